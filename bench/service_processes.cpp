@@ -5,7 +5,7 @@
 
 #include "common/base/check.h"
 #include "common/volume/sphere.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
-#include "common/probe/percentiles.h"
-#include "common/probe/pick.h"
+#include "coordinator/probe/percentiles.h"
+#include "coordinator/probe/pick.h"
 
 namespace slabstream {
 namespace {

@@ -12,9 +12,9 @@
 
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
-#include "common/volume_io/formats.h"
-#include "common/volume_io/read_options.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/read_options.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {

@@ -6,7 +6,7 @@
 //   NAME=PATH?time=FIRST:LAST
 //               a volume for each time of a file that holds several: NAME@FIRST ... NAME@LAST (NameAtTime)
 //   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
-//               the same with layers (common/layers/layer_reader.h); either one may be left out
+//               the same with layers (data/layers/layer_reader.h); either one may be left out
 //   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
 //               folder in it that is a volume by its name; a watched folder of nothing but slices, or DICOM, is one volume and has its
 //               name; in one of nothing but folders each may be a volume. What has a name that begins with a dot is left out

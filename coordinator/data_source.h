@@ -12,8 +12,8 @@
 
 #include "common/base/file_stamp.h"
 #include "common/base/status.h"
-#include "common/layers/layer_reader.h"
 #include "common/volume/layers.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

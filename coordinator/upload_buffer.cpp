@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/layers/color_table.h"
 #include "common/volume/memory_budget.h"
+#include "data/layers/color_table.h"
 
 namespace slabstream {
 namespace {

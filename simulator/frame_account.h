@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/simulation/timeline.h"
+#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "common/simulation/network.h"
-#include "common/simulation/union_coverage.h"
 #include "simulator/conditions.h"
 #include "simulator/frame_account.h"
+#include "simulator/model/network.h"
+#include "simulator/model/union_coverage.h"
 #include "simulator/simulate_frames.h"
 #include "simulator/simulated_service.h"
 

@@ -18,8 +18,8 @@
 #include "common/base/status.h"
 #include "common/image/coverage_map.h"
 #include "common/planning/frame_plan.h"
-#include "common/simulation/machine_model.h"
-#include "common/simulation/timeline.h"
+#include "simulator/model/machine_model.h"
+#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/simulation/machine_model.h"
-#include "common/simulation/timeline.h"
+#include "simulator/model/machine_model.h"
+#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

@@ -10,9 +10,9 @@
 #include <queue>
 #include <vector>
 
-#include "common/simulation/machine_model.h"
-#include "common/simulation/processors.h"
-#include "common/simulation/timeline.h"
+#include "simulator/model/machine_model.h"
+#include "simulator/model/processors.h"
+#include "simulator/model/timeline.h"
 #include "simulator/threads.h"
 
 namespace slabstream {

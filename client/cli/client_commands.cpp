@@ -13,11 +13,11 @@
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
-#include "common/simulation/link_model.h"
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/formats.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/tuning/service_machine.h"
+#include "data/volume_io/formats.h"
+#include "simulator/model/link_model.h"
 
 namespace slabstream {
 namespace {

@@ -12,7 +12,7 @@
 #include "common/base/files.h"
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/formats.h"
+#include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace {

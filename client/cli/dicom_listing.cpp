@@ -6,7 +6,7 @@
 
 #include "client/cli/input_volume.h"
 #include "common/base/printable.h"
-#include "common/volume_io/read_options.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {

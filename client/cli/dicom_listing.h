@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "common/volume_io/dicom_series.h"
+#include "data/volume_io/dicom_series.h"
 
 namespace slabstream {
 

@@ -19,7 +19,7 @@
 #include "client/request/json_value.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/summary.h"
-#include "common/volume_io/mesh_reader.h"
+#include "data/volume_io/mesh_reader.h"
 
 namespace slabstream {
 namespace {

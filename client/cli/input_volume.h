@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/base/status.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 

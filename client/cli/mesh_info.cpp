@@ -12,7 +12,7 @@
 #include "client/cli/input_volume.h"
 #include "client/request/json_value.h"
 #include "common/volume/summary.h"
-#include "common/volume_io/mesh_reader.h"
+#include "data/volume_io/mesh_reader.h"
 
 namespace slabstream {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
-#include "common/volume_io/read_options.h"
 #include "common/wire/control_messages.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {

@@ -14,11 +14,11 @@
 #include "client/service/service_choice.h"
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
-#include "common/layers/layer_reader.h"
 #include "common/volume/sphere.h"
-#include "common/volume_io/read_options.h"
-#include "common/volume_io/sample_type.h"
 #include "common/wire/client_messages.h"
+#include "data/layers/layer_reader.h"
+#include "data/volume_io/read_options.h"
+#include "data/volume_io/sample_type.h"
 
 namespace slabstream {
 

@@ -5,7 +5,7 @@
 
 #include "client/cli/picture_sink.h"
 #include "client/image_io/image_writer.h"
-#include "common/layers/layer_reader.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

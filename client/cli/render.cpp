@@ -24,7 +24,7 @@
 #include "common/frame/dataset_name.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/validate_request.h"
-#include "common/volume_io/read_options.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {

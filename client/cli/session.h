@@ -9,8 +9,8 @@
 #include "client/cli/options.h"
 #include "client/client.h"
 #include "common/base/status.h"
-#include "common/layers/layer_reader.h"
 #include "coordinator/data_source.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

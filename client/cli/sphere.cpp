@@ -4,7 +4,7 @@
 
 #include "client/cli/commands.h"
 #include "common/base/files.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 

@@ -17,7 +17,7 @@
 #include "client/service/process.h"
 #include "client/service/service_state.h"
 #include "common/base/stop_signals.h"
-#include "common/volume_io/read_options.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -49,8 +49,8 @@ std::string CatalogueEntry(const std::string& source) {
   return fmt::format("{}={}{}", DatasetName(path), path.string(), options == std::string::npos ? "" : source.substr(options));
 }
 
-// Threads of one worker draw into one image; what several workers draw has to be combined first. Splatting gives a thread 64 rows of the
-// image at a time, so this many threads are busy.
+// The threads of one worker draw one image together, while images of several workers must be combined. A task of splatting is 64 rows, so a
+// picture of 1024 rows keeps this many threads busy.
 constexpr int kThreadsOfAWorker = 8;
 int WorkersForView() { return (CoreCount() + kThreadsOfAWorker - 1) / kThreadsOfAWorker; }
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
-#include "common/layers/layer_reader.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

@@ -9,7 +9,7 @@
 #include "client/image_io/composed_picture.h"
 #include "client/request/slice_request.h"
 #include "common/frame/frame_request.h"
-#include "common/layers/layer_reader.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

@@ -13,8 +13,8 @@
 #include "client/request/values.h"
 #include "common/base/version.h"
 #include "common/view/named_view.h"
-#include "common/volume_io/volume_reader.h"
 #include "common/wire/request_json.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {

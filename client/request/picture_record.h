@@ -17,7 +17,7 @@
 #include "client/request/json_value.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
-#include "common/layers/layer_reader.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 

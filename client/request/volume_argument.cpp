@@ -8,7 +8,7 @@
 
 #include "common/base/files.h"
 #include "common/cli/parse.h"
-#include "common/volume_io/read_options.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {

@@ -1,5 +1,5 @@
 // A volume on the command line, in the form that all commands accept: VOLUME or VOLUME:TRANSFER. VOLUME is a file, with options for
-// reading it or without (common/volume_io/read_options.h), or, at a service, a dataset's name; TRANSFER is a value of --transfer.
+// reading it or without (data/volume_io/read_options.h), or, at a service, a dataset's name; TRANSFER is a value of --transfer.
 #pragma once
 
 #include <optional>

@@ -83,8 +83,9 @@ HWY_INLINE void FindPlaces(const ProjectiveMap& map, const PixelBounds& image, s
   const hn::Rebind<float, decltype(d)> df;
   const hn::Rebind<std::int32_t, decltype(d)> di;
   const auto one = hn::Set(d, 1.0), zero = hn::Zero(d);
-  auto widest = zero, least_w = one;                                                          // widest: the square of the steepest gradient
-  auto left = hn::Set(d, kFarthestPlace), right = hn::Neg(left), top = left, bottom = right;  // of the places
+  auto widest = zero, least_w = one;  // widest: the square of the steepest gradient
+  // Of the places.
+  auto left = hn::Set(d, kFarthestPlace), right = hn::Neg(left), top = left, bottom = right;
   for (std::int32_t i = 0; i < kBatch; i += std::int32_t(hn::Lanes(d))) {
     const auto x = hn::Add(hn::Iota(d, double(i)), hn::Set(d, x_begin + 0.5));
     const auto row = [&](std::size_t r) HWY_ATTR {

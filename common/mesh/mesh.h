@@ -1,5 +1,5 @@
 // A mesh of tetrahedra with one value at each point, between which it is linear, or one in each tetrahedron. What every reader of
-// unstructured grids makes (common/volume_io), and all that is drawn of them.
+// unstructured grids makes (data/volume_io), and all that is drawn of them.
 #pragma once
 
 #include <cstddef>

@@ -23,7 +23,7 @@ namespace slabstream {
 
 struct LocalImage;
 
-// Which point of a ray its pixel shows (common/probe/pick.h).
+// Which point of a ray its pixel shows (coordinator/probe/pick.h).
 enum class PickRule : std::uint8_t {
   kHalfOpacity,  // where half of the light is lost
   kSurface,      // where it meets the first opaque voxel

@@ -28,11 +28,11 @@
 
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
-#include "common/probe/volume_sample.h"
 #include "common/stats/prediction.h"
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
+#include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
 
@@ -260,7 +260,7 @@ struct SampleReply {
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
-// The point that a pixel shows (common/probe/pick.h).
+// The point that a pixel shows (coordinator/probe/pick.h).
 struct PickQuery {
   std::uint64_t nonce = 0;
   FrameRequest frame;   // its policy and previews do not matter

@@ -17,8 +17,8 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
-#include "common/simulation/machine_model.h"
 #include "common/stats/prediction.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

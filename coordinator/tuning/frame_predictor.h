@@ -1,5 +1,5 @@
 // FramePredictor: predicts the time of a frame with one layout and one way to combine, by the simulation that experiments use
-// (common/simulation), with estimated boxes (box_estimator.h). Pure and deterministic.
+// (simulator/model), with estimated boxes (box_estimator.h). Pure and deterministic.
 //
 // It simulates a coarse frame: pixels are merged until ranks x tiles are at most kMostTiles, and costs per pixel grow accordingly.
 #pragma once
@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "common/simulation/machine_model.h"
 #include "common/stats/prediction.h"
 #include "coordinator/tuning/box_estimator.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "common/planning/hosted_worker.h"
-#include "common/simulation/machine_model.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

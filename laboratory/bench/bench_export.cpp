@@ -5,8 +5,8 @@
 
 #include "common/base/files.h"
 #include "common/mesh/lattice.h"
-#include "common/volume_io/read_options.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/read_options.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "common/simulation/timeline.h"
 #include "laboratory/experiments/frame_case.h"
 #include "laboratory/results/results.h"
+#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

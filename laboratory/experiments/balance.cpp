@@ -48,18 +48,18 @@ struct Balance {
   }
 };
 
-std::vector<BenchCase> VolumesOf(const ExperimentContext& context) {
-  const OwnOptions& own = context.options().own;
+// `size`: of a standard sphere.
+std::vector<BenchCase> VolumesOf(const ExperimentOptions& options, int size) {
+  const OwnOptions& own = options.own;
   std::vector<std::string> named = own.cases;
-  named.insert(named.end(), context.options().volumes.begin(), context.options().volumes.end());
-  const int size = context.Scaled(context.quick() ? 128 : 200);
+  named.insert(named.end(), options.volumes.begin(), options.volumes.end());
   std::vector<BenchCase> volumes;
   const auto add_with = [&](const RendererKind* renderer) {
     const std::size_t begin = volumes.size();
     if (own.cases.empty()) {
       const RendererKind* const kind = renderer != nullptr ? renderer : FindRenderer(kDefaultRenderer);
       for (const SphereClass sphere : {SphereClass::kHollow, SphereClass::kFilled}) volumes.push_back(StandardSphere(sphere, size, kind));
-      if (!context.quick() || !named.empty()) std::ranges::move(RealVolumes(named), std::back_inserter(volumes));
+      if (!options.quick || !named.empty()) std::ranges::move(RealVolumes(named), std::back_inserter(volumes));
     } else {
       std::ranges::move(NamedVolumes("VOLUME", named), std::back_inserter(volumes));
     }
@@ -93,7 +93,9 @@ std::vector<const ViewMotion*> MotionsOf(const ExperimentOptions& options) {
 
 Balance BalanceOf(const ExperimentContext& context) {
   const OwnOptions& own = context.options().own;
-  Balance balance{.volumes = VolumesOf(context), .pixels = context.Scaled(512), .steps = context.quick() ? 4 : 8};
+  Balance balance{.volumes = VolumesOf(context.options(), context.Scaled(context.quick() ? 128 : 200)),
+                  .pixels = context.Scaled(512),
+                  .steps = context.quick() ? 4 : 8};
   balance.workers = !own.workers.empty() ? own.workers : context.quick() ? std::vector{2, 16} : std::vector{2, 16, 64};
   std::ranges::sort(balance.workers);
   balance.motions = MotionsOf(context.options());
@@ -363,9 +365,8 @@ void CheckBalance(const ExperimentOptions& options) {
   if (transfers != 0 && transfers != 2)
     throw Failure(
         Status::InvalidArgument(fmt::format("--transfer needs two transfer functions that differ, A,B; {} was given", transfers)));
-  for (const RendererKind* renderer : options.own.renderers) {
+  for (const BenchCase& volume : VolumesOf(options, kLeastScaledSide)) {
     for (const ViewMotion* motion : MotionsOf(options)) {
-      const BenchCase volume = StandardSphere(SphereClass::kHollow, kLeastScaledSide, renderer);
       OrThrow(Validate(RequestOf({.volume = volume, .size = {1, 1}, .view = motion->at(0), .policy = {}})));
     }
   }

@@ -1,6 +1,6 @@
 // FrameCase: one way to render one frame. The costs of its boxes are measured by rendering each of them alone
 // (laboratory/measure/box_costs.h). The frame time is measured with the service if this machine has enough cores, and simulated from the
-// box costs for any number of workers (common/simulation).
+// box costs for any number of workers (simulator/model).
 #pragma once
 
 #include <array>

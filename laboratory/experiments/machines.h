@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/simulation/machine_model.h"
 #include "laboratory/experiments/frame_case.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

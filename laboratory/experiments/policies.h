@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
-#include "common/simulation/timeline.h"
+#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

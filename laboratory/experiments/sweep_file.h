@@ -10,10 +10,10 @@
 
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
-#include "common/simulation/link_model.h"
 #include "laboratory/bench/bench_cases.h"
 #include "laboratory/experiments/frame_case.h"
 #include "laboratory/experiments/machines.h"
+#include "simulator/model/link_model.h"
 
 namespace slabstream {
 

@@ -11,7 +11,7 @@
 #include "common/planning/count_drawn.h"
 #include "common/planning/frame_plan.h"
 #include "common/renderers/renderer_kind.h"
-#include "common/volume_io/read_options.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 

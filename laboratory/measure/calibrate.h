@@ -6,9 +6,9 @@
 #pragma once
 
 #include "common/base/status.h"
-#include "common/simulation/machine_model.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/measure/wake_up_fit.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

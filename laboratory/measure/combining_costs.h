@@ -2,7 +2,7 @@
 #pragma once
 
 #include "common/image/pixel_format.h"
-#include "common/simulation/machine_model.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

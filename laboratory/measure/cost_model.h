@@ -10,7 +10,7 @@
 //   c_cp N I^2/p  composite           kSheetPixel, kDrawn                          only segments that hold something
 //   c_z C N^3/p  Z-buffer             kBrickTest, kDrawn, kPixel                   faces towards the eye
 //   c_sh C I^2  shade (Z-buffer)      kPixel                                       deferred: pixels that show something
-//   c_co I^2 log p  combine           CombiningCosts (common/simulation)           a matter of the schedule, which is simulated
+//   c_co I^2 log p  combine           CombiningCosts (simulator/model)           a matter of the schedule, which is simulated
 // kBox is a cost that every box has. Constants are seconds of one thread; laboratory/measure/cost_fit.h fits them.
 #pragma once
 

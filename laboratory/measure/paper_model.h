@@ -4,12 +4,12 @@
 //
 // A round writes, reads and combines one image; rounds of different processors do not wait for each other. T(1) is printed in tables 5 and
 // 6. One u a renderer gives back the times of frames in tables 2, 5 and 6; it cannot give back the shares of combining in tables 5 and 6,
-// which grow and shrink with p. `experiment paper` prints its errors, and tests/experiments/paper_model_test.cpp holds them.
+// which grow and shrink with p. `experiment paper` prints its errors, and tests/laboratory/experiments/paper_model_test.cpp holds them.
 #pragma once
 
 #include <string_view>
 
-#include "common/simulation/machine_model.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

@@ -10,7 +10,7 @@
 
 #include "client/cli/recording.h"
 #include "common/base/status.h"
-#include "common/simulation/machine_model.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

@@ -16,9 +16,9 @@
 
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
-#include "common/simulation/machine_model.h"
 #include "common/volume/volume.h"
 #include "laboratory/measure/wake_up_fit.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

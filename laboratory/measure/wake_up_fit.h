@@ -13,8 +13,8 @@
 
 #include <span>
 
-#include "common/simulation/machine_model.h"
 #include "laboratory/measure/statistics.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "tests/data/volume_io/dicom_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
-#include "tests/volume_io/dicom_files.h"
 
 namespace slabstream {
 namespace {

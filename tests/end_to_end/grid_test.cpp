@@ -6,9 +6,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "tests/common/mesh/vtu_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
-#include "tests/mesh/vtu_files.h"
 
 namespace slabstream {
 namespace {

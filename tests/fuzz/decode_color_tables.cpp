@@ -1,7 +1,7 @@
 // Colour tables of labels, of every format.
 //
 // input: the file
-#include "common/layers/color_table.h"
+#include "data/layers/color_table.h"
 #include "tests/fuzz/decoders.h"
 
 namespace slabstream {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/volume_io/dicom_series.h"
+#include "data/volume_io/dicom_series.h"
+#include "tests/data/volume_io/dicom_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
-#include "tests/volume_io/dicom_files.h"
 
 namespace slabstream {
 namespace {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <string>
 
-#include "common/volume_io/mesh_reader.h"
+#include "data/volume_io/mesh_reader.h"
+#include "tests/common/mesh/vtu_files.h"
 #include "tests/fuzz/decoders.h"
-#include "tests/mesh/vtu_files.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {

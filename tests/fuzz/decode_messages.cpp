@@ -1,8 +1,8 @@
 // Messages: what arrives as the first frame on a socket of the service.
+#include "tests/common/wire/decode_any_input.h"
+#include "tests/common/wire/samples.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/fuzz/recorded_traffic.h"
-#include "tests/wire/decode_any_input.h"
-#include "tests/wire/samples.h"
 
 namespace slabstream {
 

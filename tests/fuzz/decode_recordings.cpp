@@ -4,7 +4,7 @@
 
 #include "client/cli/recording.h"
 #include "tests/fuzz/decoders.h"
-#include "tests/measure/recorded.h"
+#include "tests/laboratory/measure/recorded.h"
 
 namespace slabstream {
 namespace {

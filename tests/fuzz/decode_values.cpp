@@ -5,8 +5,8 @@
 #include "client/request/values.h"
 #include "client/request/volume_argument.h"
 #include "common/cli/parse.h"
-#include "common/simulation/link_model.h"
 #include "common/transport/endpoint.h"
+#include "simulator/model/link_model.h"
 #include "tests/fuzz/decoders.h"
 
 namespace slabstream {

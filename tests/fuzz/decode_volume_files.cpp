@@ -3,12 +3,12 @@
 // input: u8 kind (Kinds()), u8 options (OptionsNumber), the file
 #include <algorithm>
 
-#include "common/volume_io/formats.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/volume_reader.h"
+#include "tests/data/volume_io/more_files.h"
+#include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
-#include "tests/volume_io/more_files.h"
-#include "tests/volume_io/volume_files.h"
 
 namespace slabstream {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "common/mesh/mesh_part.h"
 #include "common/wire/payload.h"
-#include "tests/mesh/mesh_samples.h"
+#include "tests/common/mesh/mesh_samples.h"
 
 namespace slabstream {
 namespace {

@@ -14,7 +14,6 @@
 #include "common/mesh/mesh_part.h"
 #include "common/transport/socket.h"
 #include "common/volume/sphere.h"
-#include "common/volume_io/volume_reader.h"
 #include "common/wire/payload.h"
 #include "coordinator/answer_question.h"
 #include "coordinator/box_samples.h"
@@ -22,7 +21,8 @@
 #include "coordinator/dataset_id.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/slab_server.h"
-#include "tests/mesh/mesh_samples.h"
+#include "data/volume_io/volume_reader.h"
+#include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 

@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
-#include "common/layers/layer_reader.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/layers/layer_reader.h"
+#include "data/volume_io/volume_reader.h"
 #include "tests/service/multi_process_fixture.h"
 
 namespace slabstream {

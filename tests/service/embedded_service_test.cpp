@@ -10,7 +10,7 @@
 #include <optional>
 #include <thread>
 
-#include "tests/mesh/mesh_samples.h"
+#include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 

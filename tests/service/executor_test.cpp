@@ -11,7 +11,7 @@
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
 #include "common/wire/payload.h"
-#include "tests/mesh/mesh_samples.h"
+#include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 

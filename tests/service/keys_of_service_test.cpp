@@ -10,8 +10,8 @@
 
 #include "client/client.h"
 #include "common/service/service_file.h"
-#include "common/volume_io/volume_reader.h"
 #include "coordinator/service.h"
+#include "data/volume_io/volume_reader.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"

@@ -9,7 +9,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/planning/worker_memory.h"
 #include "common/volume/memory_budget.h"
-#include "common/volume_io/volume_reader.h"
+#include "data/volume_io/volume_reader.h"
 #include "tests/service/child_process.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"

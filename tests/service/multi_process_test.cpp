@@ -10,8 +10,8 @@
 #include <iterator>
 #include <random>
 
-#include "tests/mesh/mesh_samples.h"
-#include "tests/mesh/vtu_files.h"
+#include "tests/common/mesh/mesh_samples.h"
+#include "tests/common/mesh/vtu_files.h"
 #include "tests/service/multi_process_fixture.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"

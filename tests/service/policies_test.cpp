@@ -13,7 +13,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
-#include "tests/mesh/mesh_samples.h"
+#include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/renderers.h"

@@ -1,7 +1,7 @@
 // Machine models for tests.
 #pragma once
 
-#include "common/simulation/machine_model.h"
+#include "simulator/model/machine_model.h"
 
 namespace slabstream {
 

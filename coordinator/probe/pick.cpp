@@ -1,0 +1,264 @@
+#include "coordinator/probe/pick.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "common/frame/label_use.h"
+#include "common/renderers/renderer_kind.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kStep = 0.25;  // least spacings
+constexpr int kParts = 64;      // of the step in which the point lies
+
+// Depths [begin, end] of a ray.
+struct Stretch {
+  double begin, end;
+};
+
+// What clipping leaves of the ray in the volume, nearest first.
+std::vector<Stretch> DrawnStretches(const FrameSetup& setup, const Camera::Ray& ray) {
+  Stretch whole = {0, kInfinity};
+  const auto cut = [&ray](Stretch& stretch, const Vec3& normal, double offset) {  // keeps Dot(normal, p) + offset >= 0
+    const double at_origin = Dot(normal, ray.origin) + offset, slope = Dot(normal, ray.direction);
+    if (slope > 0) {
+      stretch.begin = std::max(stretch.begin, -at_origin / slope);
+    } else if (slope < 0) {
+      stretch.end = std::min(stretch.end, -at_origin / slope);
+    } else if (at_origin < 0) {
+      stretch.end = -kInfinity;
+    }
+  };
+  for (const Axis axis : kAxes) {
+    Vec3 normal;
+    normal[axis] = 1;
+    cut(whole, normal, 0.5);
+    cut(whole, -normal, setup.description.geometry.size[axis] - 0.5);
+  }
+  if (whole.begin >= whole.end) return {};
+  if (setup.clip.empty()) return {whole};
+  Stretch region = whole;
+  for (const HalfSpace& side : setup.clip.sides) cut(region, side.normal, side.offset);
+  if (setup.clip.mode == ClipMode::kKeep) return region.begin < region.end ? std::vector{region} : std::vector<Stretch>{};
+  if (region.begin >= region.end) return {whole};
+  std::vector<Stretch> rest;
+  if (whole.begin < region.begin) rest.push_back({whole.begin, region.begin});
+  if (region.end < whole.end) rest.push_back({region.end, whole.end});
+  return rest;
+}
+
+// Where a ray enters a voxel.
+struct Entry {
+  double depth;
+  Index3 voxel;
+};
+
+// The ray through opaque cells of voxels, [v - 0.5, v + 0.5) (J. Amanatides, A. Woo: A fast voxel traversal algorithm, 1987).
+std::optional<Entry> FirstOpaqueVoxel(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
+                                      const std::vector<Stretch>& stretches) {
+  const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
+  const std::vector<LabelUse> uses = setup.looks.labels ? UsesOf(*setup.looks.labels) : std::vector<LabelUse>{LabelUse::kAsVolume};
+  const auto is_opaque = [&](const Index3& voxel) {
+    const LabelUse use = uses[std::min(std::size_t(setup.looks.labels ? volume.LabelNumberAt(voxel) : 0), uses.size() - 1)];
+    if (use != LabelUse::kAsVolume) return use == LabelUse::kOpaque;
+    const double stored = volume.StoredAt(voxel);
+    return std::isfinite(stored) && table.opacity[std::size_t(table.BinOf(stored))] > 0;
+  };
+  const Box bounds = setup.description.geometry.bounds();
+  for (const Stretch& stretch : stretches) {
+    double depth = stretch.begin;
+    Index3 voxel = Max(bounds.begin, Min(VoxelAt(ray.origin + depth * ray.direction), bounds.end - Uniform(1)));
+    while (bounds.Contains(voxel) && depth < stretch.end) {
+      if (is_opaque(voxel)) return Entry{depth, voxel};
+      double next = kInfinity;
+      int axis = 0;
+      for (int i = 0; i < 3; ++i) {
+        if (ray.direction[i] == 0) continue;
+        const double border = voxel[i] + (ray.direction[i] > 0 ? 0.5 : -0.5);
+        const double at = (border - ray.origin[i]) / ray.direction[i];
+        if (at < next) {
+          next = at;
+          axis = i;
+        }
+      }
+      depth = std::max(depth, next);
+      voxel[axis] += ray.direction[axis] > 0 ? 1 : -1;
+    }
+  }
+  return std::nullopt;
+}
+
+// The nearest sample with the largest value of `sign` * value.
+std::optional<double> Extreme(const FrameSetup& setup, const ProbeVolume& volume, const Camera::Ray& ray,
+                              const std::vector<Stretch>& stretches, double step, double sign) {
+  std::optional<double> at;
+  double best = -kInfinity;
+  for (const Stretch& stretch : stretches) {
+    const auto count = std::int64_t(std::ceil((stretch.end - stretch.begin) / step));
+    for (std::int64_t i = 0; i <= count; ++i) {
+      const double depth = std::min(stretch.begin + double(i) * step, stretch.end);
+      const double value = sign * setup.description.mapping.FromStored(volume.Interpolated(ray.origin + depth * ray.direction));
+      if (!(value > best)) continue;  // also not finite
+      best = value;
+      at = depth;
+    }
+  }
+  return at;
+}
+
+// How a ray loses light.
+class Matter {
+ public:
+  Matter(const FrameSetup& setup, const ProbeVolume& volume)
+      : setup_(setup), volume_(volume), table_(setup.renderer->Table(setup.transfer, setup.description, setup.range)) {
+    const Vec3& spacing = setup.description.geometry.spacing;
+    for (int i = 0; i < 3; ++i) per_world_[i] = 1 / spacing[i];
+    if (!setup.renderer->isosurfaces()) return;
+    for (const Isosurface& surface : setup.transfer.isosurfaces) {
+      surfaces_.push_back({double(StoredIsovalue(surface.value, setup.description.mapping)), surface.opacity});
+    }
+  }
+
+  struct Surface {
+    double stored, opacity;
+  };
+  const std::vector<Surface>& surfaces() const { return surfaces_; }
+  double StoredAt(const Vec3& p) const { return volume_.Interpolated(p); }
+
+  // Of a least spacing at p, where the interpolated sample is `stored`; infinite: opaque.
+  double Extinction(const Vec3& p, double stored) const {
+    const LabelLook* const look = setup_.looks.labels ? &*setup_.looks.labels : nullptr;
+    double factor = 1;
+    if (look != nullptr) {
+      const Box bounds = setup_.description.geometry.bounds();
+      const std::size_t number = volume_.LabelNumberAt(Max(bounds.begin, Min(VoxelAt(p), bounds.end - Uniform(1))));
+      if (number > 0 && number <= look->entries.size()) {
+        const LabelLook::Entry& entry = look->entries[number - 1];
+        if (look->mode == LabelMode::kTint) {
+          factor = entry.shown ? double(entry.opacity) : 0;
+        } else if (entry.shown) {
+          return -std::log1p(-double(entry.opacity));
+        }
+      }
+    }
+    if (!std::isfinite(stored)) return 0;
+    double opacity = factor * double(table_.opacity[std::size_t(table_.BinOf(stored))]);
+    if (opacity > 0 && setup_.renderer->gradient_opacity() && !setup_.transfer.gradient_opacities.empty()) {
+      opacity *= GradientOpacity(setup_.transfer.gradient_opacities, Slope(p));
+    }
+    return -std::log1p(-opacity) / table_.opacity_distance;
+  }
+
+ private:
+  // Data values per unit of the world.
+  double Slope(const Vec3& p) const {
+    Vec3 gradient;
+    for (int i = 0; i < 3; ++i) {
+      Vec3 offset;
+      offset[i] = 1;
+      gradient[i] = (volume_.Interpolated(p + offset) - volume_.Interpolated(p - offset)) / 2 * per_world_[i];
+    }
+    const double slope = Length(gradient) * std::abs(setup_.description.mapping.scale);
+    return std::isfinite(slope) ? slope : 0;
+  }
+
+  const FrameSetup& setup_;
+  const ProbeVolume& volume_;
+  const ClassificationTable table_;
+  Vec3 per_world_;
+  std::vector<Surface> surfaces_;
+};
+
+// Follows a ray front to back until half of its light is lost.
+class HalfLightWalk {
+ public:
+  HalfLightWalk(const Matter& matter, const Camera::Ray& ray, double least_per_depth)
+      : matter_(matter), ray_(ray), least_per_depth_(least_per_depth) {}
+
+  std::optional<double> Along(const Stretch& stretch, double step) {
+    const auto count = std::int64_t(std::ceil((stretch.end - stretch.begin) / step));
+    double stored = StoredAt(stretch.begin);
+    for (std::int64_t i = 0; i < count; ++i) {
+      const Stretch part = {stretch.begin + double(i) * step, std::min(stretch.begin + double(i + 1) * step, stretch.end)};
+      const double before = left_, first = stored;
+      Pass(part, stored);
+      if (left_ > kHalf) continue;
+      // Again, in small steps.
+      left_ = before;
+      stored = first;
+      for (int k = 0; k < kParts; ++k) {
+        const double width = (part.end - part.begin) / kParts;
+        const Stretch small = {part.begin + k * width, part.begin + (k + 1) * width};
+        Pass(small, stored);
+        if (left_ <= kHalf) return 0.5 * (small.begin + small.end);
+      }
+      left_ = std::max(left_, kHalf);  // the small steps lost a little less: go on
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static constexpr double kHalf = 0.5;
+
+  double StoredAt(double depth) const { return matter_.StoredAt(ray_.origin + depth * ray_.direction); }
+
+  // `stored`: the sample at its begin, then that at its end.
+  void Pass(const Stretch& part, double& stored) {
+    const double middle = 0.5 * (part.begin + part.end), next = StoredAt(part.end);
+    const Vec3 p = ray_.origin + middle * ray_.direction;
+    left_ *= std::exp(-matter_.Extinction(p, StoredAt(middle)) * (part.end - part.begin) * least_per_depth_);
+    for (const Matter::Surface& surface : matter_.surfaces()) {
+      if ((stored >= surface.stored) != (next >= surface.stored)) left_ *= 1 - surface.opacity;
+    }
+    stored = next;
+  }
+
+  const Matter& matter_;
+  const Camera::Ray& ray_;
+  const double least_per_depth_;
+  double left_ = 1;  // transmittance
+};
+
+}  // namespace
+
+std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, double x, double y) {
+  const Camera::Ray ray = setup.camera.RayAt(x * setup.camera.supersample, y * setup.camera.supersample);
+  const std::vector<Stretch> stretches = DrawnStretches(setup, ray);
+  const Vec3& spacing = setup.description.geometry.spacing;
+  const double least_per_depth = Length(ray.direction * spacing) / Least(spacing), step = kStep / least_per_depth;
+
+  const auto picked = [&](double depth, double deeper) {
+    const Box bounds = setup.description.geometry.bounds();
+    const Index3 voxel = VoxelAt(ray.origin + (depth + deeper) * ray.direction);
+    return Picked{ray.origin + depth * ray.direction, depth, Max(bounds.begin, Min(voxel, bounds.end - Uniform(1)))};
+  };
+  const auto extreme = [&](double sign) -> std::optional<Picked> {
+    const std::optional<double> depth = Extreme(setup, volume, ray, stretches, step, sign);
+    return depth ? std::optional(picked(*depth, 0)) : std::nullopt;
+  };
+  switch (setup.renderer->PickRuleOf(setup.parameters)) {
+    case PickRule::kHalfOpacity: {
+      const Matter matter(setup, volume);
+      HalfLightWalk walk(matter, ray, least_per_depth);
+      for (const Stretch& stretch : stretches) {
+        if (const std::optional<double> depth = walk.Along(stretch, step)) return picked(*depth, 1 / least_per_depth);
+      }
+      return std::nullopt;
+    }
+    case PickRule::kSurface: {
+      const std::optional<Entry> entry = FirstOpaqueVoxel(setup, volume, ray, stretches);
+      if (!entry) return std::nullopt;
+      return Picked{ray.origin + entry->depth * ray.direction, entry->depth, entry->voxel};
+    }
+    case PickRule::kLargest: return extreme(1);
+    case PickRule::kLeast: return extreme(-1);
+    case PickRule::kNone: break;
+  }
+  return std::nullopt;
+}
+
+}  // namespace slabstream

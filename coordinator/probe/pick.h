@@ -1,0 +1,32 @@
+// Pick: the point of the world that a pixel of a picture shows. It lies on the pixel's ray through the drawn part of the volume. By the
+// renderer's PickRule it is
+//   where renderers gather opacity (kHalfOpacity)     the first point up to which the ray has met opacity of one half or more: the
+//   opacities
+//                                                     of the transfer function at trilinear samples, isosurfaces, and labels as the frame
+//                                                     shows them. None if the whole ray meets less
+//   of opaque voxels (kSurface)                       where the ray enters the first opaque voxel, as its pictures have it
+//   of the largest or the least value                 the nearest sample with that value
+// Overlays do not count. Opacity is gathered in quarters of the least spacing, and the last step is divided further, so the point does not
+// depend on the renderer's own samples. Light does not matter. The footprints of splatting are wider than these samples, so where its
+// matter ends it may show some where nothing is picked.
+#pragma once
+
+#include <optional>
+
+#include "common/frame/frame_setup.h"
+#include "coordinator/probe/probe_volume.h"
+
+namespace slabstream {
+
+struct Picked {
+  Vec3 at;           // data space
+  double depth = 0;  // as depths of the picture's pixels (common/view/camera.h)
+  // That the pixel shows. Points of a surface lie between voxels, so where opacity is gathered it is the one that holds the point a
+  // least spacing farther along the ray.
+  Index3 voxel = {};
+};
+
+// x, y: pixels of the finished picture, from its upper left corner. Pure; may take milliseconds.
+std::optional<Picked> Pick(const FrameSetup& setup, const ProbeVolume& volume, double x, double y);
+
+}  // namespace slabstream

@@ -1,0 +1,59 @@
+// Compressed DICOM frames, decompressed by GDCM in processes of their own.
+//
+// GDCM is not made for damaged or hostile bytes: as Debian compiles it, it ends the process where an assertion fails, it writes to stderr,
+// and it may write beyond its buffers. So it runs in a child of this process, which has no open files but its pipe, a limit of memory and a
+// time for each frame. Whatever happens there, the caller gets pixels or a Status.
+#pragma once
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "data/volume_io/dicom_elements.h"
+#include "data/volume_io/dicom_image.h"
+
+namespace slabstream {
+
+// Whether frames of this transfer syntax (UID) can be decompressed.
+bool CanDecompress(const std::string& transfer_syntax);
+// Their names, for messages.
+inline constexpr const char* kCompressions = "JPEG, JPEG Lossless, JPEG-LS, JPEG 2000 and RLE";
+
+struct CompressedFrame {
+  std::string path, transfer_syntax;
+  std::vector<DicomFragment> fragments;  // its bytes in the file, one after the other
+  std::int32_t columns = 0, rows = 0;
+  DicomPixelFormat format;
+
+  std::int64_t bytes() const { return std::int64_t{columns} * rows * (format.bits_allocated / 8); }
+};
+
+// Processes that decompress frames ahead of the caller. One thread at a time.
+class DicomDecoder {
+ public:
+  static Result<DicomDecoder> Start(std::vector<CompressedFrame> frames);
+  DicomDecoder(DicomDecoder&&) = default;
+  DicomDecoder& operator=(DicomDecoder&&) = delete;
+  ~DicomDecoder();  // ends the processes
+
+  // The next frame: its pixels in this machine's byte order, format.bits_allocated each. DataLoss: damaged; the message names the file.
+  Status Read(std::span<std::byte> out);
+
+ private:
+  struct Process {
+    pid_t pid = -1;
+    int pipe = -1;
+  };
+  DicomDecoder() = default;
+
+  std::vector<CompressedFrame> frames_;
+  std::vector<Process> processes_;  // process i has the frames i, i + processes_.size() ...
+  std::size_t next_ = 0;
+};
+
+}  // namespace slabstream

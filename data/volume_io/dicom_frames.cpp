@@ -1,0 +1,198 @@
+#include "data/volume_io/dicom_frames.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <type_traits>
+
+#include "common/base/aligned_buffer.h"
+#include "data/volume_io/dicom_decoder.h"
+#include "data/volume_io/payload.h"
+
+namespace slabstream {
+namespace {
+
+bool IsUncompressed(const DicomImage& image) {
+  return image.transfer_syntax == kImplicitLittleEndian || image.transfer_syntax == kExplicitLittleEndian ||
+         image.transfer_syntax == kExplicitBigEndian;
+}
+
+Status CheckFormat(const DicomImage& image) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(image.path + ": " + why); };
+  if (image.is_colour()) {
+    return wrong(fmt::format("a colour image ({}, {} samples a pixel), must have 1 sample", image.photometric, image.samples_per_pixel));
+  }
+  const auto [allocated, stored, high, is_signed] = image.format;
+  if (allocated != 8 && allocated != 16 && allocated != 32) {
+    return wrong(fmt::format("BitsAllocated is {}, supported are 8, 16 and 32", allocated));
+  }
+  if (stored < 1 || stored > allocated) return wrong(fmt::format("BitsStored is {}, must be in [1, BitsAllocated {}]", stored, allocated));
+  if (high < stored - 1 || high >= allocated) {
+    return wrong(fmt::format("HighBit is {}, must be in [BitsStored - 1, BitsAllocated - 1] = [{}, {}]", high, stored - 1, allocated - 1));
+  }
+  if (image.transfer_syntax == kExplicitBigEndian && image.pixels.words != (allocated > 8)) {
+    return wrong(fmt::format("pixels of {} bits in big endian must {}be in words of 16 bits", allocated, allocated > 8 ? "" : "not "));
+  }
+  if (!IsUncompressed(image) && !CanDecompress(image.transfer_syntax)) {
+    return wrong(
+        fmt::format("transfer syntax {} is not supported; supported: uncompressed pixels, {}", image.transfer_syntax, kCompressions));
+  }
+  return Status::Ok();
+}
+
+Status CheckRescale(const DicomImage& image) {
+  for (const DicomFrame& frame : image.frames) {
+    const auto& [slope, intercept] = frame.rescale;
+    if (slope == 0 || !std::isfinite(slope) || !std::isfinite(intercept)) {
+      return Status::InvalidArgument(
+          fmt::format("{}: RescaleSlope is {:g}, RescaleIntercept {:g}, must be finite and the slope not 0", image.path, slope, intercept));
+    }
+  }
+  if (!image.modality_lut) return Status::Ok();
+  return Status::InvalidArgument(image.path + ": has a Modality LUT Sequence instead of a rescaling, which is not supported");
+}
+
+// The bits of a pixel that are stored, as a number: signed if Raw is.
+template <class Raw>
+Raw Stored(Raw raw, const DicomPixelFormat& format) {
+  using Bits = std::make_unsigned_t<Raw>;
+  const auto at_top = Raw(Bits(Bits(raw) << (format.bits_allocated - 1 - format.high_bit)));
+  return Raw(at_top >> (format.bits_allocated - format.bits_stored));
+}
+
+template <class Function>
+void VisitPixelType(const DicomPixelFormat& format, Function&& function) {
+  switch (format.type()) {
+    case SampleType::kInt8: return function(std::int8_t{});
+    case SampleType::kUint8: return function(std::uint8_t{});
+    case SampleType::kInt16: return function(std::int16_t{});
+    case SampleType::kUint16: return function(std::uint16_t{});
+    case SampleType::kInt32: return function(std::int32_t{});
+    default: return function(std::uint32_t{});
+  }
+}
+
+// Stored pixels to samples. `pixels` may be `out`, if a sample has the bytes of a pixel.
+void ToSamples(std::span<const std::byte> pixels, const DicomImage& image, const ValueMapping& rescale, bool as_values, std::byte* out) {
+  const DicomPixelFormat& format = image.format;
+  VisitPixelType(format, [&]<class Raw>(Raw) {
+    for (std::size_t i = 0; i < pixels.size() / sizeof(Raw); ++i) {
+      Raw raw{};
+      std::memcpy(&raw, pixels.data() + i * sizeof(Raw), sizeof(Raw));
+      const Raw stored = Stored(raw, format);
+      if (as_values) {
+        const auto value = float(rescale.FromStored(double(stored)));
+        std::memcpy(out + i * sizeof(float), &value, sizeof(float));
+      } else {
+        std::memcpy(out + i * sizeof(Raw), &stored, sizeof(Raw));
+      }
+    }
+  });
+}
+
+using FrameFragments = std::vector<std::vector<DicomFragment>>;
+
+// The fragments of each frame of an encapsulated image. DataLoss: they cannot be told apart.
+Result<FrameFragments> FragmentsOfFrames(const DicomImage& image) {
+  Result<std::vector<DicomFragment>> listed = ListFragments(image.path, image.pixels);
+  if (!listed.ok()) return listed.status();
+  std::vector<DicomFragment>& all = *listed;
+  const std::size_t frames = image.frames.size();
+  const auto damaged = [&](const std::string& why) { return Status::DataLoss(image.path + ": truncated or damaged: " + why); };
+  if (all.empty()) return damaged("the compressed pixels have no offset table");
+  const DicomFragment table = all.front();
+  all.erase(all.begin());
+  if (all.size() < frames) return damaged(fmt::format("{} frames in {} fragments of compressed pixels", frames, all.size()));
+  if (frames == 1) return FrameFragments{std::move(all)};
+  FrameFragments of_frames;
+  if (all.size() == frames) {
+    for (const DicomFragment& fragment : all) of_frames.push_back({fragment});
+    return of_frames;
+  }
+  // Frames begin at the fragments whose headers lie at the table's offsets from the first.
+  if (table.second != std::int64_t(4 * frames))
+    return damaged(fmt::format("{} frames in {} fragments need an offset table", frames, all.size()));
+  std::vector<std::uint32_t> offsets(frames);
+  std::ifstream file(image.path, std::ios::binary);
+  file.seekg(table.first);
+  file.read(reinterpret_cast<char*>(offsets.data()), table.second);
+  if (file.gcount() != table.second) return damaged("the offset table cannot be read");
+  const std::int64_t begin = all.front().first;
+  std::size_t next = 0;
+  for (const DicomFragment& fragment : all) {
+    if (next < frames && fragment.first - begin == std::int64_t{offsets[next]}) {
+      of_frames.emplace_back();
+      ++next;
+    }
+    if (of_frames.empty()) return damaged("the offset table does not begin at the first fragment");
+    of_frames.back().push_back(fragment);
+  }
+  if (next != frames) return damaged("the offset table does not fit the fragments");
+  return of_frames;
+}
+
+}  // namespace
+
+Status CheckFrames(const DicomImage& image) {
+  if (Status status = CheckFormat(image); !status.ok()) return status;
+  if (Status status = CheckRescale(image); !status.ok()) return status;
+  if (image.pixels.offset == 0) return Status::InvalidArgument(image.path + ": has no Pixel Data of integers");
+  if (!image.damage.ok()) return image.damage;
+  if (IsUncompressed(image) != image.pixels.encapsulated) {
+    if (!image.pixels.encapsulated || image.frame_pixels() <= kMaxCompressedPixels) return Status::Ok();
+    return Status::InvalidArgument(
+        fmt::format("{}: {} x {} compressed pixels, limit {}", image.path, image.columns, image.rows, kMaxCompressedPixels));
+  }
+  return Status::DataLoss(fmt::format("{}: damaged: its pixels are {}, but its transfer syntax is {}", image.path,
+                                      image.pixels.encapsulated ? "in fragments" : "not in fragments", image.transfer_syntax));
+}
+
+DicomSamples SamplesOf(std::span<const DicomFrameNumber> frames) {
+  const auto rescale_of = [](const DicomFrameNumber& of) { return of.image->frames[of.frame].rescale; };
+  const DicomFrameNumber& first = frames.front();
+  const bool alike = std::ranges::all_of(frames, [&](const DicomFrameNumber& each) {
+    return each.image->format.type() == first.image->format.type() && rescale_of(each) == rescale_of(first);
+  });
+  return alike ? DicomSamples{first.image->format.type(), rescale_of(first)} : DicomSamples{SampleType::kFloat32, {}};
+}
+
+Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out) {
+  // Compressed frames, in the order in which they are needed.
+  std::vector<CompressedFrame> compressed;
+  std::map<const DicomImage*, FrameFragments> fragments;
+  for (const auto& [image, frame] : frames) {
+    if (!image->pixels.encapsulated) continue;
+    if (!fragments.contains(image)) {
+      Result<FrameFragments> of_frames = FragmentsOfFrames(*image);
+      if (!of_frames.ok()) return of_frames.status();
+      fragments[image] = *std::move(of_frames);
+    }
+    compressed.push_back({image->path, image->transfer_syntax, fragments[image][frame], image->columns, image->rows, image->format});
+  }
+  Result<DicomDecoder> decoder = DicomDecoder::Start(std::move(compressed));
+  if (!decoder.ok()) return decoder.status();
+
+  const bool as_values = samples.type == SampleType::kFloat32;
+  AlignedVector<std::byte> pixels;
+  std::byte* next = out.data();
+  for (const auto& [image, frame] : frames) {
+    pixels.resize(std::size_t(image->frame_bytes()));
+    if (image->pixels.encapsulated) {
+      if (Status status = decoder->Read(pixels); !status.ok()) return status;
+    } else {
+      const Payload payload{.file = image->path, .offset = image->pixels.offset + std::int64_t(frame) * image->frame_bytes()};
+      if (Status status = ReadPayload(payload, pixels); !status.ok()) return status;
+      if (image->transfer_syntax == kExplicitBigEndian && image->pixels.words) SwapByteOrder(SampleType::kUint16, pixels);
+    }
+    ToSamples(pixels, *image, image->frames[frame].rescale, as_values, next);
+    next += image->frame_pixels() * std::int64_t(BytesPerSample(samples.type));
+  }
+  return Status::Ok();
+}
+
+}  // namespace slabstream

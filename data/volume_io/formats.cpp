@@ -1,0 +1,116 @@
+#include "data/volume_io/formats.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/base/find_named.h"
+#include "data/volume_io/output.h"
+#include "data/volume_io/text_header.h"
+
+namespace slabstream {
+
+// Each in the file of its format.
+VolumeFormat Nifti();
+VolumeFormat Nrrd();
+VolumeFormat MetaImage();
+VolumeFormat Tiff();
+VolumeFormat Dicom();
+VolumeFormat Mrc();
+VolumeFormat VtkLegacy();
+VolumeFormat VtkImage();
+VolumeFormat UnstructuredGrid();
+VolumeFormat Npy();
+VolumeFormat Png();
+VolumeFormat Jpeg();
+VolumeFormat Raw();
+
+const std::vector<VolumeFormat>& VolumeFormats() {
+  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
+                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
+  return formats;
+}
+
+namespace {
+
+bool EndsInOneOf(const std::string& path, const std::vector<std::string_view>& endings) {
+  const std::string lower = ToLower(path);
+  return std::ranges::any_of(endings, [&](std::string_view ending) { return lower.ends_with(ending); });
+}
+
+std::string Joined(const std::vector<std::string_view>& texts) { return fmt::format("{}", fmt::join(texts, ", ")); }
+
+}  // namespace
+
+const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& options) {
+  std::error_code error;
+  const std::vector<VolumeFormat>& formats = VolumeFormats();
+  auto found = formats.end();
+  if (!std::filesystem::is_directory(path, error)) {
+    found = std::ranges::find_if(formats, [&](const VolumeFormat& format) {
+      return EndsInOneOf(path, format.endings) && (format.claims == nullptr || format.claims(path));
+    });
+  }
+  if (found == formats.end()) {
+    found = std::ranges::find_if(
+        formats, [&](const VolumeFormat& format) { return format.recognises != nullptr && format.recognises(path, options); });
+  }
+  return found == formats.end() ? nullptr : &*found;
+}
+
+const VolumeFormat* FindWritableFormat(const std::string& path) {
+  const auto found =
+      std::ranges::find_if(VolumeFormats(), [&](const VolumeFormat& format) { return EndsInOneOf(path, format.written_endings); });
+  return found == VolumeFormats().end() ? nullptr : &*found;
+}
+
+std::string ReadableText() {
+  std::vector<std::string_view> endings, others;
+  for (const VolumeFormat& format : VolumeFormats()) {
+    for (const std::string_view ending : format.endings) {
+      if (std::ranges::find(endings, ending) == endings.end()) endings.push_back(ending);
+    }
+    if (!format.also.empty()) others.push_back(format.also);
+  }
+  return fmt::format("must end in {}, or be {}", Joined(endings), fmt::join(others, ", or "));
+}
+
+std::string WritableEndings() {
+  std::vector<std::string_view> endings;
+  for (const VolumeFormat& format : VolumeFormats())
+    endings.insert(endings.end(), format.written_endings.begin(), format.written_endings.end());
+  return Joined(endings);
+}
+
+std::string WhatIsLost(const VolumeFormat& format, const VolumeGeometry& geometry) {
+  const auto& [spacing, axes, patient, scene] = format.keeps;
+  const World world = geometry.orientation.world;
+  std::vector<std::string> lost;
+  if (!spacing && geometry.spacing != Vec3{1, 1, 1}) lost.push_back("the spacing " + Numbers(geometry.spacing, ","));
+  if (!axes && world != World::kVoxels) lost.emplace_back("the origin and the directions of the axes");
+  if (axes && !patient && world == World::kPatient) lost.emplace_back("that the axes are a patient's: right, anterior, superior");
+  if (axes && !scene && world == World::kScene) lost.emplace_back("that the axes are not a patient's");
+  return fmt::format("{}", fmt::join(lost, ", nor "));
+}
+
+Status CheckOptions(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
+  for (const ReadOption& option : ReadOptionList()) {
+    if (!option.given(options) || std::ranges::count(format.options, option.name) > 0) continue;
+    const std::string takes = format.options.empty() ? "takes none" : "takes " + Joined(format.options);
+    return Status::InvalidArgument(fmt::format("{}: {} is no option of {}, which {}", path, option.name, format.name, takes));
+  }
+  std::string flags, suffix;
+  for (const std::string_view name : format.required) {
+    const ReadOption& option = *FindNamed(ReadOptionList(), name);
+    if (option.given(options)) continue;
+    flags += fmt::format(" --{} {}", name, option.value);
+    suffix += fmt::format("{}{}={}", suffix.empty() ? '?' : ',', name, option.value);
+  }
+  if (!flags.empty()) {
+    return Status::InvalidArgument(fmt::format("{}: {} files need{}, or in --data {}{}", path, format.name, flags, path, suffix));
+  }
+  return Status::Ok();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,62 @@
+// The formats of volume files: by what each is recognised, and how it is read and written. VolumeFormats() is the only list; a new format
+// is a file that defines its VolumeFormat, and its line there (docs/adding.md).
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/status.h"
+#include "data/volume_io/raw_volume.h"
+#include "data/volume_io/read_options.h"
+
+namespace slabstream {
+
+class FileSamples;
+
+// What a file of a format keeps of a volume's geometry.
+struct KeptGeometry {
+  bool spacing = true;
+  bool axes = true;                   // directions and origin
+  bool patient = true, scene = true;  // that they are a patient's, or that they are not
+};
+
+struct VolumeFormat {
+  std::string_view name;                  // "NIfTI"
+  std::vector<std::string_view> endings;  // of files, in lower case: ".nii"
+  // Whether a file with one of the endings is of this format, which shares the ending with another one. Null: it is.
+  bool (*claims)(const std::string& path) = nullptr;
+  std::string_view also = {};  // what else is read, for error texts: "a folder of .tif slices"
+  // Whether this is of the format: a folder, or a file by its first bytes. Asked if no format claims the ending. Null: only endings count.
+  bool (*recognises)(const std::string& path, const ReadOptions& options) = nullptr;
+  std::vector<std::string_view> options = {};   // names of the options (ReadOptionList) that it takes
+  std::vector<std::string_view> required = {};  // those of them without which it cannot be read
+  // Errors as in volume_reader.h.
+  Result<RawVolume> (*read)(const std::string& path, const ReadOptions& options) = nullptr;
+
+  std::vector<std::string_view> written_endings = {};  // of files that can be written; none: it is only read
+  // `path` ends in one of those. Errors as of WriteVolume (volume_reader.h).
+  Status (*write)(const FileSamples& samples, const std::string& path) = nullptr;
+  std::string (*second_file)(const std::string& path) = nullptr;  // which is written with `path`; "": none
+  KeptGeometry keeps = {};                                        // by what is written
+};
+
+const std::vector<VolumeFormat>& VolumeFormats();
+
+// By the ending of a file or else by recognises(). Null: no format knows it.
+const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& options);
+// Null: nothing is written with this ending.
+const VolumeFormat* FindWritableFormat(const std::string& path);
+
+// "must end in .nii, .nii.gz, ... or be a folder of ..."
+std::string ReadableText();
+// ".nrrd, .mha, ..."
+std::string WritableEndings();
+
+// What a file of the format does not keep of the geometry, such as "the spacing 0.5 0.5 2"; "": it keeps all.
+std::string WhatIsLost(const VolumeFormat& format, const VolumeGeometry& geometry);
+
+// InvalidArgument, naming `path`: an option is given that the format does not take, or one is missing that it requires.
+Status CheckOptions(const VolumeFormat& format, const std::string& path, const ReadOptions& options);
+
+}  // namespace slabstream

@@ -1,0 +1,14 @@
+// Readers of single formats of unstructured grids: errors as in mesh_reader.h.
+#pragma once
+
+#include <string>
+
+#include "common/base/status.h"
+#include "data/volume_io/mesh_reader.h"
+
+namespace slabstream {
+
+Result<LoadedMesh> ReadVtkXmlGrid(const std::string& path, const MeshOptions& options);
+Result<LoadedMesh> ReadVtkLegacyGrid(const std::string& path, const MeshOptions& options);
+
+}  // namespace slabstream

@@ -1,0 +1,58 @@
+// Files of unstructured grids to meshes: VTK's XML files (.vtu), of one piece; ASCII, base64 or appended, uncompressed or in blocks of
+// zlib; legacy VTK files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells
+// without a volume are counted and left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in
+// each part, not trilinear in the cell.
+//
+// All functions may be called from any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/mesh/lattice.h"
+#include "common/mesh/mesh.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+
+struct MeshArray {
+  std::string name;
+  ValuesAt at = ValuesAt::kPoints;
+  SampleType type = SampleType::kFloat32;
+  int components = 1;
+};
+
+struct MeshFileInfo {
+  std::string format;  // "VTK unstructured grid", "VTK unstructured grid, legacy"
+  std::int64_t points = 0, cells = 0;
+  struct CellCount {
+    const CellKind* kind = nullptr;
+    std::int64_t count = 0;
+  };
+  std::vector<CellCount> kinds;   // that occur, in the order of CellKinds()
+  std::vector<MeshArray> arrays;  // in the file's order
+  std::size_t array = 0;          // the one that is read, of `arrays`
+};
+
+struct LoadedMesh {
+  MeshFileInfo info;
+  Bounds3 bounds;  // of the points, in the world
+  Mesh mesh;       // its points are in the world, from bounds.low
+};
+
+struct MeshOptions {
+  std::string array;  // "": the active scalars, those of points first, else the only array with one component
+  // Checks what can be checked without points, cells and values; the mesh has none then, and no bounds.
+  bool headers_only = false;
+};
+
+// By its ending; a legacy VTK file by what it says of its dataset.
+bool LooksLikeMesh(const std::string& path);
+
+// NotFound (no such file), InvalidArgument (no unstructured grid, no such array, cells of another kind, a point that is not finite),
+// DataLoss (truncated, damaged, cells of points that there are not), ResourceExhausted (does not fit the memory). Messages name the path.
+Result<LoadedMesh> ReadMesh(const std::string& path, const MeshOptions& options = {});
+
+}  // namespace slabstream

@@ -1,0 +1,166 @@
+// MetaImage with its samples in the same file or in one other (.mha, .mhd), raw or zlib-compressed, by the fields that MetaIO documents.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "common/base/parse_number.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/output.h"
+#include "data/volume_io/text_header.h"
+
+namespace slabstream {
+namespace {
+
+// The first name of a type is the one that is written.
+constexpr std::array<std::pair<std::string_view, SampleType>, 12> kTypeNames = {{
+    {"MET_CHAR", SampleType::kInt8},
+    {"MET_UCHAR", SampleType::kUint8},
+    {"MET_SHORT", SampleType::kInt16},
+    {"MET_USHORT", SampleType::kUint16},
+    {"MET_INT", SampleType::kInt32},
+    {"MET_UINT", SampleType::kUint32},
+    {"MET_LONG", SampleType::kInt32},  // four bytes in files, on every machine
+    {"MET_ULONG", SampleType::kUint32},
+    {"MET_LONG_LONG", SampleType::kInt64},
+    {"MET_ULONG_LONG", SampleType::kUint64},
+    {"MET_FLOAT", SampleType::kFloat32},
+    {"MET_DOUBLE", SampleType::kFloat64},
+}};
+
+std::optional<SampleType> ToSampleType(std::string_view name) {
+  const auto* const found = std::ranges::find(kTypeNames, name, [](const auto& entry) { return entry.first; });
+  return found == kTypeNames.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::string_view NameOf(SampleType type) {
+  return std::ranges::find(kTypeNames, type, [](const auto& entry) { return entry.second; })->first;
+}
+
+bool IsTrue(const TextHeader& text, const char* key) {
+  const std::string value = ToLower(text.Find(key).value_or("false"));
+  return value.starts_with('t') || value == "1";
+}
+
+Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options) {
+  const auto sizes = text.Sizes("NDims", "DimSize");
+  if (!sizes.ok()) return sizes.status();
+  RawHeader header;
+  if (Status status = SetSize(header, text.path, *sizes, options); !status.ok()) return status;
+  const std::string channels = text.Find("ElementNumberOfChannels").value_or("1");
+  header.components = ParseNumber<int>(channels).value_or(0);
+  if (header.components < 1 || header.components > kMaxComponents) {
+    return text.NotAVolume(fmt::format("ElementNumberOfChannels is '{}', must be in [1, {}]", channels, kMaxComponents));
+  }
+  const std::optional<SampleType> type = ToSampleType(*text.Find("ElementType"));
+  if (!type) return text.NotAVolume("ElementType '" + *text.Find("ElementType") + "' is not supported");
+
+  const std::size_t count = sizes->size();
+  const auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, {1, 1, 1});
+  const auto origin = text.Numbers({"Offset", "Origin", "Position"}, count, {0, 0, 0});
+  const auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, {});
+  for (const auto* numbers : {&spacing, &origin, &directions}) {
+    if (!numbers->ok()) return numbers->status();
+  }
+  header.type = *type;
+  header.steps = StepsOf(Triple(*spacing));
+  std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
+  for (std::size_t i = 0; i < 3 && !directions->empty(); ++i) axes[i] = Triple(*directions, i * count);
+  // Only files about a patient name the directions of the axes; their space is left, posterior, superior. Others have no orientation
+  // unless they state a matrix or an origin.
+  const bool patient = text.Find("AnatomicalOrientation").value_or("???").find('?') == std::string::npos;
+  if (!patient && directions->empty() && Triple(*origin) == Vec3{}) return header;
+  header.world = patient ? World::kPatient : World::kScene;
+  header.matrix = "TransformMatrix";
+  const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
+  for (std::size_t i = 0; i < 3; ++i) header.steps[i] = (*spacing)[i] * (signs * axes[i]);
+  header.origin = signs * Triple(*origin);
+  return header;
+}
+
+Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
+  if (text.Find("BinaryData") && !IsTrue(text, "BinaryData")) {
+    return text.Refused("samples as text (BinaryData = False) are not supported");
+  }
+  const std::string file = *text.Find("ElementDataFile");
+  const bool local = ToLower(file) == "local";
+  Result<Payload> payload = text.PayloadIn(local ? std::nullopt : std::optional(file));
+  if (!payload.ok()) return payload;
+  payload->compressed = IsTrue(text, "CompressedData");
+  payload->big_endian = IsTrue(text, "BinaryDataByteOrderMSB") || IsTrue(text, "ElementByteOrderMSB");
+  if (local) return payload;
+  const Result<std::int64_t> skip = text.BytesToSkip("HeaderSize", text.Find("HeaderSize").value_or("0"), *payload, sample_bytes);
+  if (!skip.ok()) return skip.status();
+  payload->offset = *skip;
+  return payload;
+}
+
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  return ReadTextVolume(path,
+                        {.name = "MetaImage",
+                         .separator = '=',
+                         .last_key = "ElementDataFile",
+                         .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
+                         .read_header = ReadHeader,
+                         .find_payload = FindPayload},
+                        options);
+}
+
+// A patient's space is left, posterior, superior in MetaImage. Its letters say where each axis begins: left, posterior, inferior, since
+// axes lie near those of World.
+std::string SpaceLines(const VolumeGeometry& geometry) {
+  const Orientation& orientation = geometry.orientation;
+  if (orientation.world == World::kVoxels) return "";
+  const bool patient = orientation.world == World::kPatient;
+  const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
+  const auto axis = [&](std::size_t i) { return Numbers(signs * orientation.axes[i]); };
+  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\n{}", axis(0), axis(1), axis(2), Numbers(signs * orientation.origin),
+                     patient ? "AnatomicalOrientation = LPI\n" : "");
+}
+
+std::string HeaderOf(const FileSamples& samples, const std::string& data_file) {
+  const VolumeGeometry& geometry = samples.geometry();
+  return fmt::format(
+      "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
+      "{}ElementSpacing = {}\nDimSize = {} {} {}\nElementType = {}\nElementDataFile = {}\n",
+      SpaceLines(geometry), Numbers(geometry.spacing), geometry.size.x, geometry.size.y, geometry.size.z, NameOf(samples.type()),
+      data_file);
+}
+
+// .mhd has its samples in a .raw beside it.
+std::string SecondFile(const std::string& path) {
+  return ToLower(path).ends_with(".mhd") ? std::filesystem::path(path).replace_extension(".raw").string() : "";
+}
+
+Status Write(const FileSamples& samples, const std::string& path) {
+  const std::string data_path = SecondFile(path);
+  if (data_path.empty()) return WriteHeaderAndSamples(path, HeaderOf(samples, "LOCAL"), samples);
+  Result<OutputFile> header = OutputFile::Create(path);
+  if (!header.ok()) return header.status();
+  Result<OutputFile> data = OutputFile::Create(data_path);
+  if (!data.ok()) return data.status();
+  AppendSamples(*data, samples);
+  header->Append(HeaderOf(samples, std::filesystem::path(data_path).filename().string()));
+  // Store both files before either takes its place.
+  if (Status status = header->Close(); !status.ok()) return status;
+  if (Status status = data->Finish(); !status.ok()) return status;
+  return header->Finish();
+}
+
+}  // namespace
+
+VolumeFormat MetaImage() {
+  return {.name = "MetaImage",
+          .endings = {".mhd", ".mha"},
+          .options = {"time", "channel"},
+          .read = Read,
+          .written_endings = {".mha", ".mhd"},
+          .write = Write,
+          .second_file = SecondFile};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,28 @@
+// What an OME-TIFF says of its pages: the XML in the description of the first one.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/math/vec.h"
+#include "data/volume_io/read_options.h"
+
+namespace slabstream {
+
+// The slices of a volume among the pages of a file: first, first + step, ...
+struct PageOrder {
+  std::int64_t first = 0, step = 1, count = 0;
+  bool of_channel = false;      // these are the pages of the channel that options.channel takes
+  std::optional<Vec3> spacing;  // micrometres
+};
+
+// Whether a description is OME's.
+bool IsOmeHeader(const std::string& description);
+
+// InvalidArgument, naming `path`: several channels or times, of which the options do not take one; sizes that do not fit the number of
+// pages; several images; or no XML.
+Result<PageOrder> ReadOmeHeader(const std::string& path, const std::string& description, std::int64_t pages, const ReadOptions& options);
+
+}  // namespace slabstream

@@ -1,0 +1,135 @@
+#include "data/volume_io/raw_volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <utility>
+
+#include "common/volume/memory_budget.h"
+
+namespace slabstream {
+namespace {
+
+Status CheckChannel(const std::string& path, int components, const ReadOptions& options) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
+  const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
+  if (components == 1 && options.channel.value_or(0) == 0) return Status::Ok();
+  if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
+  const std::string which = fmt::format("0 to {}{}", components - 1, colour ? ", or luminance, of red, green and blue" : "");
+  if (!options.channel) return wrong(fmt::format("has {} components a voxel, of which --channel takes one: {}", components, which));
+  if (luminance ? colour : *options.channel < components) return Status::Ok();
+  return wrong(fmt::format("has {} components a voxel, so channel must be {}", components, which));
+}
+
+float FromHalf(std::uint16_t half) {
+  const int exponent = (half >> 10) & 0x1f, fraction = half & 0x3ff;
+  const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
+  if (exponent == 0x1f) return fraction != 0 ? std::numeric_limits<float>::quiet_NaN() : sign * std::numeric_limits<float>::infinity();
+  // Without the leading 1, subnormal numbers have the exponent of the least normal ones.
+  return sign * (exponent == 0 ? std::ldexp(float(fraction), -24) : std::ldexp(float(fraction + 0x400), exponent - 25));
+}
+
+template <class T>
+T Luminance(const T* rgb) {  // of ITU-R BT.709
+  const double value = 0.2126 * double(rgb[0]) + 0.7152 * double(rgb[1]) + 0.0722 * double(rgb[2]);
+  return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
+}
+
+}  // namespace
+
+Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options) {
+  while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
+  if (sizes.size() != 3 && sizes.size() != 4) {
+    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3", path, sizes.size()));
+  }
+  for (const Axis axis : kAxes) {
+    const double side = sizes[std::size_t(Number(axis))];
+    if (!(side >= 1 && side <= kMaxVolumeSide && side == std::floor(side))) {
+      return Status::InvalidArgument(
+          fmt::format("{}: the size along {} is {}, must be a whole number in [1, {}]", path, Letter(axis), side, kMaxVolumeSide));
+    }
+    header.size[axis] = std::int32_t(side);
+  }
+  const double count = sizes.size() == 4 ? sizes[3] : 1;
+  if (!(count >= 1 && count <= kMaxVolumes && count == std::floor(count))) {
+    return Status::InvalidArgument(fmt::format("{}: the fourth size is {}, must be a whole number in [1, {}]", path, count, kMaxVolumes));
+  }
+  const Result<std::int64_t> number = ChosenVolume(path, std::int64_t(count), options);
+  if (!number.ok()) return number.status();
+  header.number = *number;
+  return Status::Ok();
+}
+
+Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options) {
+  if (options.time && options.time->count() > 1) {
+    return Status::InvalidArgument(
+        fmt::format("{}: time is {}:{}, must be one volume here", path, options.time->first, options.time->last));
+  }
+  if (options.time && options.time->first >= count) {
+    return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]", path, options.time->first, count - 1));
+  }
+  if (!options.time && count > 1) {
+    return Status::InvalidArgument(fmt::format("{}: holds {} volumes, of which --time takes one: 0 to {}", path, count, count - 1));
+  }
+  return std::int64_t{options.time.value_or(TimeRange{}).first};
+}
+
+Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {
+  if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
+  if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
+  return RawVolume{header, AlignedVector<std::byte>(options.headers_only ? 0 : std::size_t(header.sample_bytes())), {}};
+}
+
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options) {
+  // Samples in a file of their own: the volume's name first.
+  const auto failed = [&](const Status& status) {
+    return payload.file == path ? status : Status(status.code(), path + ": samples in " + status.message());
+  };
+  constexpr std::int64_t kMost = std::int64_t{1} << 61;  // longer than any file
+  if (header.number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
+  Payload chosen = payload;
+  (chosen.compressed ? chosen.skip : chosen.offset) += header.number * header.sample_bytes();
+  if (Status status = CheckHolds(chosen, header.sample_bytes()); !status.ok()) return failed(status);
+  Result<RawVolume> raw = TakeMemory(path, header, options);
+  if (!raw.ok()) return raw;
+  if (payload.file != path) raw->samples_file = payload.file;
+  if (options.headers_only) return raw;
+  if (Status status = ReadPayload(chosen, raw->bytes); !status.ok()) return failed(status);
+  static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
+  if (payload.big_endian) SwapByteOrder(header.type, raw->bytes);
+  return raw;
+}
+
+Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
+  RawVolume floats{.header = halves.header, .samples_file = std::move(halves.samples_file)};
+  floats.header.type = SampleType::kFloat32;
+  if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
+  floats.bytes.resize(2 * halves.bytes.size());
+  const std::span in(reinterpret_cast<const std::uint16_t*>(halves.bytes.data()), halves.bytes.size() / sizeof(std::uint16_t));
+  std::ranges::transform(in, reinterpret_cast<float*>(floats.bytes.data()), FromHalf);
+  return floats;
+}
+
+void TakeChannel(RawVolume& raw, const ReadOptions& options) {
+  const auto components = std::size_t(raw.header.components);
+  if (components == 1) return;
+  const std::size_t count = CountIn(raw.header.size);
+  VisitSampleType(raw.header.type, [&]<class T>(const T*) {
+    T* const samples = reinterpret_cast<T*>(raw.bytes.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      const T* const voxel = samples + i * components;
+      samples[i] = options.channel == kLuminance ? Luminance(voxel) : voxel[options.channel.value_or(0)];
+    }
+  });
+  raw.header.components = 1;
+  raw.bytes.resize(std::size_t(raw.header.sample_bytes()));
+  raw.bytes.shrink_to_fit();
+}
+
+}  // namespace slabstream

@@ -1,0 +1,78 @@
+// What a reader of one format makes of a file: a description of the volume, and the samples in the type that the file has.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/aligned_buffer.h"
+#include "common/base/status.h"
+#include "common/mesh/mesh.h"
+#include "common/volume/volume.h"
+#include "data/volume_io/payload.h"
+#include "data/volume_io/read_options.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+
+inline constexpr int kMaxComponents = 1024;  // of a voxel
+
+struct RawHeader {
+  Index3 size;
+  // Samples of one voxel, which lie together; above 1 only where options.channel takes one of them.
+  int components = 1;       // in [1, kMaxComponents]
+  std::int64_t number = 0;  // in [0, kMaxVolumes): which of the volumes that lie one after the other in the payload
+  World world = World::kVoxels;
+  // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
+  // zero or NaN (kVoxels: only in that order).
+  std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
+  Vec3 origin;                // of the centre of the first voxel
+  std::string_view matrix{};  // the file's name for the steps, for messages; lives as long as the program
+  SampleType type = SampleType::kUint8;
+  ValueMapping rescale;  // from the file's samples to data values
+  bool labels = false;   // samples are numbers of structures, not measurements
+
+  // Of all components.
+  std::int64_t sample_bytes() const {
+    return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)) * components;
+  }
+};
+
+struct RawVolume {
+  RawHeader header;
+  AlignedVector<std::byte> bytes;      // this machine's byte order; none if only headers were read
+  std::shared_ptr<const Mesh> cells;   // of an unstructured grid, in data space of the volume, which is not turned or straightened
+  std::filesystem::path samples_file;  // or the folder of several; if that is not the header's file
+};
+
+// Steps along the axes themselves.
+inline std::array<Vec3, 3> StepsOf(const Vec3& spacing) { return {Vec3{spacing.x, 0, 0}, Vec3{0, spacing.y, 0}, Vec3{0, 0, spacing.z}}; }
+
+// From left, posterior, superior to right, anterior, superior, and back.
+inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
+
+// Sets the size and the number of the volume by what a file says of its dimensions; those of 1 behind the third are left out.
+// InvalidArgument naming `path`: there are fewer than three or more than four, one of three is no whole number in [1, kMaxVolumeSide], or
+// there are several volumes and options.time does not take one.
+Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options);
+// Which of `count` volumes options.time takes. InvalidArgument: none, although there are several, or one that there is not.
+Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
+
+// Takes memory for the samples, unless only headers are read. InvalidArgument: several components, of which options.channel takes none.
+// ResourceExhausted: too large.
+Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options);
+
+// Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
+Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options);
+
+// Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.
+Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves);
+
+// Of several components the one that options.channel takes, or their luminance, in place.
+void TakeChannel(RawVolume& raw, const ReadOptions& options);
+
+}  // namespace slabstream

@@ -1,0 +1,207 @@
+#include "data/volume_io/read_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "common/base/find_named.h"
+#include "common/base/parse_number.h"
+#include "common/mesh/lattice.h"
+
+namespace slabstream {
+namespace {
+
+Status Wrong(std::string_view option, std::string_view text, const std::string& must_be) {
+  return Status::InvalidArgument(fmt::format("{} '{}' must be {}", option, text, must_be));
+}
+
+Status SetSeries(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.series = text;
+  return text.empty() ? Wrong(option, text, "the number or the UID of a series") : Status::Ok();
+}
+
+Status SetTime(ReadOptions& options, std::string_view option, std::string_view text) {
+  const Result<TimeRange> range = ParseTimeRange(option, text);
+  if (!range.ok()) return range.status();
+  options.time = *range;
+  return Status::Ok();
+}
+
+Status SetChannel(ReadOptions& options, std::string_view option, std::string_view text) {
+  constexpr int kMost = 65535;
+  options.channel = text == "luminance" ? kLuminance : ParseNumber<int>(text);
+  if (text == "luminance" || (options.channel && *options.channel >= 0 && *options.channel <= kMost)) return Status::Ok();
+  return Wrong(option, text, fmt::format("luminance or a whole number in [0, {}]", kMost));
+}
+
+// "X,Y,Z"
+template <class T>
+std::optional<Vector3<T>> ParseTriple(std::string_view text) {
+  Vector3<T> triple;
+  for (int i = 0; i < 3; ++i) {
+    const std::size_t end = i < 2 ? text.find(',') : text.size();
+    const std::optional<T> number = end == std::string_view::npos ? std::nullopt : ParseNumber<T>(text.substr(0, end));
+    if (!number) return std::nullopt;
+    triple[i] = *number;
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return triple;
+}
+
+Status SetDims(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.dims = ParseTriple<std::int32_t>(text);
+  const auto in_range = [](std::int32_t side) { return side >= 1 && side <= kMaxVolumeSide; };
+  if (options.dims && in_range(options.dims->x) && in_range(options.dims->y) && in_range(options.dims->z)) return Status::Ok();
+  return Wrong(option, text, fmt::format("three whole numbers in [1, {}], such as 256,256,100", kMaxVolumeSide));
+}
+
+Status SetSpacing(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.spacing = ParseTriple<double>(text);
+  const auto in_range = [](double spacing) { return spacing > 0 && std::isfinite(spacing); };
+  if (options.spacing && in_range(options.spacing->x) && in_range(options.spacing->y) && in_range(options.spacing->z)) return Status::Ok();
+  return Wrong(option, text, "three numbers above 0, such as 0.5,0.5,1.25");
+}
+
+Status SetType(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.type = SampleTypeNamed(text);
+  return options.type ? Status::Ok() : Wrong(option, text, "one of " + SampleTypeNames());
+}
+
+Status SetEndian(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.big_endian = text == "big";
+  return text == "big" || text == "little" ? Status::Ok() : Wrong(option, text, "little or big");
+}
+
+Status SetOffset(ReadOptions& options, std::string_view option, std::string_view text) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 60;
+  options.offset = ParseNumber<std::int64_t>(text);
+  if (options.offset && *options.offset >= 0 && *options.offset <= kMost) return Status::Ok();
+  return Wrong(option, text, "a whole number of bytes, at least 0");
+}
+
+Status SetArray(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.array = text;
+  return text.empty() ? Wrong(option, text, "the name of an array") : Status::Ok();
+}
+
+Status SetLattice(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.lattice = ParseNumber<std::int32_t>(text);
+  if (options.lattice && *options.lattice >= 1 && *options.lattice <= kMaxLatticeSide) return Status::Ok();
+  return Wrong(option, text, fmt::format("a whole number in [1, {}]", kMaxLatticeSide));
+}
+
+// Where the options of `source` begin, behind the question mark; npos: it has none.
+std::size_t OptionsBegin(const std::string& source) {
+  const std::size_t mark = source.rfind('?');
+  std::error_code error;
+  const bool has_options =
+      mark != std::string::npos && source.find('=', mark) != std::string::npos && !std::filesystem::exists(source, error);
+  return has_options ? mark + 1 : std::string::npos;
+}
+
+// The end of the option that begins at `begin`: a comma with a name and = behind it, since values may hold commas too.
+std::size_t OptionEnd(const std::string& source, std::size_t begin) {
+  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; };
+  for (std::size_t comma = source.find(',', begin); comma != std::string::npos; comma = source.find(',', comma + 1)) {
+    std::size_t behind = comma + 1;
+    while (behind < source.size() && in_name(source[behind])) ++behind;
+    if (behind > comma + 1 && behind < source.size() && source[behind] == '=') return comma;
+  }
+  return source.size();
+}
+
+}  // namespace
+
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text) {
+  const std::size_t colon = text.find(':');
+  const auto parse = [&](std::string_view end) -> Result<int> {
+    const std::optional<int> time = ParseNumber<int>(end);
+    if (time && *time >= 0 && *time < kMaxVolumes) return *time;
+    return Wrong(option, text, fmt::format("a whole number in [0, {}], or FIRST:LAST", kMaxVolumes - 1));
+  };
+  const Result<int> first = parse(text.substr(0, colon)), last = colon == std::string_view::npos ? first : parse(text.substr(colon + 1));
+  if (!first.ok()) return first.status();
+  if (!last.ok()) return last.status();
+  if (*first <= *last) return TimeRange{*first, *last};
+  return Status::InvalidArgument(fmt::format("{} '{}': FIRST must not be above LAST", option, text));
+}
+
+const std::vector<ReadOption>& ReadOptionList() {
+  static const std::vector<ReadOption> options = {
+      {"time", "T", "Which of the volumes in a file of several, such as a time series; counted from 0", SetTime,
+       [](const ReadOptions& given) { return given.time.has_value(); }},
+      {"channel", "N|luminance", "Which of a voxel's components, counted from 0; or the luminance of red, green and blue", SetChannel,
+       [](const ReadOptions& given) { return given.channel.has_value(); }},
+      {"spacing", "X,Y,Z", "Distances of voxels, for files that state none: raw, NumPy, pictures", SetSpacing,
+       [](const ReadOptions& given) { return given.spacing.has_value(); }},
+      {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims,
+       [](const ReadOptions& given) { return given.dims.has_value(); }},
+      {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64", SetType,
+       [](const ReadOptions& given) { return given.type.has_value(); }},
+      {"endian", "little|big", "Byte order of raw samples (default: little)", SetEndian,
+       [](const ReadOptions& given) { return given.big_endian.has_value(); }},
+      {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset,
+       [](const ReadOptions& given) { return given.offset.has_value(); }},
+      {"series", "NUMBER|UID", "Which of the series of a DICOM folder; `slabstream info` lists them", SetSeries,
+       [](const ReadOptions& given) { return !given.series.empty(); }},
+      {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray,
+       [](const ReadOptions& given) { return !given.array.empty(); }},
+      {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is laid", SetLattice,
+       [](const ReadOptions& given) { return given.lattice.has_value(); }},
+  };
+  return options;
+}
+
+namespace {
+
+struct OptionText {
+  std::string name, value;
+};
+
+// The options behind the question mark, which is at begin - 1.
+std::vector<OptionText> OptionsFrom(const std::string& text, std::size_t begin) {
+  std::vector<OptionText> options;
+  while (begin <= text.size()) {
+    const std::size_t end = OptionEnd(text, begin), equals = std::min(text.find('=', begin), end);
+    options.push_back({text.substr(begin, equals - begin), equals < end ? text.substr(equals + 1, end - equals - 1) : ""});
+    begin = end + 1;
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<VolumeSource> ParseVolumeSource(const std::string& text) {
+  VolumeSource source{text, {}};
+  const std::size_t begin = OptionsBegin(text);
+  if (begin == std::string::npos) return source;
+  source.path = text.substr(0, begin - 1);
+  for (const auto& [name, value] : OptionsFrom(text, begin)) {
+    const ReadOption* const option = FindNamed(ReadOptionList(), name);
+    if (option == nullptr) {
+      return Status::InvalidArgument(
+          fmt::format("'{}': '{}' is no option for reading a file, which are {}", text, name, NamesOf(ReadOptionList())));
+    }
+    if (option->given(source.options)) return Status::InvalidArgument(fmt::format("'{}': {} is given twice", text, name));
+    if (Status status = option->set(source.options, fmt::format("'{}': {}", text, name), value); !status.ok()) return status;
+  }
+  return source;
+}
+
+std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value) {
+  return fmt::format("{}{}{}={}", source, OptionsBegin(source) == std::string::npos ? '?' : ',', name, value);
+}
+
+std::string AtTime(const std::string& source, int time) {
+  const std::size_t begin = OptionsBegin(source);
+  if (begin == std::string::npos) return WithReadOption(source, "time", std::to_string(time));
+  std::string others;
+  for (const auto& [name, value] : OptionsFrom(source, begin)) {
+    if (name != "time") others += fmt::format("{}={},", name, value);
+  }
+  return fmt::format("{}{}time={}", source.substr(0, begin), others, time);
+}
+
+}  // namespace slabstream

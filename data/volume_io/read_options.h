@@ -1,0 +1,76 @@
+// How a volume file is to be read, where its format leaves that open: which of several volumes, or what raw samples are. And a source, as
+// users name it: a path, and behind it such options.
+//
+//   head.nii.gz?time=3      ct.raw?dims=512,512,300,type=int16,spacing=0.7,0.7,1.25
+//
+// ReadOptionList() is the only list. Commands that read files have the same options: --time 3 says what ?time=3 says.
+//
+// Pure, but for ParseVolumeSource, which looks for the file.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/math/vec.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+
+inline constexpr std::int64_t kMaxVolumes = 1 << 20;  // in one file
+inline constexpr int kLuminance = -1;
+
+// Volumes of a file that holds several, both included.
+struct TimeRange {
+  int first = 0, last = 0;  // 0 <= first <= last < kMaxVolumes
+  int count() const { return last - first + 1; }
+  friend bool operator==(const TimeRange&, const TimeRange&) = default;
+};
+// "T" or "FIRST:LAST". InvalidArgument: the message begins with `option` and names the text.
+Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
+
+struct ReadOptions {
+  std::string series;             // which of the series of a DICOM folder: its number or UID; "": the only one
+  std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
+  std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
+  std::optional<Vec3> spacing;    // each > 0, finite
+  // Of unstructured grids.
+  std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
+  std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
+  // Of raw samples.
+  std::optional<Index3> dims;  // voxels along x, y and z, each in [1, kMaxVolumeSide]
+  std::optional<SampleType> type;
+  std::optional<bool> big_endian;
+  std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
+  // What users cannot say.
+  bool headers_only = false;  // check whatever can be checked without the samples, and take no memory for them
+};
+
+struct ReadOption {
+  std::string_view name;     // "time"
+  std::string_view value;    // how its values are written, for help texts: "T"
+  std::string_view purpose;  // for help texts
+  // InvalidArgument: the message begins with `option` and names the text.
+  Status (*set)(ReadOptions& options, std::string_view option, std::string_view text);
+  bool (*given)(const ReadOptions& options);
+};
+const std::vector<ReadOption>& ReadOptionList();
+
+struct VolumeSource {
+  std::string path;
+  ReadOptions options;
+};
+
+// PATH or PATH?NAME=VALUE,NAME=VALUE... A text that is a file's name as a whole is its path. Does not check that the file exists.
+// InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take.
+Result<VolumeSource> ParseVolumeSource(const std::string& text);
+
+// The source with one more option.
+std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
+// The source at one time, whatever times it names. `source` is right (ParseVolumeSource).
+std::string AtTime(const std::string& source, int time);
+
+}  // namespace slabstream

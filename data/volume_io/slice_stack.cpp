@@ -1,0 +1,119 @@
+#include "data/volume_io/slice_stack.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "data/volume_io/text_header.h"
+
+namespace slabstream {
+namespace {
+
+constexpr const char* kDigits = "0123456789";
+
+// A key that sorts numbers inside names by value, s2 before s10: each becomes a 0, the count of its digits, and its digits.
+std::string NaturalKey(const std::string& name) {
+  std::string key;
+  for (std::size_t i = 0; i < name.size();) {
+    const std::size_t number = std::min(name.find_first_of(kDigits, i), name.size());
+    key.append(name, i, number - i);
+    i = std::min(name.find_first_not_of(kDigits, number), name.size());
+    const std::size_t digits = std::min(name.find_first_not_of('0', number), i);
+    if (number < i) key.append({'0', char(i - digits)}).append(name, digits, i - digits);
+  }
+  return key;
+}
+
+// The name of a file in lower case, without its numbers.
+std::string WithoutNumbers(const std::string& path) {
+  std::string name = ToLower(std::filesystem::path(path).stem().string());
+  std::erase_if(name, [](char c) { return c >= '0' && c <= '9'; });
+  return name;
+}
+
+}  // namespace
+
+std::vector<std::string> SlicesIn(const std::string& folder, const std::vector<std::string_view>& endings) {
+  std::vector<std::string> paths;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
+    if (std::ranges::count(endings, ToLower(entry.path().extension().string())) > 0 && entry.is_regular_file(error)) {
+      paths.push_back(entry.path().string());
+    }
+  }
+  std::ranges::sort(paths, {}, [](const std::string& path) { return std::pair(NaturalKey(path), path); });
+  return paths;
+}
+
+bool HasVolumeFiles(const std::string& folder) {
+  std::vector<std::string_view> of_volumes;
+  for (const VolumeFormat& format : VolumeFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
+  return !SlicesIn(folder, of_volumes).empty();
+}
+
+bool IsStackOfPictures(const std::string& folder, const std::vector<std::string_view>& endings) {
+  const std::vector<std::string> slices = SlicesIn(folder, endings);
+  if (slices.size() < 2) return false;
+  const std::string name = WithoutNumbers(slices.front());
+  if (!std::ranges::all_of(slices, [&](const std::string& slice) { return WithoutNumbers(slice) == name; })) return false;
+  return !HasVolumeFiles(folder);
+}
+
+Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
+                                      const ReadOptions& options) {
+  if (Status status = SetSize(slice, path, {double(slice.size.x), double(slice.size.y), double(count)}, {}); !status.ok()) return status;
+  if (options.spacing) slice.steps = StepsOf(*options.spacing);
+  // More than LZW (1400), deflate (1032), JPEG (512) and LZMA (7000) reach; a file that claims more is damaged.
+  constexpr std::int64_t kMaxRatio = 8192;
+  const std::int64_t needed = slice.sample_bytes();
+  if (needed / kMaxRatio > file_bytes) {
+    return Status::DataLoss(
+        fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", path, needed, file_bytes));
+  }
+  return TakeMemory(path, slice, options);
+}
+
+Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume, const ReadOptions& options) {
+  const Result<RawHeader> header = slice.ReadHeader();
+  if (!header.ok()) return header.status();
+  const RawHeader& wanted = volume.header;
+  const auto kind = [](const RawHeader& of) {
+    return fmt::format("{} x {} {}{}", of.size.x, of.size.y, ToString(of.type),
+                       of.components == 1 ? "" : fmt::format(" of {} components", of.components));
+  };
+  if (kind(*header) != kind(wanted)) {
+    return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(*header), kind(wanted)));
+  }
+  return options.headers_only ? Status::Ok() : slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+}
+
+Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<std::string>& paths, OpenSlice open,
+                                 const ReadOptions& options) {
+  std::int64_t file_bytes = 0;
+  for (const std::string& path : paths) file_bytes += BytesOfFile(path);
+  std::optional<RawVolume> raw;
+  for (std::size_t number = 0; number < paths.size(); ++number) {
+    const Result<std::unique_ptr<SliceFile>> slice = open(paths[number]);
+    if (!slice.ok()) return slice.status();
+    if (!raw) {
+      const Result<RawHeader> first = (*slice)->ReadHeader();
+      if (!first.ok()) return first.status();
+      Result<RawVolume> taken = TakeMemoryForSlices(folder, *first, std::int64_t(paths.size()), file_bytes, options);
+      if (!taken.ok()) return taken;
+      raw = *std::move(taken);
+    }
+    if (Status status = ReadSlice(**slice, paths[number], std::int64_t(number), *raw, options); !status.ok()) return status;
+  }
+  return *std::move(raw);
+}
+
+std::int64_t BytesOfFile(const std::string& path) {
+  std::error_code error;
+  const auto bytes = std::filesystem::file_size(path, error);
+  return error ? 0 : std::int64_t(bytes);
+}
+
+}  // namespace slabstream

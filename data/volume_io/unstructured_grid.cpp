@@ -1,0 +1,39 @@
+// Unstructured grids as volumes: their values on a lattice, and their cells beside them.
+#include <utility>
+
+#include "common/mesh/lattice.h"
+#include "common/volume/memory_budget.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/mesh_reader.h"
+
+namespace slabstream {
+namespace {
+
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  Result<LoadedMesh> loaded = ReadMesh(path, {.array = options.array, .headers_only = options.headers_only});
+  if (!loaded.ok()) return loaded.status();
+  if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}};
+  const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
+  RawVolume raw;
+  raw.header.size = lattice.size;
+  raw.header.world = lattice.orientation.world;
+  raw.header.steps = StepsOf(lattice.spacing);
+  raw.header.origin = lattice.orientation.origin;
+  raw.header.type = SampleType::kFloat32;
+  const auto bytes = std::int64_t(loaded->mesh.bytes()) + raw.header.sample_bytes();
+  if (Status status = CheckFitsMemory(bytes, path + ": its cells in order, and their lattice"); !status.ok()) return status;
+  MoveToLattice(lattice, loaded->mesh);
+  SortByPlace(lattice, loaded->mesh);
+  raw.bytes = std::move(Resample(loaded->mesh, lattice).block.bytes);
+  raw.cells = std::make_shared<const Mesh>(std::move(loaded->mesh));
+  return raw;
+}
+
+}  // namespace
+
+VolumeFormat UnstructuredGrid() {
+  return {
+      .name = "VTK unstructured grid", .endings = {".vtu", ".vtk"}, .claims = LooksLikeMesh, .options = {"array", "lattice"}, .read = Read};
+}
+
+}  // namespace slabstream

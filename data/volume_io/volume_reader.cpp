@@ -1,0 +1,134 @@
+#include "data/volume_io/volume_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <new>
+#include <span>
+
+#include "common/base/log.h"
+#include "common/base/printable.h"
+#include "common/volume/memory_budget.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/raw_volume.h"
+#include "data/volume_io/world_placement.h"
+
+namespace slabstream {
+namespace {
+
+// The stored sample of the lowest data value that there is: what lies outside a volume.
+double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
+  return VisitScalarType(block.type, [&]<class T>(const T*) {
+    double least = 0, greatest = 0;
+    bool any = false;
+    for (const T sample : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) {
+      if (!std::isfinite(double(sample))) continue;
+      least = any ? std::min(least, double(sample)) : double(sample);
+      greatest = any ? std::max(greatest, double(sample)) : double(sample);
+      any = true;
+    }
+    return mapping.scale < 0 ? greatest : least;
+  });
+}
+
+Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path) {
+  KeptSamples kept = Keep(raw.header.type, std::move(raw.bytes));
+  if (!kept.exact) LogWarning(path + ": values of type " + std::string(ToString(raw.header.type)) + " are rounded to " + "float32");
+
+  const Result<WorldPlacement> placed = PlaceInWorld(raw.header, path);
+  if (!placed.ok()) return placed.status();
+  LoadedVolume loaded;
+  VolumeFileInfo& info = loaded.info;
+  info.file_type = ToString(raw.header.type);
+  info.format = format.name;
+  info.stored_size = raw.header.size;
+  info.steps = raw.header.steps;
+  info.straightened = placed->slant.has_value();
+  info.labels = raw.header.labels;
+  info.samples_file = std::move(raw.samples_file);
+  VolumeDescription& description = info.description;
+  description.geometry = placed->geometry;
+  description.type = kept.type;
+  // value = scale * (stored + shift) + offset
+  const auto [scale, offset] = raw.header.rescale;
+  description.mapping = {scale, scale * kept.shift + offset};
+
+  auto volume = std::make_shared<Volume>();
+  volume->description = description;
+  volume->block = {{{0, 0, 0}, raw.header.size}, kept.type, std::move(kept.bytes)};
+  volume->cells = std::move(raw.cells);
+  if (placed->turn != AxisTurn{}) {
+    if (Status status = CheckFitsMemory(std::int64_t(volume->block.bytes.size()), path); !status.ok()) return status;
+    volume->block = TurnVoxels(volume->block, placed->turn);
+  }
+  if (placed->slant) {
+    if (Status status = CheckFitsMemory(description.voxel_bytes(), path); !status.ok()) return status;
+    volume->block =
+        StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
+  }
+  loaded.volume = std::move(volume);
+  return loaded;
+}
+
+struct ReadFile {
+  RawVolume raw;
+  const VolumeFormat* format = nullptr;
+};
+
+Result<ReadFile> ReadRaw(const std::string& path, const ReadOptions& options) {
+  if (Status status = CheckVolume(path, options); !status.ok()) return status;
+  const VolumeFormat* const format = FindFormat(path, options);
+  Result<RawVolume> raw = format->read(path, options);
+  if (!raw.ok()) return Printable(raw.status());
+  return ReadFile{std::move(*raw), format};
+}
+
+// What `read` returns, unless there is not enough memory.
+template <class Read>
+auto WithinMemory(const std::string& path, Read&& read) -> decltype(read()) {
+  try {
+    return read();
+  } catch (const std::bad_alloc&) {
+    return Status::ResourceExhausted(path + ": does not fit the memory");
+  }
+}
+
+}  // namespace
+
+Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& options) {
+  return WithinMemory(path, [&]() -> Result<LoadedVolume> {
+    Result<ReadFile> file = ReadRaw(path, options);
+    if (!file.ok()) return file.status();
+    TakeChannel(file->raw, options);
+    return Finish(std::move(file->raw), *file->format, path);
+  });
+}
+
+Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, const ReadOptions& options) {
+  return WithinMemory(path, [&]() -> Result<std::vector<std::string>> {
+    ReadOptions of_headers = options;
+    of_headers.headers_only = true;
+    const Result<ReadFile> file = ReadRaw(path, of_headers);
+    if (!file.ok()) return file.status();
+    if (const auto placed = PlaceInWorld(file->raw.header, path); !placed.ok()) return placed.status();
+    std::vector<std::string> files = {path};
+    if (!file->raw.samples_file.empty()) files.push_back(file->raw.samples_file.string());
+    return files;
+  });
+}
+
+Status CheckVolume(const std::string& path, const ReadOptions& options) {
+  std::error_code error;
+  const auto kind = std::filesystem::status(path, error).type();
+  if (kind == std::filesystem::file_type::not_found) return Printable(Status::NotFound(path + ": no such file"));
+  if (kind != std::filesystem::file_type::directory && kind != std::filesystem::file_type::regular) {
+    return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
+  }
+  const VolumeFormat* const format = FindFormat(path, options);
+  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume, which " + ReadableText()));
+  return Printable(CheckOptions(*format, path, options));
+}
+
+bool LooksLikeVolume(const std::string& path) { return CheckVolume(path).ok(); }
+
+}  // namespace slabstream

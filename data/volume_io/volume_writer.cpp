@@ -1,0 +1,20 @@
+#include <fmt/format.h>
+
+#include <string>
+
+#include "common/base/printable.h"
+#include "data/volume_io/file_samples.h"
+#include "data/volume_io/formats.h"
+#include "data/volume_io/volume_reader.h"
+
+namespace slabstream {
+
+Status WriteVolume(const Volume& volume, const std::string& path, const WriteOptions& options) {
+  const VolumeFormat* const format = FindWritableFormat(path);
+  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": volumes are written as " + WritableEndings()));
+  const Result<FileSamples> samples = FileSamples::Of(volume, options.type, options.progress);
+  if (!samples.ok()) return Printable(Status::InvalidArgument(path + ": " + samples.status().message()));
+  return format->write(*samples, path);
+}
+
+}  // namespace slabstream

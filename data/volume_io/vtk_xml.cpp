@@ -1,0 +1,297 @@
+#include "data/volume_io/vtk_xml.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <sstream>
+#include <utility>
+
+#include "common/base/parse_number.h"
+#include "data/volume_io/payload.h"
+#include "data/volume_io/text_cursor.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::array<std::pair<std::string_view, SampleType>, 10> kTypes = {{{"Int8", SampleType::kInt8},
+                                                                             {"UInt8", SampleType::kUint8},
+                                                                             {"Int16", SampleType::kInt16},
+                                                                             {"UInt16", SampleType::kUint16},
+                                                                             {"Int32", SampleType::kInt32},
+                                                                             {"UInt32", SampleType::kUint32},
+                                                                             {"Int64", SampleType::kInt64},
+                                                                             {"UInt64", SampleType::kUint64},
+                                                                             {"Float32", SampleType::kFloat32},
+                                                                             {"Float64", SampleType::kFloat64}}};
+
+// The bytes of the file [begin, end), decoded or not.
+class ByteSource {
+ public:
+  ByteSource(const std::string& path, std::int64_t begin, std::int64_t end, bool base64) : cursor_(path, begin, end), base64_(base64) {}
+
+  // How many bytes there were, at most out.size().
+  std::size_t Read(std::span<std::byte> out) {
+    if (!base64_) return cursor_.Read(out);
+    std::size_t done = 0;
+    while (done < out.size() && (!group_.empty() || NextGroup())) {
+      const std::size_t count = std::min(group_.size(), out.size() - done);
+      std::ranges::copy(group_.first(count), out.begin() + std::ptrdiff_t(done));
+      group_ = group_.subspan(count);
+      done += count;
+    }
+    return done;
+  }
+
+ private:
+  static int Digit(char c) {
+    if (c >= 'A' && c <= 'Z') return c - 'A';
+    if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+    if (c >= '0' && c <= '9') return c - '0' + 52;
+    return c == '+' ? 62 : c == '/' ? 63 : -1;
+  }
+
+  // Four letters stand for three bytes. Each = at the end of the four stands for one byte less. A header is encoded by itself, so such an
+  // end may come before more letters.
+  bool NextGroup() {
+    unsigned bits = 0;
+    std::size_t letters = 0, padding = 0;
+    while (letters < 4) {
+      const std::optional<char> c = cursor_.Next();
+      if (!c) return false;
+      if (*c == ' ' || *c == '\n' || *c == '\r' || *c == '\t') continue;
+      const int digit = *c == '=' ? 0 : Digit(*c);
+      if (digit < 0) return false;
+      padding += *c == '=' ? 1 : 0;
+      bits = bits << 6 | unsigned(digit);
+      ++letters;
+    }
+    if (padding > 2) return false;
+    decoded_ = {std::byte(bits >> 16), std::byte(bits >> 8 & 0xff), std::byte(bits & 0xff)};
+    group_ = std::span(decoded_).first(3 - padding);
+    return true;
+  }
+
+  TextCursor cursor_;
+  bool base64_;
+  std::array<std::byte, 3> decoded_{};
+  std::span<std::byte> group_;
+};
+
+// Numbers of the header in front of binary samples.
+struct HeaderFormat {
+  bool wide = false;  // 8 bytes, else 4
+  bool big_endian = false;
+};
+
+Result<std::uint64_t> ReadCount(ByteSource& source, const HeaderFormat& header) {
+  std::array<std::byte, 8> bytes{};
+  const std::span word = std::span(bytes).first(header.wide ? 8 : 4);
+  if (source.Read(word) != word.size()) return Status::DataLoss("truncated in the header of its samples");
+  if (header.big_endian) std::ranges::reverse(word);
+  return std::bit_cast<std::uint64_t>(bytes);
+}
+
+Status ReadPlain(ByteSource& source, const HeaderFormat& header, std::span<std::byte> out) {
+  const Result<std::uint64_t> bytes = ReadCount(source, header);
+  if (!bytes.ok()) return bytes.status();
+  if (*bytes != out.size()) return Status::DataLoss(fmt::format("has {} bytes, must have {}", *bytes, out.size()));
+  const std::size_t found = source.Read(out);
+  return found == out.size() ? Status::Ok() : Status::DataLoss(fmt::format("truncated: has {} of {} bytes", found, out.size()));
+}
+
+// The number of blocks, the size of all but the last, the size of the last if it is less (else 0), and the size of each when compressed.
+Status ReadBlocks(ByteSource& source, const HeaderFormat& format, std::int64_t file_bytes, std::span<std::byte> out) {
+  std::array<std::uint64_t, 3> header{};
+  for (std::uint64_t& number : header) {
+    const Result<std::uint64_t> read = ReadCount(source, format);
+    if (!read.ok()) return read.status();
+    number = *read;
+  }
+  const auto [blocks, block_bytes, last_bytes] = header;
+  const std::uint64_t wanted = out.size(), full = last_bytes == 0 ? blocks : blocks - 1;
+  // Compare without multiplying what may be huge.
+  const bool fits = blocks > 0 && block_bytes > 0 && last_bytes <= block_bytes && full <= wanted / block_bytes &&
+                    full * block_bytes + last_bytes == wanted;
+  if (!fits) {
+    return Status::DataLoss(
+        fmt::format("has {} blocks of {} bytes and {} in the last one, must have {} in all", blocks, block_bytes, last_bytes, wanted));
+  }
+  std::vector<std::uint64_t> packed_bytes;
+  for (std::uint64_t i = 0; i < blocks; ++i) {  // no more than the samples have bytes
+    const Result<std::uint64_t> bytes = ReadCount(source, format);
+    if (!bytes.ok()) return bytes.status();
+    if (*bytes > std::uint64_t(file_bytes))
+      return Status::DataLoss(fmt::format("block {} has {} bytes, the file {}", i, *bytes, file_bytes));
+    packed_bytes.push_back(*bytes);
+  }
+  std::vector<std::byte> packed;
+  std::size_t done = 0;
+  for (std::uint64_t i = 0; i < blocks; ++i) {
+    packed.resize(packed_bytes[i]);
+    const std::size_t bytes = std::min<std::size_t>(block_bytes, out.size() - done);
+    uLongf unpacked = bytes;
+    uLong used = packed.size();
+    const bool sound = source.Read(packed) == packed.size() && uncompress2(reinterpret_cast<Bytef*>(out.data() + done), &unpacked,
+                                                                           reinterpret_cast<const Bytef*>(packed.data()), &used) == Z_OK;
+    if (!sound || unpacked != bytes || used != packed.size()) {
+      return Status::DataLoss(fmt::format("block {} is truncated or damaged", i));
+    }
+    done += bytes;
+  }
+  return Status::Ok();
+}
+
+}  // namespace
+
+std::string_view VtkTypeName(SampleType type) {
+  return std::ranges::find(kTypes, type, [](const auto& entry) { return entry.second; })->first;
+}
+
+Result<VtkXmlFile> VtkXmlFile::Open(const std::string& path, std::string_view type) {
+  VtkXmlFile file(path);
+  if (Status status = file.ReadElements(type); !status.ok()) return status;
+  return file;
+}
+
+bool VtkXmlFile::OnStart(const XmlTag& tag, std::string_view type) {
+  const std::string parent = open_.empty() ? "" : open_.back(), grandparent = open_.size() < 2 ? "" : open_[open_.size() - 2];
+  open_.push_back(tag.name);
+  if (tag.name == "VTKFile") file_ = tag;
+  if (tag.name == type) dataset_ = tag;
+  if (tag.name == "Piece" && ++pieces_ == 1) piece_ = tag;
+  if (tag.name == "PointData") point_scalars_ = tag.Attribute("Scalars");
+  if (tag.name == "CellData") cell_scalars_ = tag.Attribute("Scalars");
+  if (tag.name == "DataArray" && grandparent == "Piece" && pieces_ == 1) {
+    constexpr std::size_t kMostArrays = 4096;
+    in_array_ = arrays_.size() < kMostArrays;
+    if (in_array_) arrays_.push_back({tag, parent, tag.end, tag.end});
+  }
+  if (tag.name != "AppendedData") return true;
+  appended_ = tag.end;
+  appended_encoding_ = tag.Attribute("encoding");
+  return false;
+}
+
+void VtkXmlFile::OnEnd(const XmlTag& tag) {
+  open_.pop_back();
+  if (!in_array_) return;
+  if (tag.name == "DataArray") {
+    arrays_.back().end = std::max(arrays_.back().begin, tag.begin);
+    in_array_ = false;
+  } else {
+    arrays_.back().begin = tag.end;  // samples stand behind what else is in the element
+  }
+}
+
+Status VtkXmlFile::ReadElements(std::string_view type) {
+  std::ifstream file(path_, std::ios::binary);
+  if (!file) return Status::NotFound(path_ + ": cannot be opened for reading");
+  const auto read = [&](std::span<char> out) {
+    file.read(out.data(), std::streamsize(out.size()));
+    return std::size_t(file.gcount());
+  };
+  const XmlEvents events{[&](const XmlTag& tag) { return OnStart(tag, type); }, [&](const XmlTag& tag) { OnEnd(tag); }};
+  if (Status status = ReadXml(read, events); !status.ok()) {
+    return Status(status.code(), fmt::format("{}: not a VTK file of type {}: {}", path_, type, status.message()));
+  }
+  if (file_.Attribute("type") != type || dataset_.name.empty()) {
+    return Wrong(fmt::format("a VTK file of type '{}', must be {}", file_.Attribute("type"), type));
+  }
+  return appended_ > 0 ? FindAppended() : Status::Ok();
+}
+
+Status VtkXmlFile::FindAppended() {
+  TextCursor cursor(path_, appended_);
+  std::optional<char> c = cursor.Next();
+  while (c && *c != '_' && *c <= ' ') c = cursor.Next();
+  if (c != '_') return Damaged("no underscore begins its appended samples");
+  appended_ = cursor.offset();
+  return Status::Ok();
+}
+
+Result<std::vector<double>> VtkXmlFile::Numbers(const XmlTag& tag, const std::string& key, std::size_t count,
+                                                std::vector<double> if_absent) const {
+  const std::string text = tag.Attribute(key);
+  if (text.empty() && !if_absent.empty()) return if_absent;
+  std::istringstream words(text);
+  std::vector<double> numbers;
+  for (std::string word; words >> word;) {
+    const std::optional<double> number = ParseNumber<double>(word);
+    if (!number) break;
+    numbers.push_back(*number);
+  }
+  if (numbers.size() == count && words.eof()) return numbers;
+  return Wrong(fmt::format("{} of {} is '{}', must be {} numbers", key, tag.name, text, count));
+}
+
+Result<VtkArrayType> VtkXmlFile::TypeOf(const VtkArray& array, int most_components) const {
+  const std::string type_name = array.tag.Attribute("type"), components = array.tag.Attribute("NumberOfComponents");
+  const auto* const type = std::ranges::find(kTypes, type_name, [](const auto& entry) { return entry.first; });
+  if (type == kTypes.end()) return Wrong(fmt::format("array {}: type '{}' is not supported", array.name(), type_name));
+  const VtkArrayType result = {type->second, components.empty() ? 1 : ParseNumber<int>(components).value_or(0)};
+  if (result.components >= 1 && result.components <= most_components) return result;
+  return Wrong(fmt::format("array {}: NumberOfComponents is '{}', must be in [1, {}]", array.name(), components, most_components));
+}
+
+Result<VtkXmlFile::Place> VtkXmlFile::PlaceOf(const VtkArray& array) const {
+  const std::string name = array.name(), format = array.tag.Attribute("format"), compressor = file_.Attribute("compressor");
+  const bool appended = format == "appended";
+  Place place = {.text = format == "ascii", .begin = array.begin, .end = array.end};
+  place.compressed = !place.text && !compressor.empty();
+  if (place.compressed && compressor != "vtkZLibDataCompressor") {
+    return Wrong(fmt::format("compressor {} is not supported; supported: vtkZLibDataCompressor", compressor));
+  }
+  if (!place.text && !appended && format != "binary") {
+    return Wrong(fmt::format("array {}: format '{}', must be ascii, binary or appended", name, format));
+  }
+  place.base64 = !appended || appended_encoding_ == "base64";
+  if (appended && !place.base64 && appended_encoding_ != "raw") {
+    return Wrong(fmt::format("its appended samples have encoding '{}', must be raw or base64", appended_encoding_));
+  }
+  std::error_code error;
+  place.file_bytes = std::int64_t(std::filesystem::file_size(path_, error));
+  if (error) return Status::NotFound(path_ + ": cannot be opened for reading");
+  if (!appended) return place;
+  const std::string offset = array.tag.Attribute("offset");
+  const std::optional<std::int64_t> bytes = ParseNumber<std::int64_t>(offset);
+  if (!bytes || *bytes < 0 || appended_ == 0) return Wrong(fmt::format("array {}: offset '{}' of appended samples", name, offset));
+  place.begin = std::min(*bytes, place.file_bytes) + appended_;
+  place.end = std::max(place.begin, place.file_bytes);
+  return place;
+}
+
+Status VtkXmlFile::CheckHolds(const VtkArray& array, SampleType type, std::int64_t samples) const {
+  const Result<Place> place = PlaceOf(array);
+  if (!place.ok()) return place.status();
+  // A text has a digit and a blank for each sample, at least.
+  const std::int64_t bytes = samples * std::int64_t(BytesPerSample(type));
+  const std::int64_t least = place->text ? 2 * samples - 1 : place->compressed ? bytes / kMaxDeflateRatio : bytes;
+  if (place->end - place->begin >= least) return Status::Ok();
+  return Damaged(fmt::format("truncated: array {} has {} bytes, its {} samples need at least {}", array.name(),
+                             std::max<std::int64_t>(place->end - place->begin, 0), samples, least));
+}
+
+Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVector<std::byte>& out) const {
+  const Result<Place> place = PlaceOf(array);
+  if (!place.ok()) return place.status();
+  Status status;
+  if (place->text) {
+    TextCursor cursor(path_, place->begin, place->end);
+    status = ReadTextSamples(cursor, type, out);
+  } else {
+    ByteSource source(path_, place->begin, place->end, place->base64);
+    const HeaderFormat header = {file_.Attribute("header_type") == "UInt64", file_.Attribute("byte_order") == "BigEndian"};
+    status = place->compressed ? ReadBlocks(source, header, place->file_bytes, out) : ReadPlain(source, header, out);
+    if (header.big_endian) SwapByteOrder(type, out);
+  }
+  return status.ok() ? status : Status(status.code(), fmt::format("{}: array {}: {}", path_, array.name(), status.message()));
+}
+
+}  // namespace slabstream

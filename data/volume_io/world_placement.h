@@ -1,0 +1,51 @@
+// From the axes that a file stores its voxels in to those nearest to its world's. Voxels are turned (axes exchanged and run backwards),
+// which moves samples and changes none. If the stored axes are not at right angles, as in CT with a tilted gantry, the voxels are
+// straightened: sampled anew on a grid whose axes are, by linear interpolation within slices.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/volume/volume.h"
+#include "data/volume_io/raw_volume.h"
+
+namespace slabstream {
+
+// The axis i of the turned voxels is the stored axis from[i], run backwards if flipped[i].
+struct AxisTurn {
+  std::array<int, 3> from = {0, 1, 2};
+  std::array<bool, 3> flipped{};
+  friend bool operator==(const AxisTurn&, const AxisTurn&) = default;
+};
+
+// Axes that are not at right angles: x of a straight grid = x + x_per_y * y + x_per_z * z of the slanted one; y = y + y_per_z * z; z = z.
+struct Slant {
+  double x_per_y = 0, x_per_z = 0, y_per_z = 0;
+  Vec3 first;  // of the straight grid's voxel 0, 0, 0; whole numbers
+};
+
+struct WorldPlacement {
+  AxisTurn turn;
+  std::optional<Slant> slant;  // of the turned voxels
+  VolumeGeometry geometry;     // of the turned and straightened voxels
+};
+
+// Steps whose angles differ from right ones by less than this (radians) are at right angles: files round their numbers.
+inline constexpr double kStraight = 1e-4;
+
+// The turn whose axes are nearest to the world's: of all right-handed ones, the one with the largest sum of cosines. So the same voxels in
+// any order of storage give the same result. InvalidArgument, naming `path` and the header's matrix: a step or the origin is not finite, a
+// step is zero, the steps lie in a plane, or the straight grid is larger than a volume can be.
+Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path);
+
+bool IsFinite(const Vec3& v);
+std::string TextOf(const Vec3& v);  // "(0, 1.5, nan)", for messages
+
+// `block`: the whole volume as stored.
+VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn);
+// `outside`: what voxels of the straight grid hold that the slanted one does not reach, a sample.
+VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside);
+
+}  // namespace slabstream

@@ -1,0 +1,60 @@
+#include "simulator/model/processors.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+
+void Processors::AdvanceTo(Host& host, double now) const {
+  for (Task& task : host.tasks) task.left -= (now - host.since) * host.speed;
+  host.since = now;
+}
+
+void Processors::Predict(std::uint32_t number) {
+  Host& host = hosts_[number];
+  ++host.generation;
+  if (host.tasks.empty()) return;
+  double threads = 0, least = std::numeric_limits<double>::infinity();
+  for (const Task& task : host.tasks) {
+    threads += task.threads;
+    least = std::min(least, task.left);
+  }
+  const double busy = std::min(threads, cores_);
+  host.speed = busy / threads / (1 + memory_slowdown_ * std::max(busy - 1, 0.0));
+  forecasts_.push({host.since + std::max(least, 0.0) / host.speed, number, host.generation});
+}
+
+void Processors::Start(std::uint32_t host, std::uint64_t task, double seconds, double threads, double now) {
+  if (hosts_.size() <= host) hosts_.resize(host + 1);
+  AdvanceTo(hosts_[host], now);
+  hosts_[host].tasks.push_back({task, seconds, threads});
+  Predict(host);
+}
+
+void Processors::EndNow(std::uint32_t host, std::uint64_t task, double now) {
+  AdvanceTo(hosts_[host], now);
+  std::ranges::find(hosts_[host].tasks, task, &Task::name)->left = 0;
+  Predict(host);
+}
+
+double Processors::NextTime() {
+  while (!forecasts_.empty() && forecasts_.top().generation != hosts_[forecasts_.top().host].generation) forecasts_.pop();
+  return forecasts_.empty() ? std::numeric_limits<double>::infinity() : forecasts_.top().time;
+}
+
+Processors::Completion Processors::Finish() {
+  CHECK_LT(NextTime(), std::numeric_limits<double>::infinity());
+  const Forecast next = forecasts_.top();
+  forecasts_.pop();
+  Host& host = hosts_[next.host];
+  AdvanceTo(host, next.time);
+  const auto first = std::min_element(host.tasks.begin(), host.tasks.end(), [](const Task& a, const Task& b) { return a.left < b.left; });
+  const Completion done{next.time, first->name};
+  host.tasks.erase(first);
+  Predict(next.host);
+  return done;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,230 @@
+#include "common/planning/balance.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "common/base/find_named.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/measured_cost.h"
+#include "common/renderers/registry.h"
+#include "tests/common/planning/support.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint32_t kSlots = 8;
+
+double MaxOverMean(const std::vector<double>& seconds) {
+  return *std::max_element(seconds.begin(), seconds.end()) * double(seconds.size()) / std::accumulate(seconds.begin(), seconds.end(), 0.0);
+}
+
+TEST(Assignments, GiveEveryBoxASlotAndNoSlotMuchMoreThanOthers) {
+  Random random(61);
+  SCOPED_TRACE(random.trace());
+  for (const AssignmentEntry& entry : Assignments()) {
+    for (const std::uint32_t slots : {1U, 2U, 3U, 5U, 8U, 13U}) {
+      for (const std::size_t boxes : {0U, 1U, 5U, 13U, 40U}) {
+        std::vector<double> costs(boxes, 1.0);
+        const std::vector<std::uint32_t> owners = entry.assign({costs, slots});
+        ASSERT_EQ(owners.size(), boxes);
+        std::vector<std::size_t> counts(slots);
+        for (const std::uint32_t owner : owners) {
+          ASSERT_LT(owner, slots);
+          ++counts[owner];
+        }
+        const auto [least, most] = std::minmax_element(counts.begin(), counts.end());
+        EXPECT_LE(*most - *least, 1U) << entry.name << " " << boxes << " boxes, " << slots << " slots";
+      }
+    }
+  }
+}
+
+TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
+  Random random(62);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 100; ++i) {
+    std::vector<double> costs(std::size_t(random.Integer(1, 60)));
+    for (double& cost : costs) cost = std::exp(random.Real(-2, 2));
+    const auto slots = random.Integer<std::uint32_t>(1, 13);
+    std::vector<double> loads(slots);
+    const std::vector<std::uint32_t> owners = FindNamed(Assignments(), "greedy")->assign({costs, slots});
+    for (std::size_t box = 0; box < costs.size(); ++box) loads[owners[box]] += costs[box];
+    // Of any assignment: not below the mean, nor below the costliest box, nor below two of the slots + 1 costliest.
+    double least = std::max(std::accumulate(costs.begin(), costs.end(), 0.0) / slots, *std::max_element(costs.begin(), costs.end()));
+    std::sort(costs.rbegin(), costs.rend());
+    if (costs.size() > slots) least = std::max(least, costs[slots - 1] + costs[slots]);
+    EXPECT_LE(*std::max_element(loads.begin(), loads.end()), least * (4.0 / 3 + 1e-9));
+  }
+}
+
+// A volume where every cell is occupied, with true costs that the occupancy does not tell.
+struct World {
+  Index3 size{128, 128, 256};
+  VolumeSummary summary = FullSummary(size);
+  TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
+  OccupancyGrid grid{size, std::vector<CellOccupancy>(16 * 16 * 32, FullCell({{0, 0, 0}, {8, 8, 8}}))};
+  Policy policy{.decomposition = "kd-tree", .groups = 1, .balance = "dynamic"};
+  mutable ResolvedPolicy resolved;  // of the last Request
+  double seconds_a_cell = 1e-4;
+  Random random{63};
+
+  // Hotter towards the top of z, and a hot corner.
+  WorkField Truth() const {
+    std::vector<double> work;
+    for (std::int32_t z = 0; z < 32; ++z) {
+      for (std::int32_t y = 0; y < 16; ++y) {
+        for (std::int32_t x = 0; x < 16; ++x) work.push_back(seconds_a_cell * (1 + 0.1 * z + (x < 5 && y < 5 && z < 9 ? 8 : 0)));
+      }
+    }
+    return {size, work};
+  }
+  LayoutRequest Request(const WorkField* cost) const {
+    FrameRequest request;
+    request.policy = policy;
+    resolved = ResolvePolicy(request, summary.description.geometry).value();
+    return {.summary = &summary,
+            .transfer = &transfer,
+            .policy = &resolved,
+            .renderer = FindRenderer(kDefaultRenderer),
+            .slots = kSlots,
+            .known = {.occupied = &grid, .cost = cost}};
+  }
+  std::vector<BoxSeconds> Render(const Layout& layout, double noise) {
+    const WorkField truth = Truth();
+    std::vector<BoxSeconds> seconds;
+    for (std::size_t box = 0; box < layout.owners.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) continue;
+      const Box& voxels = layout.partition.boxes()[box];
+      seconds.push_back({voxels, (truth.Sum(voxels) + 1e-3 * seconds_a_cell) * (1 + random.Real(-noise, noise))});
+    }
+    return seconds;
+  }
+
+  struct Outcome {
+    double imbalance = 0;  // of the last layout, as the truth is
+    int changes = 0;
+    int last_change = -1;
+  };
+  Outcome Play(int frames, double noise) {
+    Outcome outcome;
+    MeasuredCost learnt(grid);
+    Layout layout = MakeLayout(Request(nullptr));
+    int seen = 0;
+    std::vector<double> average;  // by box
+    for (int frame = 0; frame < frames; ++frame) {
+      const double weight = std::max(0.2, 1.0 / ++seen);
+      if (seen == 1) average.assign(layout.owners.size(), 0);
+      const std::vector<BoxSeconds> rendered = Render(layout, noise);
+      learnt.Learn(rendered, weight);
+      for (std::size_t box = 0, i = 0; box < average.size(); ++box) {
+        if (layout.owners[box] != kNoSlot) average[box] += weight * (rendered[i++].seconds - average[box]);
+      }
+      const WorkField cost = learnt.Field();
+      if (std::optional<Layout> better = Rebalance(layout, average, Request(&cost), seen)) {
+        layout = *std::move(better);
+        seen = 0;
+        ++outcome.changes;
+        outcome.last_change = frame;
+      }
+    }
+    std::vector<double> slots(kSlots);
+    const WorkField truth = Truth();
+    for (std::size_t box = 0; box < layout.owners.size(); ++box) {
+      if (layout.owners[box] != kNoSlot) slots[layout.owners[box]] += truth.Sum(layout.partition.boxes()[box]);
+    }
+    outcome.imbalance = MaxOverMean(slots);
+    return outcome;
+  }
+};
+
+TEST(Balance, ConvergesWithinFiveFrames) {
+  for (const std::string decomposition : {"slab", "beam", "subcube", "kd-tree"}) {
+    World world;
+    world.policy.decomposition = decomposition;
+    EXPECT_GT(world.Play(0, 0).imbalance, 1.3) << decomposition;
+    EXPECT_LT(world.Play(5, 0).imbalance, 1.05) << decomposition;
+  }
+}
+
+TEST(Balance, HandsOverBoxesWhereTheyCannotBeCutAnew) {
+  World world;
+  world.policy.decomposition = "octree";
+  world.policy.groups = 6;  // 64 boxes
+  const double before = world.Play(0, 0).imbalance, after = world.Play(5, 0).imbalance;
+  EXPECT_GT(before, 1.1);
+  EXPECT_LT(after, 1.1);
+}
+
+TEST(Balance, DoesNotOscillateUnderNoise) {
+  World world;
+  SCOPED_TRACE(world.random.trace());
+  const World::Outcome outcome = world.Play(200, 0.03);
+  EXPECT_LE(outcome.changes, 6);
+  EXPECT_LT(outcome.imbalance, 1.08);
+}
+
+TEST(Balance, MovesNothingWhereItDoesNotPay) {
+  World world;
+  world.seconds_a_cell = 1e-9;  // what could be won is less than the voxels cost
+  EXPECT_EQ(world.Play(20, 0).changes, 0);
+
+  // Nor what is even already.
+  Layout layout = MakeLayout(world.Request(nullptr));
+  const WorkField even = WorkField(world.grid);
+  EXPECT_FALSE(Rebalance(layout, PredictedSeconds(layout, even), world.Request(&even), 1).has_value());
+}
+
+TEST(Balance, ReassigningNeverMakesAFrameSlower) {
+  World world;
+  world.policy.decomposition = "subcube";
+  world.policy.groups = 5;
+  for (const AssignmentEntry& assignment : Assignments()) {
+    world.policy.assignment = assignment.name;
+    const WorkField truth = world.Truth();
+    const Layout before = MakeLayout(world.Request(nullptr));
+    const std::vector<double> seconds = PredictedSeconds(before, truth);
+    const Layout after = Reassign(before, kSlots, seconds);
+    EXPECT_EQ(after.partition, before.partition);
+    EXPECT_LE(FrameSeconds(after, kSlots, seconds), FrameSeconds(before, kSlots, seconds));
+    // No slot is further above the mean than a box weighs.
+    const double largest = *std::max_element(seconds.begin(), seconds.end());
+    EXPECT_LE(FrameSeconds(after, kSlots, seconds), truth.total() / kSlots + largest) << assignment.name;
+  }
+}
+
+TEST(MovedVoxels, AreThoseThatASlotDidNotHoldWithTheirHalo) {
+  const WorkField voxels = WorkField::Uniform({10, 10, 60});
+  const Layout from = {MakeSlabs({.work = &voxels, .boxes = 3}), {0, 1, kNoSlot}};
+  Layout to = from;
+  EXPECT_EQ(MovedVoxels(from, to), 0);
+  to.owners = {0, kNoSlot, kNoSlot};
+  EXPECT_EQ(MovedVoxels(from, to), 0);
+  to.owners = {1, 1, 2};
+  EXPECT_EQ(MovedVoxels(from, to), 10 * 10 * ((28 - 16) + 28)) << "slot 1 held the halo of its box, twice 8 slices";
+}
+
+TEST(MeasuredCost, AddsUpToWhatFramesTook) {
+  World world;
+  MeasuredCost learnt(world.grid);
+  EXPECT_FALSE(learnt.any());
+  const Layout layout = MakeLayout(world.Request(nullptr));
+  const std::vector<BoxSeconds> frame = world.Render(layout, 0);
+  learnt.Learn(frame, 1);
+  EXPECT_TRUE(learnt.any());
+  const WorkField field = learnt.Field();
+  // Cells that a plane cuts in two belong to both.
+  for (const BoxSeconds& box : frame) EXPECT_NEAR(field.Sum(box.box), box.seconds, 0.1 * box.seconds);
+
+  // What takes no time is not learnt to be nothing.
+  std::vector<BoxSeconds> hidden = frame;
+  hidden[0].seconds = 0;
+  learnt.Learn(hidden, 1);
+  EXPECT_GT(learnt.Field().Sum(frame[0].box), 0);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,77 @@
+#include "common/planning/validate_request.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <limits>
+#include <string>
+
+#include "tests/common/planning/support.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+TEST(ValidateFrameRequest, AcceptsDefaultsAndLimits) {
+  FrameRequest request;
+  request.dataset = "x";
+  EXPECT_TRUE(Validate(request).ok());
+  EXPECT_TRUE(Validate(SomeRequest()).ok());
+  request.dataset = std::string(kMaxNameBytes, 'x');
+  request.termination = 0.5;
+  request.policy.groups = kMaxGroups;
+  request.transfer.opacity_distance = kMaxOpacityDistance;
+  EXPECT_TRUE(Validate(request).ok());
+}
+
+TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
+  struct Case {
+    std::function<void(FrameRequest&)> change;
+    std::string message;  // how it begins
+  };
+  const std::string long_name(kMaxNameBytes + 1, 'x');
+  const Case cases[] = {
+      {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
+      {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
+      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
+      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but the renderer 'splat' has no such parameter"},
+      {[](auto& r) { r.size.width = 0; }, "size.width is 0"},
+      {[](auto& r) { r.view.zoom = kNan; }, "view.zoom is nan"},
+      {[](auto& r) { r.transfer.choice = ""; }, "transfer.preset has 0 bytes"},
+      {[](auto& r) { r.transfer.choice = TransferFunction{}; }, "transfer function: number of colour points is 0"},
+      {[](auto& r) { r.transfer.opacity_distance = 0; }, "transfer.opacity_distance is 0, but must lie in (0, 1000000] voxel lengths"},
+      {[](auto& r) { r.transfer.opacity_distance = kNan; }, "transfer.opacity_distance is nan"},
+      {[](auto& r) { r.shading.ambient = 7; }, "shading.ambient is 7"},
+      {[](auto& r) {
+         r.renderer = "shear";
+         r.view.projection = Projection::kPerspective;
+       },
+       "renderer is 'shear', but projection 'perspective' needs one of: splat, zbuffer, raycast, mip"},
+      {[](auto& r) { r.labels.emplace(); }, "renderer is 'splat', but labels needs one of: zbuffer, raycast"},
+      {[](auto& r) {
+         r.renderer = "zbuffer";
+         r.overlay.emplace();
+       },
+       "renderer is 'zbuffer', but overlay needs one of: raycast"},
+      {[](auto& r) { r.termination = 0.6; }, "termination is 0.6, but must lie in [0, 0.5]"},
+      {[](auto& r) { r.termination = kNan; }, "termination is nan"},
+      {[](auto& r) { r.policy.decomposition = ""; }, "policy.decomposition has 0 bytes"},
+      {[](auto& r) { r.policy.load_metric = ""; }, "policy.load_metric has 0 bytes"},
+      {[](auto& r) { r.policy.assignment = ""; }, "policy.assignment has 0 bytes"},
+      {[&](auto& r) { r.policy.balance = long_name; }, "policy.balance has 257 bytes"},
+      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is 5, but must lie in [0, 4]"},
+      {[](auto& r) { r.policy.groups = -1; }, "policy.groups is -1, but must lie in [0, 1024]"},
+      {[&](auto& r) { r.policy.combine = long_name; }, "policy.combine has 257 bytes"},
+  };
+  for (const Case& c : cases) {
+    FrameRequest request = SomeRequest();
+    c.change(request);
+    const Status status = Validate(request);
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+    EXPECT_EQ(status.message().substr(0, c.message.size()), c.message);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

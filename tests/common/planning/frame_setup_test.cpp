@@ -1,0 +1,102 @@
+// What a plan says about the frame that its workers render.
+#include <gtest/gtest.h>
+
+#include "common/combining/travel.h"
+#include "common/planning/validate_request.h"
+#include "tests/common/planning/plan_support.h"
+#include "tests/support/renderers.h"
+
+namespace slabstream {
+namespace {
+
+TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
+  FrameRequest request = SomeRequest();
+  request.renderer = ZBuffer()->name();
+  request.termination = 0.25;
+  request.transfer.opacity_distance = 3;
+  request.shading.model = ShadingModel::kNone;
+  request.size = {100, 50};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  const FrameSetup setup = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_EQ(setup.dataset, 7U);
+  EXPECT_EQ(setup.description, summary.description);
+  EXPECT_EQ(setup.range, summary.range);
+  EXPECT_EQ(setup.renderer, ZBuffer());
+  EXPECT_EQ(setup.camera, MakeSupersampledCamera(request.view, request.size, summary.description.geometry));
+  EXPECT_EQ(setup.transfer.opacity_distance, 3);
+  EXPECT_EQ(setup.shading, request.shading);
+  EXPECT_EQ(setup.termination, 0.25);
+  EXPECT_EQ(setup.halo, kHalo);
+}
+
+// Splatting renders a grid along the slices and the display worker makes the picture of it; the Z-buffer renders the supersampled picture.
+TEST(PlanFrame, TheFrameIsWhatThePipelineRenders) {
+  FrameRequest request = SomeRequest();
+  request.view = {.azimuth_degrees = 30, .elevation_degrees = 20, .zoom = 0.2};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  const VolumeGeometry& geometry = summary.description.geometry;
+  const FrameSetup splat = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_EQ(splat.camera, MakeCamera(request.view, request.size, geometry));
+  EXPECT_EQ(splat.sheets, MakeSheetGrid(splat.camera, geometry));
+  EXPECT_EQ(FrameBounds(splat), (PixelBounds{0, 0, splat.sheets.width, splat.sheets.height}));
+
+  request.renderer = ZBuffer()->name();
+  const FrameSetup zbuffer = Plan(request, summary, FullRoster(2)).setup;
+  EXPECT_GT(zbuffer.camera.supersample, 1);
+  EXPECT_EQ(FrameBounds(zbuffer), (PixelBounds{0, 0, zbuffer.camera.width, zbuffer.camera.height}));
+  EXPECT_EQ(WholeFrame(zbuffer).end, std::uint64_t(zbuffer.camera.width) * std::uint64_t(zbuffer.camera.height));
+}
+
+// Seen obliquely, slices that lie far apart for the width of their voxels need absurdly wide images.
+TEST(PlanFrame, RefusesViewsThatCannotBeRendered) {
+  FrameRequest request = SomeRequest();
+  request.view.elevation_degrees = -50;
+  VolumeSummary summary = FullSummary({64, 64, 600});
+  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1), {}).ok());
+  summary.description.geometry.spacing = {1, 1, 3000};
+  const Status status = PlanFrame(request, 7, summary, FullRoster(1), {}).status();
+  EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message().find("at most 131072 a side"), std::string::npos) << status.message();
+}
+
+TEST(PlanFrame, ResolvesPresets) {
+  FrameRequest request = SomeRequest();
+  request.transfer = {"auto", 2.5};
+  const VolumeSummary summary = FullSummary({40, 41, 42});
+  TransferFunction expected = *MakePreset("auto", summary);
+  expected.opacity_distance = 2.5;
+  EXPECT_EQ(Plan(request, summary, FullRoster(1)).setup.transfer, expected);
+}
+
+TEST(PlanFrame, ColoursTravelInAsManyBitsAsTheirErrorAllows) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 1;
+  const auto color = [&](double pixel_error, int workers) {
+    request.policy.pixel_error = pixel_error;
+    const FramePlan plan = Plan(request, summary, FullRoster(workers));
+    for (const GroupPlan& group : plan.groups) {
+      const Travel travel = TravelOf(DeriveSchedule(group.schedule, WholeFrame(plan.setup)).value(), WholeFrame(plan.setup));
+      EXPECT_LE(CodingError(group.color, travel.hops, travel.transfers), pixel_error);
+    }
+    return plan.groups[0].color;
+  };
+  for (int workers : {2, 5, 8}) {
+    EXPECT_EQ(color(0, workers), ColorCoding::kFloat32);
+    EXPECT_EQ(color(1e-6, workers), ColorCoding::kFloat32);
+    EXPECT_EQ(color(1.0 / 1024, workers), ColorCoding::kFixed16);
+  }
+  request.policy.combine = "centralized";
+  request.policy.groups = 1;
+  const VolumeSummary large = FullSummary({16, 16, 400});
+  request.policy.pixel_error = 1.0 / 1024;
+  const FramePlan plan = Plan(request, large, FullRoster(100));
+  EXPECT_EQ(plan.groups[0].color, ColorCoding::kHalf) << "99 transfers, but one hop";
+  request.renderer = ZBuffer()->name();
+  EXPECT_EQ(color(kMaxPixelError, 5), ColorCoding::kFloat32);
+  request.policy.pixel_error = 0.2;
+  EXPECT_EQ(Validate(request).code(), StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,102 @@
+// The names of a policy, and what is looked up by them.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/classified_volume.h"
+#include "common/planning/policy_names.h"
+#include "tests/common/planning/plan_support.h"
+#include "tests/support/renderers.h"
+
+namespace slabstream {
+namespace {
+
+TEST(PlanFrame, UsesEveryNameOfAPolicy) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (const DecompositionEntry& decomposition : Decompositions()) {
+      FrameRequest request = SomeRequest();
+      request.policy.combine = scheme.name;
+      request.policy.decomposition = decomposition.name;
+      for (const AssignmentEntry& assignment : Assignments()) {
+        for (const NamedChoice& split : LoadMetrics()) {
+          request.policy.assignment = assignment.name;
+          request.policy.load_metric = split.name;
+          request.policy.groups = 2;
+          const Roster roster = FullRoster(5);
+          ExpectSound(Plan(request, summary, roster), roster);
+        }
+      }
+    }
+  }
+}
+
+TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
+  const VolumeGeometry geometry = FullSummary({40, 200, 42}).description.geometry;
+  FrameRequest request = SomeRequest();
+  for (const DecompositionEntry& decomposition : Decompositions()) {
+    for (const AssignmentEntry& assignment : Assignments()) {
+      for (const NamedChoice& split : LoadMetrics()) {
+        for (const AxisChoice axis : {AxisChoice::kX, AxisChoice::kAuto, AxisChoice::kView}) {
+          request.policy = {.decomposition = std::string(decomposition.name),
+                            .load_metric = std::string(split.name),
+                            .axis = axis,
+                            .assignment = std::string(assignment.name),
+                            .balance = std::string(kDynamicBalance)};
+          const Result<ResolvedPolicy> resolved = ResolvePolicy(request, geometry);
+          ASSERT_TRUE(resolved.ok()) << resolved.status().message();
+          EXPECT_EQ(resolved->decomposition, &decomposition);
+          EXPECT_EQ(resolved->assignment, &assignment);
+          EXPECT_EQ(NeedsOccupancy(*resolved), NeedsOccupancy(request.policy));
+          request.policy = AskFor(*resolved);
+          EXPECT_EQ(*ResolvePolicy(request, geometry), *resolved);
+        }
+      }
+    }
+  }
+}
+
+TEST(ClassifiedVolume, IsAKeyByWhatItIs) {
+  const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
+  const ClassifiedVolume volume(3, transfer, Splatting()), same(3, transfer, Splatting());
+  EXPECT_EQ(volume, same);
+  TransferFunction other = transfer;
+  other.opacities.back().opacity /= 2;
+  EXPECT_NE(volume, ClassifiedVolume(4, transfer, Splatting()));
+  EXPECT_NE(volume, ClassifiedVolume(3, transfer, ZBuffer()));
+  EXPECT_NE(volume, ClassifiedVolume(3, other, Splatting()));
+}
+
+TEST(PlanFrame, NamesWhatItDoesNotKnow) {
+  const VolumeSummary summary = FullSummary({8, 8, 8});
+  const auto status = [&](auto change, const Roster& roster) {
+    FrameRequest request = SomeRequest();
+    change(request);
+    return PlanFrame(request, 7, summary, roster, {}).status();
+  };
+  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));
+  EXPECT_EQ(status([](auto& r) { r.policy.load_metric = "hairs"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.load_metric is 'hairs', but must be one of: auto, voxels, occupied, cost"));
+  EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, contiguous, greedy"));
+  EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic"));
+  EXPECT_EQ(
+      status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
+      Status::InvalidArgument("policy.combine 'mix' is not one of fan-in, centralized, chain, tree, radix-k, binary-swap, direct-send"));
+  const Status open = Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
+  EXPECT_EQ(status([](auto& r) { r.policy.decomposition = kAutomatic; }, FullRoster(1)), open);
+  EXPECT_EQ(status([](auto& r) { r.policy.assignment = kAutomatic; }, FullRoster(1)), open);
+  EXPECT_EQ(status([](auto& r) { r.policy.combine = kAutomatic; }, FullRoster(1)), open);
+  EXPECT_EQ(status([](auto& r) { r.transfer.choice = "no-such-preset"; }, FullRoster(1)).code(), StatusCode::kNotFound);
+  for (const Roster& nobody : {Roster{}, Roster{{0}}, Roster{{0, 0, 0}}}) {
+    EXPECT_EQ(status([](auto&) {}, nobody).code(), StatusCode::kUnavailable);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

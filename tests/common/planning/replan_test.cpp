@@ -1,0 +1,121 @@
+// Who does what: turns of display workers, and plans after the loss of workers.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "common/combining/schemes.h"
+#include "common/planning/assignment.h"
+#include "tests/common/planning/plan_support.h"
+
+namespace slabstream {
+namespace {
+
+TEST(PlanFrame, DisplayWorkersTakeTurns) {
+  for (int workers = 1; workers <= 7; ++workers) {
+    FrameRequest request = SomeRequest();
+    request.policy.groups = 3;
+    const Roster roster = FullRoster(workers);
+    const FramePlan first = Plan(request, FullSummary({96, 96, 96}), roster);
+    std::set<WorkerId> displays;
+    for (std::uint64_t turn = 0; turn < 2 * std::uint64_t(workers); ++turn) {
+      const FramePlan plan = TakeTurn(first, roster, {turn, 1});
+      ExpectSound(plan, roster);
+      EXPECT_EQ(PlacedBoxes(plan), PlacedBoxes(first));
+      EXPECT_EQ(plan.display, TakeTurn(first, roster, {turn + std::uint64_t(workers), 1}).display);
+      displays.insert(plan.display);
+    }
+    EXPECT_EQ(displays.size(), std::size_t(workers));
+  }
+}
+
+TEST(Replan, ReassignsLostBoxesAndChangesNothingElse) {
+  const VolumeSummary summary = FullSummary({40, 40, 120});
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (int workers : {2, 3, 5, 8}) {
+      FrameRequest request = SomeRequest();
+      request.policy.groups = 3;
+      request.policy.combine = scheme.name;
+      const FramePlan plan = Plan(request, summary, FullRoster(workers));
+      for (int lost = 0; lost < workers; ++lost) {
+        SCOPED_TRACE(testing::Message() << scheme.name << ", " << workers << " workers, lost " << lost);
+        Roster rest = FullRoster(workers);
+        rest.slots[std::size_t(lost)] = 0;
+        const Result<FramePlan> again = Replan(plan, rest);
+        ASSERT_TRUE(again.ok());
+        ExpectSound(*again, rest);
+        EXPECT_EQ(again->setup, plan.setup);
+        EXPECT_EQ(again->layout->partition, plan.layout->partition);
+        EXPECT_EQ(PlacedBoxes(*again), PlacedBoxes(plan));
+        ASSERT_EQ(again->groups.size(), plan.groups.size());
+        std::set<WorkerId> lenders;
+        for (std::size_t g = 0; g < plan.groups.size(); ++g) {
+          ASSERT_EQ(again->groups[g].placements.size(), plan.groups[g].placements.size());
+          for (std::size_t rank = 0; rank < plan.groups[g].placements.size(); ++rank) {
+            const WorkerId before = plan.groups[g].placements[rank].worker, after = again->groups[g].placements[rank].worker;
+            if (before == WorkerId(lost + 1)) {
+              lenders.insert(after);
+            } else {
+              EXPECT_EQ(after, before);
+            }
+          }
+        }
+        EXPECT_EQ(lenders.size(), std::size_t(std::min(3, workers - 1)));  // its three boxes go to different workers
+        if (plan.display != WorkerId(lost + 1)) {
+          EXPECT_EQ(again->display, plan.display);
+        }
+        // Back again, or another in its place: everything as it was.
+        Roster back = FullRoster(workers);
+        EXPECT_EQ(PlacedBoxes(*Replan(*again, back)), PlacedBoxes(plan));
+      }
+    }
+  }
+}
+
+TEST(Replan, SurvivesAllButOne) {
+  Random random(93);
+  SCOPED_TRACE(random.trace());
+  const VolumeSummary summary = FullSummary({40, 40, 120});
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 4;
+  FramePlan plan = Plan(request, summary, FullRoster(9));
+  Roster roster = FullRoster(9);
+  for (int left = 8; left >= 1; --left) {
+    std::size_t lost = random.Integer<std::size_t>(0, 8);
+    while (roster.slots[lost] == 0) lost = (lost + 1) % 9;
+    roster.slots[lost] = 0;
+    const Result<FramePlan> next = Replan(plan, roster);
+    ASSERT_TRUE(next.ok());
+    ExpectSound(*next, roster);
+    plan = *next;
+  }
+  EXPECT_EQ(Replan(plan, Roster{std::vector<WorkerId>(9)}).status().code(), StatusCode::kUnavailable);
+}
+
+TEST(OwnersOf, LendsTheBoxesOfVacantSlotsEvenly) {
+  for (const AssignmentEntry& assignment : Assignments()) {
+    const Roster roster = {{11, 0, 13, 0, 15}};
+    Layout layout;
+    layout.owners = assignment.assign({std::vector<double>(5 * 30, 1.0), 5});
+    layout.owners.insert(layout.owners.begin() + 7, kNoSlot);
+    const std::vector<WorkerId> owners = OwnersOf(layout, roster);
+    ASSERT_EQ(owners.size(), layout.owners.size());
+    std::map<WorkerId, int> lent;
+    for (std::size_t box = 0; box < owners.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) {
+        EXPECT_EQ(owners[box], 0U);
+      } else if (roster.slots[layout.owners[box]] != 0) {
+        EXPECT_EQ(owners[box], roster.slots[layout.owners[box]]);
+      } else {
+        ++lent[owners[box]];
+      }
+    }
+    EXPECT_EQ(lent, (std::map<WorkerId, int>{{11, 20}, {13, 20}, {15, 20}})) << assignment.name;
+    EXPECT_EQ(OwnersOf(layout, Roster{{0, 0, 0, 0, 0}}), std::vector<WorkerId>(layout.owners.size()));
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

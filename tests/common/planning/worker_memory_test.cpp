@@ -1,0 +1,84 @@
+// What frames take of workers, and whom they fit.
+#include "common/planning/worker_memory.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/planning/frame_window.h"
+#include "common/volume/memory_budget.h"
+#include "tests/common/planning/plan_support.h"
+#include "tests/support/renderers.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::uint64_t kMebi = 1 << 20;
+
+FramePlan PlanOf(int side, int workers, const VolumeSummary& summary, const std::string& renderer = "raycast") {
+  FrameRequest request = SomeRequest();
+  request.renderer = renderer;
+  request.size = {side, side};
+  request.view.zoom = 4;  // the volume fills the frame, and no picture is minified
+  return Plan(request, summary, FullRoster(workers));
+}
+
+TEST(WorkerMemory, AFrameOfOneBoxTakesFourImages) {
+  const FramePlan plan = PlanOf(1024, 1, FullSummary({64, 64, 64}));
+  constexpr std::uint64_t kImage = 16 * kMebi;
+  ASSERT_EQ(std::uint64_t(FrameBytes(plan.setup)), kImage);
+  EXPECT_EQ(GroupImageBytes(plan.setup, plan.groups[0].placements), 2 * kImage) << "rendered, and on its way";
+  EXPECT_EQ(PictureBytes(plan.setup), 2 * kImage) << "accumulated, and encoded";
+}
+
+TEST(WorkerMemory, BricksOfOneValueTakeNothing) {
+  VolumeSummary summary = FullSummary({64, 64, 64});
+  const Box all = summary.description.geometry.bounds();
+  EXPECT_EQ(VoxelBytes(all, summary), 2U * 64 * 64 * 64);
+  summary.bricks[0] = {7, 7};
+  EXPECT_EQ(VoxelBytes(all, summary), 2U * (64 * 64 * 64 - 16 * 16 * 16));
+  EXPECT_EQ(VoxelBytes({{8, 8, 8}, {24, 16, 16}}, summary), 2U * 8 * 8 * 8) << "half of the box lies in the brick of one value";
+  EXPECT_EQ(VoxelBytes({}, summary), 0U);
+  const std::uint64_t without = VoxelBytes({{0, 0, 0}, {16, 64, 64}}, summary);
+  summary.cells.assign(summary.bricks.size(), 100);
+  EXPECT_EQ(VoxelBytes({{0, 0, 0}, {16, 64, 64}}, summary), without + std::uint64_t{80} * 100 * 16)
+      << "those of the bricks that it touches";
+}
+
+TEST(WorkerMemory, TheSmallestWorkerWithAPartDecides) {
+  const VolumeSummary summary = FullSummary({64, 64, 64});
+  const FramePlan plan = PlanOf(1024, 2, summary);
+  const auto fit = [&](std::uint64_t first, std::uint64_t second, std::uint64_t stranger = 0) {
+    return FramesThatFit(plan, summary, std::vector<WorkerLimit>{{1, first}, {2, second}, {3, stranger}});
+  };
+  const std::uint64_t images = GroupImageBytes(plan.setup, plan.groups[0].placements) + PictureBytes(plan.setup);
+  const std::uint64_t one = kIdleMemoryBytes + 2 * kMebi + images;
+  EXPECT_EQ(*fit(0, 0), kMostInWindow) << "without limits everything fits";
+  EXPECT_EQ(*fit(one, 0), 1);
+  EXPECT_EQ(*fit(one + images, one + 2 * images), 2);
+  EXPECT_EQ(*fit(one + 2 * images, one + 2 * images, kMebi), 3) << "who has no part does not count";
+  const Status refused = fit(one, images).status();
+  EXPECT_EQ(refused.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(refused.message(), HasSubstr("size 1024x1024 needs "));
+  EXPECT_THAT(refused.message(), HasSubstr(" of worker 2, limit " + MemoryText(images)));
+}
+
+TEST(WorkerMemory, VoxelsThatDoNotFitAreNamedAsTheDataset) {
+  const VolumeSummary summary = FullSummary({512, 512, 512});
+  const FramePlan plan = PlanOf(64, 1, summary);
+  const Status refused = FramesThatFit(plan, summary, std::vector<WorkerLimit>{{1, 256 * kMebi}}).status();
+  EXPECT_EQ(refused.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(refused.message(), HasSubstr("the dataset needs 449 MiB of worker 1, limit 256 MiB (voxels 256 MiB"));
+}
+
+// A frame along slices, or a finer one, is as large as it is, not as its picture.
+TEST(WorkerMemory, NamesTheSizeThatIsRendered) {
+  const VolumeSummary summary = FullSummary({64, 64, 64});
+  const FramePlan plan = PlanOf(1024, 1, summary, "splat");
+  const Status refused = FramesThatFit(plan, summary, std::vector<WorkerLimit>{{1, kMebi}}).status();
+  EXPECT_THAT(refused.message(), testing::ContainsRegex("size 1024x1024 \\(rendered as [0-9]+x[0-9]+\\) needs "));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,486 @@
+#include "tests/common/wire/samples.h"
+#include "tests/support/renderers.h"
+
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "common/wire/limits.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint32_t kMax32 = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint64_t kMax64 = std::numeric_limits<std::uint64_t>::max();
+constexpr std::int64_t kMaxTime = std::numeric_limits<std::int64_t>::max();
+
+const std::string kLongName(kMaxNameBytes, 'n');
+const std::string kLongText(kMaxTextBytes, 't');
+const std::string kLongEndpoint(kMaxEndpointBytes, 'e');
+const std::string kOddEndpoint = "ipc:///tmp/not\xFFutf-8";  // paths are bytes
+const std::string kUmlaut = "B\xC3\xBCro";
+
+RankReport FullReport() {
+  RankReport report{.worker = kMax32, .group = 1023, .rank = 65535, .box = kMax32};
+  for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
+  for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
+  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = kMax64;
+  report.image_bounds = {0, 1, 16384, 16384};
+  return report;
+}
+
+VolumeDescription Description() { return {{{301, 370, 316}, {0.5, 1, 2.25}}, ScalarType::kUint16, {-0.125, 1e300}}; }
+
+TransferFunction Curve() {
+  return {{{-1e308, {0, 0.25F, 1}}, {0, {1, 1, 1}}, {0, {0, 0, 0}}, {1e308, {0.5F, 0.5F, 0.5F}}},
+          {{-1, 0, 0.5, 0}, {7, 1, 0.001, 1}},
+          kMaxOpacityDistance};
+}
+
+Shading ManyLights() {
+  Shading shading{.model = ShadingModel::kNone, .lights = {}, .ambient = 0, .diffuse = 1, .specular = 0.5F, .shininess = 1000};
+  for (int i = 0; i < kMaxLights; ++i) shading.lights.push_back({-1.0 * i, 1e-3, 1e3});
+  return shading;
+}
+
+// A group of `ranks` slabs along z.
+GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const RendererKind* renderer) {
+  GroupAssignment message{.epoch = kMax64, .key = {.frame = kMax64, .attempt = kMax32, .group = 3}, .finished_before = kMax64 - 1};
+  message.group_count = 1024;
+  message.first_group = 3;
+  message.previews = true;
+  message.display = kMax32;
+  FrameSetup& setup = message.setup;
+  setup.dataset = kMax64;
+  setup.description = Description();
+  setup.range = {-1, 1e30F};
+  SetRenderer(*renderer, setup);
+  SetView(view, {640, 480}, setup);
+  setup.transfer = Curve();
+  setup.shading = ManyLights();
+  setup.termination = 0;
+  setup.halo = 16;
+  const Index3 size = setup.description.geometry.size;
+  for (Rank rank = 0; rank < ranks; ++rank) {
+    const auto z = std::int32_t(rank);
+    message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
+    message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
+  }
+  message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
+  message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
+  message.peers.push_back({kMax32, kOddEndpoint});
+  return message;
+}
+
+// Every third tile is hidden; the last byte of bits is used in part.
+OcclusionMask Mask(std::int32_t tiles_x, std::int32_t tiles_y) {
+  OcclusionMask mask{tiles_x, tiles_y, std::vector<std::uint8_t>(std::size_t(tiles_x) * std::size_t(tiles_y))};
+  for (std::size_t i = 0; i < mask.hidden.size(); i += 3) mask.hidden[i] = 1;
+  return mask;
+}
+
+GroupAssignment Clipped() {
+  GroupAssignment message = Assignment(2, {}, ZBuffer());
+  for (std::size_t i = 0; i < kMaxClipSides; ++i) {
+    message.setup.clip.sides.push_back({i % 2 == 0 ? Vec3{0.5, 0, 0} : Vec3{0, 0, -2.25}, -1e300});
+  }
+  message.setup.clip.mode = ClipMode::kCutAway;
+  return message;
+}
+
+std::vector<Isosurface> ManySurfaces() {
+  std::vector<Isosurface> surfaces;
+  for (int i = 0; i < kMaxIsosurfaces; ++i) surfaces.push_back({-kMaxScalar + i * 1e299, {0, 0.5F, 1}, i % 2 == 0 ? 0.25 : 1});
+  return surfaces;
+}
+
+GroupAssignment WithLayers() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32, .cells = true};
+  message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
+  message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
+  return message;
+}
+
+GroupAssignment WithSurfaces() {
+  GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
+  message.setup.transfer.isosurfaces = ManySurfaces();
+  message.setup.transfer.gradient_opacities = {{0, 0}, {0, 1}, {kMaxScalar, 0.5}};
+  return message;
+}
+
+GroupAssignment BehindOthers() {
+  GroupAssignment message = Assignment(2, {}, Splatting());
+  message.setup.termination = 0.5;
+  message.hidden = Mask(OcclusionTiles(message.setup.sheets.width), OcclusionTiles(message.setup.sheets.height));
+  return message;
+}
+
+EncodedRuns NoRuns() { return {{PixelFormat::kRgba, {}, 0, 0}, Codec::kRaw, 0, kMax64}; }
+EncodedRuns SomeRuns() { return {{PixelFormat::kRgbaDepth, {1, 2, 30, 40}, 7, 900}, Codec::kZstd, 12 * 7 + 20 * 900, 1}; }
+
+constexpr Box kWholeBox = {{0, 0, 0}, {kMaxVolumeSide, kMaxVolumeSide, kMaxVolumeSide}};
+constexpr Box kOneVoxel = {{9, 8, 7}, {10, 9, 8}};
+
+FrameRequest Request() {
+  FrameRequest request;
+  request.dataset = "brain";
+  return request;
+}
+
+// Without a specialisation for each member of AnyMessage, AllSamples does not compile.
+template <class Message>
+std::vector<Message> SamplesOf() = delete;
+
+template <>
+std::vector<Register> SamplesOf() {
+  return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
+          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true, std::string(kKeyTextBytes, 'k')},
+          {0, 0, kUmlaut, kOddEndpoint}};
+}
+
+template <>
+std::vector<Welcome> SamplesOf() {
+  return {{1, 2, 3, "inproc://slabs", 10, 100}, {kMax64, kMax64, kMax32, kLongEndpoint, 60000, 600000}};
+}
+
+template <>
+std::vector<Heartbeat> SamplesOf() {
+  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32, true}};
+}
+
+template <>
+std::vector<Ping> SamplesOf() {
+  return {{}, {kMax64, kMax64, {0, 1, kMax64}, {kMax32, kMax32}, {1, kMax32}}};
+}
+
+template <>
+std::vector<GroupAssignment> SamplesOf() {
+  const ViewParameters oblique{Projection::kPerspective, 1e6, -33, 12.5, 0.01, 60};
+  return {Assignment(3, {}, Splatting()),
+          Assignment(0, oblique, ZBuffer()),
+          Assignment(16, oblique, Splatting()),
+          BehindOthers(),
+          Clipped(),
+          WithSurfaces(),
+          WithLayers()};
+}
+
+template <>
+std::vector<GroupDone> SamplesOf() {
+  return {{1, 2, {3, 4, 1023}, {}, {}},
+          {kMax64, kMax32, {}, {RankReport{}, FullReport()}, Mask(5, 3)},
+          {1, 1, {}, {}, Mask(kMaxOcclusionTiles, 1)}};
+}
+
+template <>
+std::vector<FrameImage> SamplesOf() {
+  return {{1, 2, 3, 4, 0, 1, NoRuns(), {}}, {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}}};
+}
+
+template <>
+std::vector<WorkerTrouble> SamplesOf() {
+  return {{1, 2, {3, 4, 5}, 0, Status::Internal("")}, {kMax64, kMax32, {}, kMax32, Status::InvalidArgument(kLongText), true}};
+}
+
+template <>
+std::vector<Leave> SamplesOf() {
+  return {{}, {kMax64, kMax32}};
+}
+
+template <>
+std::vector<Retire> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<Stop> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ChunkRequest> SamplesOf() {
+  return {{1, 2, 3, kOneVoxel, 0},
+          {kMax64, kMax32, kMax32, kWholeBox, ChunkCount(kWholeBox, ScalarType::kFloat32) - 1},
+          {1, 2, 3, kOneVoxel, kFirstCellChunk}};
+}
+
+template <>
+std::vector<Chunk> SamplesOf() {
+  return {{1, 2, kOneVoxel, 0, Codec::kRaw, 1, 1, 0},
+          {kMax64, kMax32, kWholeBox, 1, Codec::kZstd, kChunkBytes, 9, kMax64},
+          {1, 2, kOneVoxel, kFirstCellChunk + 2, Codec::kZstd, 5, 4, 0, 2 * kChunkBytes + 5}};
+}
+
+template <>
+std::vector<ChunkRefused> SamplesOf() {
+  return {{1, 2, kOneVoxel, 0, Status::NotFound("no dataset 2")}, {kMax64, kMax64, kWholeBox, 5, Status::Cancelled(kLongText)}};
+}
+
+template <>
+std::vector<PartialImage> SamplesOf() {
+  return {{1, 2, {3, 4, 5}, 0, {0, 1}, {0, 0}, NoRuns().image, {}, {}, 0, {}},
+          {kMax64,
+           kMax32,
+           {},
+           1U << 20U,
+           {65535, 65536},
+           {17, std::uint64_t{1} << 48U},
+           {PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900},
+           {},
+           PackedRuns{Codec::kZstd, 7 * 12 + 900 * 24 - 1, kMax64},
+           kMax64,
+           {RankReport{}, FullReport()}},
+          {1,
+           2,
+           {3, 4, 5},
+           0,
+           {0, 1},
+           {0, 0},
+           {.format = PixelFormat::kDepth},
+           SharedImage{{kMax64, kMax32, kMax32},
+                       {0, 0, 1 << 24, 1},
+                       1U << 24U,
+                       std::uint64_t{1} << 48U,
+                       {{kArenaBytes, kMax64, kArenaSlots - 1}, {0, 1, 0}, {4096, 1, 1}}},
+           {},
+           1,
+           {}}};
+}
+
+template <>
+std::vector<ImageRefused> SamplesOf() {
+  return {{}, {kMax64, kMax32, {3, 4, 5}, 1U << 20U, {17, std::uint64_t{1} << 48U}}};
+}
+
+template <>
+std::vector<ImageReceived> SamplesOf() {
+  return {{}, {kMax64, kMax32, kMax64}};
+}
+
+template <>
+std::vector<SubmitFrame> SamplesOf() {
+  FrameRequest full;
+  full.dataset = kLongName;
+  full.renderer = "mip";
+  full.parameters = {{"projection-mode", "minimum"}};
+  full.size = {kMaxImageSide, 1};
+  full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
+  full.clipping = {.box = ClipBox{{-kMaxWorldCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
+                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxWorldCoordinate},
+                   .planes = std::vector<ClipPlane>(kMaxClipPlanes, {{0, -1, 1e9}, -1e18}),
+                   .mode = ClipMode::kCutAway};
+  full.transfer = {Curve(), 1e-6, ScalarRange{-1e300, 1e-300}};
+  full.shading = ManyLights();
+  full.termination = 0.5;
+  full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
+  full.previews = true;
+  FrameRequest sliced = Request();
+  sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
+  FrameRequest surfaces = Request();
+  surfaces.renderer = "raycast";
+  surfaces.transfer.scalar_range = ScalarRange{0, 100, true};
+  surfaces.transfer.isosurfaces = ManySurfaces();
+  surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
+  FrameRequest layers = Request();
+  layers.renderer = "raycast";
+  layers.labels = LabelChoice{
+      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMaxLabelValue, 0.25}}, .shown = {{1, kMaxLabelValue}, {7, 7}}};
+  layers.overlay = OverlayChoice{.transfer = {"grayscale", 1, ScalarRange{-1, 2}}, .weight = 0.5};
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}};
+}
+
+template <>
+std::vector<FrameProgress> SamplesOf() {
+  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2}};
+}
+
+template <>
+std::vector<FrameReply> SamplesOf() {
+  const FrameStatistics statistics{kMax32,  kMax32,    kMax32,    "slab",   "occupied", "x",           kLongName,
+                                   kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
+  FrameStatistics predicted = statistics;
+  predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
+  const PictureGeometry of_patient{World::kPatient,
+                                   LengthUnit::kMillimetre,
+                                   Projection::kPerspective,
+                                   {0, -1, 0},
+                                   {0.6, 0, 0.8},
+                                   {0.8, 0, -0.6},
+                                   {-1e9, 0.5, 1e300},
+                                   1e-300,
+                                   1e300};
+  const PictureGeometry behind_the_eye_plane{
+      World::kScene, LengthUnit::kFile, Projection::kOrthographic, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {}, -7.5, 0.25};
+  return {{1, {1, 1}, 0, 1, NoRuns(), {}, {}},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics, of_patient},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane}};
+}
+
+template <>
+std::vector<FrameFailed> SamplesOf() {
+  return {{1, Status::DeadlineExceeded("")},
+          {kMax64, Status::DataLoss(kUmlaut)},
+          {2, Status::Unavailable("x")},
+          {3, Status::ResourceExhausted("y")}};
+}
+
+template <>
+std::vector<CancelFrame> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ClientPing> SamplesOf() {
+  return {{}, {kMax64, {0, kMax64}, kMax64}};
+}
+
+template <>
+std::vector<ClientPong> SamplesOf() {
+  return {{}, {kMax64, kMax64, {kMax64, 0}}};
+}
+
+template <>
+std::vector<StatusQuery> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<StatusReply> SamplesOf() {
+  StatusReply full{kMax64, kMax64, kMax32, kMax64, kMax32, kMax32, kMax32, kMax64, kMax64, kMax64, {}, {}};
+  full.workers = {{1, 2, "", 1, 0, 0, 0, 0, 0}, {kMax32, kMax32, kLongName, kMaxThreads, kMax32, kMax64, kMax64, kMax32, kMax32, true}};
+  full.datasets = {{"a", DatasetState::kUnloaded, {}, {}, ""},
+                   {kLongName, DatasetState::kLoading, {}, {}, ""},
+                   {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
+                   {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
+  full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
+  return {{}, full};
+}
+
+template <>
+std::vector<ShutDown> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<ShutDownReply> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <>
+std::vector<KeysOrder> SamplesOf() {
+  return {{},
+          {kMax64, KeysAction::kRotate, Role::kAdmin, ""},
+          {1, KeysAction::kRevoke, Role::kClient, std::string(kKeyTextBytes, 'a')},
+          {1, KeysAction::kRevoke, Role::kClient, ""}};
+}
+
+template <>
+std::vector<KeysReply> SamplesOf() {
+  return {
+      {},
+      {kMax64,
+       {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"}, {std::string(kKeyTextBytes, 'b'), Role::kAdmin, ""}}}};
+}
+
+template <>
+std::vector<OrderRefused> SamplesOf() {
+  return {{}, {kMax64, Status::InvalidArgument("ending the service needs an admin's key")}};
+}
+
+template <>
+std::vector<DataOrder> SamplesOf() {
+  return {{},
+          {kMax64, DataAction::kAdd, {"head=/data/head.nrrd", std::string(kMaxDataItemBytes, '/'), "\xff"}},
+          {1, DataAction::kRemove, std::vector<std::string>(kMaxDataItems, "a")},
+          {1, DataAction::kReload, {kUmlaut}}};
+}
+
+template <>
+std::vector<DataReply> SamplesOf() {
+  return {{},
+          {kMax64,
+           {{kUmlaut, DatasetState::kReady, Description(), {-3, 4}, "", kMax64, kMax64, std::uint32_t(kMaxLabels), true},
+            {"b", DatasetState::kLoading}}}};
+}
+
+template <>
+std::vector<SummaryQuery> SamplesOf() {
+  return {{.dataset = "a", .transfer = {}}, {kMax64, kLongName, {Curve(), 1e-6, ScalarRange{0, 100, true}}}};
+}
+
+template <>
+std::vector<SummaryReply> SamplesOf() {
+  const TransferFunction flat{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  return {{.description = Description(), .range = {}, .percentiles = {}, .transfer = flat, .labels = {}},
+          {kMax64,
+           Description(),
+           {-1e30F, 1e30F},
+           std::vector<std::uint64_t>(kHistogramBins, kMax64),
+           kMax64,
+           std::vector<Percentile>(kMaxPercentiles, {100, -1e300}),
+           Curve(),
+           {{1, {0, 0.5F, 1}, std::string(kMaxLabelNameBytes, 'n')}, {kMaxLabelValue, {}, ""}}}};
+}
+
+template <>
+std::vector<SampleQuery> SamplesOf() {
+  return {{.dataset = "a", .points = {{}}}, {kMax64, kLongName, std::vector<Vec3>(50, {1e300, -1, 0})}};
+}
+
+template <>
+std::vector<SampleReply> SamplesOf() {
+  const VolumeSample full{{-1e9, 0, 1}, true, {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
+                          -2.5};
+  return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .label = LabelAt{}}}}};
+}
+
+template <>
+std::vector<PickQuery> SamplesOf() {
+  FrameRequest request = Request();
+  return {{.frame = request}, {kMax64, request, double(request.size.width), 0.5}};
+}
+
+template <>
+std::vector<PickReply> SamplesOf() {
+  return {{}, {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300}};
+}
+
+template <>
+std::vector<AddVolume> SamplesOf() {
+  return {{.name = "a", .description = Description(), .layers = {}, .labels = {}},
+          {kMax64,
+           kLongName,
+           Description(),
+           {ScalarType::kUint16, ScalarType::kFloat32},
+           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}}};
+}
+
+template <>
+std::vector<VolumeCredit> SamplesOf() {
+  return {{}, {kMax64, kMax64 - 1, kMax64}};
+}
+
+template <>
+std::vector<VolumePart> SamplesOf() {
+  return {{}, {kMax64, kMax64, kMaxVolumePartBytes}};
+}
+
+template <>
+std::vector<DropVolume> SamplesOf() {
+  return {{}, {kMax64}};
+}
+
+template <std::size_t... I>
+std::vector<AnyMessage> AllSamplesOf(std::index_sequence<I...>) {
+  std::vector<AnyMessage> all;
+  const auto add = [&all](auto samples) { all.insert(all.end(), samples.begin(), samples.end()); };
+  (add(SamplesOf<std::variant_alternative_t<I, AnyMessage>>()), ...);
+  return all;
+}
+
+}  // namespace
+
+std::vector<AnyMessage> AllSamples() { return AllSamplesOf(std::make_index_sequence<std::variant_size_v<AnyMessage>>()); }
+
+}  // namespace slabstream

@@ -1,0 +1,114 @@
+// Layers on the grid of another volume: the same world point has the same label, whatever the grids.
+#include "data/layers/layer_sampling.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+template <class T>
+Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value,
+                  ValueMapping mapping = {}) {
+  Volume volume{{geometry, type, mapping}, MakeVoxelBlock(geometry.bounds(), type)};
+  for (Index3 v; v.z < geometry.size.z; ++v.z) {
+    for (v.y = 0; v.y < geometry.size.y; ++v.y) {
+      for (v.x = 0; v.x < geometry.size.x; ++v.x) volume.block.samples<T>()[volume.block.Offset(v)] = T(value(v));
+    }
+  }
+  return volume;
+}
+
+VolumeGeometry Placed(const Index3& size, const Vec3& spacing, const Vec3& origin, double turn = 0) {
+  const double c = std::cos(turn), s = std::sin(turn);
+  return {size, spacing, {World::kPatient, origin, {Vec3{c, s, 0}, Vec3{-s, c, 0}, Vec3{0, 0, 1}}}};
+}
+
+Vec3 WorldOf(const VolumeGeometry& g, const Index3& v) { return g.orientation.origin + g.orientation.ToWorld(ToVec3(v) * g.spacing); }
+
+std::uint32_t Same(double sample) { return std::uint32_t(sample); }
+
+TEST(NearestOn, KeepsSamplesOnTheSameGrid) {
+  const VolumeGeometry grid = Placed({5, 4, 3}, {0.7, 1.1, 1.3}, {-31.7, 12.9, 4.1}, 0.3);
+  const Volume labels = MakeVolume<std::uint8_t>(grid, ScalarType::kUint8, [](const Index3& v) { return v.x + 10 * v.y + 50 * v.z; });
+  EXPECT_EQ(NearestOn(grid, labels, ScalarType::kUint8, Same).bytes, labels.block.bytes);
+}
+
+TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
+  Random random(3);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 20; ++i) {
+    const auto real = [&](double low, double high) { return random.Real(low, high); };
+    const VolumeGeometry grid = Placed({9, 8, 7}, {real(0.5, 2), 1, real(0.5, 2)}, {real(-3, 3), 1, 2}, real(-0.7, 0.7));
+    const VolumeGeometry coarse = Placed({5, 6, 4}, {real(1, 3), 2, real(1, 3)}, {real(-3, 3), real(-3, 3), 0}, real(-0.7, 0.7));
+    const Volume labels =
+        MakeVolume<std::uint16_t>(coarse, ScalarType::kUint16, [](const Index3& v) { return 1 + v.x + 5 * v.y + 30 * v.z; });
+    const VoxelBlock found = NearestOn(grid, labels, ScalarType::kUint16, Same);
+    for (Index3 v; v.z < grid.size.z; ++v.z) {
+      for (v.y = 0; v.y < grid.size.y; ++v.y) {
+        for (v.x = 0; v.x < grid.size.x; ++v.x) {
+          const std::uint16_t label = found.samples<std::uint16_t>()[found.Offset(v)];
+          const Vec3 point = WorldOf(grid, v);
+          // The label's own voxel is nearest; 0: none holds the point.
+          bool expected_any = false;
+          for (Index3 w; w.z < coarse.size.z; ++w.z) {
+            for (w.y = 0; w.y < coarse.size.y; ++w.y) {
+              for (w.x = 0; w.x < coarse.size.x; ++w.x) {
+                const Vec3 from = coarse.orientation.FromWorld(point - WorldOf(coarse, w)) / coarse.spacing;
+                const double farthest = std::max({std::abs(from.x), std::abs(from.y), std::abs(from.z)});
+                if (farthest < 0.4999) {
+                  expected_any = true;
+                  EXPECT_EQ(label, 1 + w.x + 5 * w.y + 30 * w.z);
+                } else if (farthest < 0.5001) {
+                  expected_any = true;  // on a border: either
+                }
+              }
+            }
+          }
+          EXPECT_TRUE(expected_any || label == 0);
+        }
+      }
+    }
+  }
+}
+
+TEST(InterpolatedOn, IsExactForLinearValuesAndNothingOutside) {
+  const VolumeGeometry layer = Placed({6, 6, 6}, {2, 2, 2}, {0, 0, 0});
+  const Volume ramp = MakeVolume<std::uint8_t>(layer, ScalarType::kUint8, [](const Index3& v) { return v.x + 6 * v.y + 36 * v.z; },
+                                               {.scale = 0.5, .offset = -3});
+  const VolumeGeometry grid = Placed({9, 9, 9}, {1.5, 1.5, 1.5}, {-2, 0.25, 0.5});
+  const VoxelBlock found = InterpolatedOn(grid, ramp);
+  for (Index3 v; v.z < 9; ++v.z) {
+    for (v.y = 0; v.y < 9; ++v.y) {
+      for (v.x = 0; v.x < 9; ++v.x) {
+        const float value = found.samples<float>()[found.Offset(v)];
+        const Vec3 p = WorldOf(grid, v) / Vec3{2, 2, 2};
+        const auto inside = [](double q) { return q >= -0.5 && q < 5.5; };
+        if (!inside(p.x) || !inside(p.y) || !inside(p.z)) {
+          EXPECT_TRUE(std::isnan(value));
+          continue;
+        }
+        const auto within = [](double q) { return std::clamp(q, 0.0, 5.0); };
+        EXPECT_NEAR(value, 0.5 * (within(p.x) + 6 * within(p.y) + 36 * within(p.z)) - 3, 1e-4);
+      }
+    }
+  }
+}
+
+TEST(InterpolatedOn, AVoxelWithoutAValueCountsOnlyWhereItHasAPart) {
+  const VolumeGeometry layer = Placed({3, 1, 1}, {1, 1, 1}, {0, 0, 0});
+  const Volume values = MakeVolume<float>(layer, ScalarType::kFloat32, [](const Index3& v) { return v.x == 2 ? NAN : 4 + v.x; });
+  const VoxelBlock found = InterpolatedOn(Placed({5, 1, 1}, {0.5, 1, 1}, {0, 0, 0}), values);
+  const float* const samples = found.samples<float>();
+  EXPECT_EQ(samples[0], 4);
+  EXPECT_EQ(samples[1], 4.5F);
+  EXPECT_EQ(samples[2], 5) << "the next voxel has no part in it";
+  EXPECT_TRUE(std::isnan(samples[3]));
+  EXPECT_TRUE(std::isnan(samples[4]));
+}
+
+}  // namespace
+}  // namespace slabstream

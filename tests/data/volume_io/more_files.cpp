@@ -1,0 +1,228 @@
+#include "tests/data/volume_io/more_files.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <jpeglib.h>
+#include <cstdio>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include "common/base/check.h"
+
+namespace slabstream {
+namespace {
+
+template <class T>
+void PutNumber(FileBytes& bytes, std::size_t offset, T value, bool big_endian) {
+  std::array<char, sizeof(T)> raw{};
+  std::memcpy(raw.data(), &value, sizeof(T));
+  if (big_endian) std::reverse(raw.begin(), raw.end());
+  bytes.replace(offset, raw.size(), raw.data(), raw.size());
+}
+
+FileBytes Word(std::uint64_t number, const FileSpec& spec, const VtiOptions& options) {
+  FileBytes word(options.wide_header ? 8 : 4, '\0');
+  if (options.wide_header) {
+    PutNumber(word, 0, number, spec.big_endian);
+  } else {
+    PutNumber(word, 0, std::uint32_t(number), spec.big_endian);
+  }
+  return word;
+}
+
+}  // namespace
+
+FileBytes VtkXmlSamples(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options) {
+  if (options.format == "ascii") return samples;
+  const bool base64 = options.format == "binary" || options.encoding == "base64";
+  const auto encoded = [&](const FileBytes& bytes) { return base64 ? Base64(bytes) : bytes; };
+  if (options.block == 0) return encoded(Word(samples.size(), spec, options) + samples);
+  FileBytes sizes, blocks;
+  std::size_t count = 0;
+  for (std::size_t begin = 0; begin < samples.size(); begin += options.block, ++count) {
+    const FileBytes block = Zlib(samples.substr(begin, options.block));
+    sizes += Word(block.size(), spec, options);
+    blocks += block;
+  }
+  return encoded(Word(count, spec, options) + Word(options.block, spec, options) + Word(samples.size() % options.block, spec, options) +
+                 sizes) +
+         encoded(blocks);
+}
+
+FileBytes Base64(const FileBytes& bytes) {
+  constexpr const char* kLetters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  FileBytes text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    unsigned bits = 0;
+    for (std::size_t j = 0; j < 3; ++j) bits = bits << 8 | (i + j < bytes.size() ? std::uint8_t(bytes[i + j]) : 0U);
+    for (std::size_t j = 0; j < 4; ++j) text += i + j > bytes.size() ? '=' : kLetters[bits >> (18 - 6 * j) & 63];
+  }
+  return text;
+}
+
+FileBytes MrcHeader(const MrcSpec& spec) {
+  FileBytes bytes(1024 + std::size_t(spec.extension), '\0');
+  const auto put = [&](int word, auto value) { PutNumber(bytes, 4 * std::size_t(word - 1), value, spec.big_endian); };
+  for (int i = 0; i < 3; ++i) {
+    const int axis = spec.axes[i] - 1;  // which column i runs along
+    put(1 + i, std::int32_t(spec.size[i] * (i == 2 ? spec.volumes : 1)));
+    put(5 + i, std::int32_t(spec.starts[i]));
+    put(8 + axis, std::int32_t(spec.size[i]));
+    put(11 + axis, float(spec.spacing[axis] * spec.size[i]));
+    put(14 + i, float(spec.angles[i]));
+    put(17 + i, std::int32_t(spec.axes[i]));
+    put(50 + i, float(spec.origin[i]));
+  }
+  put(4, std::int32_t(spec.mode));
+  put(23, std::int32_t(spec.volumes > 1 ? 401 : 1));
+  put(24, std::int32_t(spec.extension));
+  if (spec.imod != 0) {
+    put(39, std::int32_t{1146047817});
+    put(40, spec.imod);
+  }
+  bytes.replace(208, 4, "MAP ");
+  bytes.replace(212, 4, spec.big_endian ? std::string("\x11\x11\0\0", 4) : std::string("\x44\x44\0\0", 4));
+  return bytes;
+}
+
+FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool fortran, int version) {
+  FileBytes text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", descr, fortran ? "True" : "False", shape);
+  const std::size_t before = version == 1 ? 10 : 12;
+  text += FileBytes(64 - (before + text.size() + 1) % 64, ' ') + "\n";
+  FileBytes header = "\x93NUMPY" + FileBytes{char(version), '\0', char(text.size() & 0xff), char(text.size() >> 8)};
+  if (version > 1) header += FileBytes(2, '\0');
+  return header + text;
+}
+
+FileBytes NpyHeader(const FileSpec& spec) {
+  constexpr const char* kTypes[] = {"i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"};
+  return NpyHeader((spec.big_endian ? ">" : "<") + std::string(kTypes[int(spec.type)]),
+                   fmt::format("({}, {}, {})", spec.size.z, spec.size.y, spec.size.x));
+}
+
+std::string AsText(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += fmt::format("{:.17g}\n", value);
+  return text;
+}
+
+FileBytes VtkFile(const FileSpec& spec, const FileBytes& samples, bool binary, const std::string& components) {
+  constexpr const char* kTypes[] = {"char",         "unsigned_char", "short",         "unsigned_short", "int",
+                                    "unsigned_int", "long",          "unsigned_long", "float",          "double"};
+  const auto& [x, y, z] = spec.size;
+  return fmt::format(
+             "# vtk DataFile Version 3.0\na title\n{}\nDATASET STRUCTURED_POINTS\nDIMENSIONS {} {} {}\nSPACING {} {} {}\nORIGIN 1 2 3\n"
+             "POINT_DATA {}\nSCALARS density {}{}\nLOOKUP_TABLE default\n",
+             binary ? "BINARY" : "ASCII", x, y, z, spec.spacing.x, spec.spacing.y, spec.spacing.z, x * y * z, kTypes[int(spec.type)],
+             components) +
+         samples + "\n";
+}
+
+FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptions& options) {
+  constexpr const char* kTypes[] = {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Float32", "Float64"};
+  const std::string extent =
+      options.extent.empty() ? fmt::format("0 {} 0 {} 0 {}", spec.size.x - 1, spec.size.y - 1, spec.size.z - 1) : options.extent;
+  FileBytes text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n"
+      "<ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\"{}>\n<Piece Extent=\"{}\">\n<PointData {}>\n",
+      spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
+      options.block > 0 ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, options.origin.x, options.origin.y, options.origin.z,
+      spec.spacing.x, spec.spacing.y, spec.spacing.z, options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent,
+      options.attributes);
+  const FileBytes stored = VtkXmlSamples(spec, samples, options);
+  const bool appended = options.format == "appended";
+  for (int i = 0; i < options.arrays; ++i) {
+    text += fmt::format("<DataArray type=\"{}\" Name=\"density{}\" NumberOfComponents=\"{}\" format=\"{}\"{}>\n", kTypes[int(spec.type)],
+                        i == 0 ? "" : std::to_string(i + 1), options.components, options.format, appended ? " offset=\"0\"" : "");
+    if (!appended) text += "<InformationKey name=\"range\">0 1</InformationKey>\n" + stored + "\n";
+    text += "</DataArray>\n";
+  }
+  text += "</PointData>\n</Piece>\n</ImageData>\n";
+  if (appended) text += "<AppendedData encoding=\"" + options.encoding + "\">\n  _" + stored + "\n</AppendedData>\n";
+  return text + "</VTKFile>\n";
+}
+
+void WritePng(const std::string& path, const Index3& size, int bits, int kind, const FileBytes& samples, bool interlaced) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  CHECK(file != nullptr) << path;
+  png_init_io(png, file);
+  png_set_IHDR(png, info, png_uint_32(size.x), png_uint_32(size.y), bits, kind, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  const std::array<png_color, 2> palette = {png_color{10, 20, 30}, png_color{200, 210, 220}};
+  if (kind == PNG_COLOR_TYPE_PALETTE) png_set_PLTE(png, info, palette.data(), int(palette.size()));
+  png_write_info(png, info);
+  if (bits == 16) png_set_swap(png);
+  if (bits < 8) png_set_packing(png);
+  FileBytes copy = samples;
+  const std::size_t row = samples.size() / std::size_t(size.y);
+  std::vector<png_bytep> rows;
+  for (std::size_t y = 0; y < std::size_t(size.y); ++y) rows.push_back(reinterpret_cast<png_bytep>(copy.data() + y * row));
+  png_write_image(png, rows.data());
+  png_write_end(png, info);
+  png_destroy_write_struct(&png, &info);
+  CHECK_EQ(std::fclose(file), 0);
+}
+
+void WriteJpeg(const std::string& path, const Index3& size, int components, const FileBytes& samples, bool progressive) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  CHECK(file != nullptr) << path;
+  jpeg_compress_struct jpeg{};
+  jpeg_error_mgr errors{};
+  jpeg.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&jpeg);
+  jpeg_stdio_dest(&jpeg, file);
+  jpeg.image_width = JDIMENSION(size.x);
+  jpeg.image_height = JDIMENSION(size.y);
+  jpeg.input_components = components;
+  jpeg.in_color_space = components == 1 ? JCS_GRAYSCALE : JCS_RGB;
+  jpeg_set_defaults(&jpeg);
+  jpeg_set_quality(&jpeg, 100, TRUE);
+  if (progressive) jpeg_simple_progression(&jpeg);
+  jpeg_start_compress(&jpeg, TRUE);
+  FileBytes copy = samples;
+  while (jpeg.next_scanline < jpeg.image_height) {
+    auto* row = reinterpret_cast<JSAMPROW>(copy.data() + std::size_t(jpeg.next_scanline) * std::size_t(size.x) * std::size_t(components));
+    (void)jpeg_write_scanlines(&jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  jpeg_destroy_compress(&jpeg);
+  CHECK_EQ(std::fclose(file), 0);
+}
+
+std::vector<SampleFile> OneOfEachFormat() {
+  const FileSpec spec{.type = SampleType::kInt16}, big{.type = SampleType::kInt16, .big_endian = true};
+  FileBytes samples;
+  std::vector<double> values;
+  for (int i = 0; i < 24; ++i) values.push_back(i * 321 - 2000);
+  samples = EncodeSamples(SampleType::kInt16, values);
+  const FileBytes swapped = EncodeSamples(SampleType::kInt16, values, true), zlib = Zlib(samples);
+  const auto whole = [](const std::string& file, const FileBytes& header, const FileBytes& behind) {
+    return SampleFile{file, header + behind, header.size()};
+  };
+  // XML and text: all of it is header, since samples are found by it.
+  const auto all = [](const std::string& file, const FileBytes& bytes) { return SampleFile{file, bytes, bytes.size()}; };
+  return {
+      whole("v.nii", NiftiHeader(spec), samples),
+      whole("v.nii.gz", "", Gzip(NiftiHeader(spec) + samples)),
+      whole("v.nrrd", NrrdHeader(spec, "raw"), samples),
+      whole("v.nrrd", NrrdHeader(spec, "gzip"), Gzip(samples)),
+      whole("v.mha", MetaHeader(spec, "LOCAL"), samples),
+      whole("v.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())), zlib),
+      whole("v.mrc", MrcHeader({.mode = 1, .extension = 40}), samples),
+      whole("v.map.gz", "", Gzip(MrcHeader({.mode = 1, .big_endian = true}) + swapped)),
+      all("v.vtk", VtkFile(spec, swapped, true)),
+      all("v.vtk", VtkFile(spec, AsText(values), false)),
+      all("v.vti", VtiFile(spec, samples)),
+      all("v.vti", VtiFile(big, swapped, {.format = "binary", .wide_header = true, .block = 16})),
+      all("v.vti", VtiFile(spec, samples, {.encoding = "base64", .block = 20})),
+      all("v.vti", VtiFile(spec, AsText(values), {.format = "ascii"})),
+      whole("v.npy", NpyHeader(spec), samples),
+  };
+}
+
+}  // namespace slabstream

@@ -1,0 +1,94 @@
+// Options for reading a file, as they stand behind its path.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "data/volume_io/read_options.h"
+#include "tests/data/volume_io/volume_files.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(VolumeSource, IsAPathWithOptionsBehindIt) {
+  const Result<VolumeSource> source = ParseVolumeSource("ct.raw?dims=512,256,300,type=int16,spacing=0.7,0.7,1.25,endian=big,offset=128");
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  EXPECT_EQ(source->path, "ct.raw");
+  EXPECT_EQ(source->options.dims, (Index3{512, 256, 300}));
+  EXPECT_EQ(source->options.type, SampleType::kInt16);
+  EXPECT_EQ(source->options.spacing, (Vec3{0.7, 0.7, 1.25}));
+  EXPECT_EQ(source->options.big_endian, true);
+  EXPECT_EQ(source->options.offset, 128);
+  EXPECT_FALSE(source->options.time);
+  EXPECT_EQ(ParseVolumeSource("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
+  EXPECT_EQ(ParseVolumeSource("head.nii.gz?channel=luminance")->options.channel, kLuminance);
+  EXPECT_EQ(ParseVolumeSource("head.nii.gz")->path, "head.nii.gz");
+  EXPECT_EQ(ParseVolumeSource("what?")->path, "what?") << "no option stands behind the question mark";
+}
+
+TEST(VolumeSource, MayBeAFileWithAQuestionMark) {
+  const TemporaryDirectory directory;
+  const std::string odd = directory / "a?time=1";
+  WriteFile(odd, "x");
+  EXPECT_EQ(ParseVolumeSource(odd)->path, odd);
+  const Result<VolumeSource> with_option = ParseVolumeSource(odd + "?time=2");
+  EXPECT_EQ(with_option->path, odd);
+  EXPECT_EQ(with_option->options.time, (TimeRange{2, 2}));
+}
+
+TEST(VolumeSource, SaysWhatIsWrong) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"v?tine=3", "'tine' is no option for reading a file, which are time, channel"},
+      {"v?time=", "'v?time=': time '' must be a whole number"},
+      {"v?time=-1", "time '-1' must be a whole number in [0,"},
+      {"v?time=1.5", "time '1.5' must be"},
+      {"v?time=1,time=2", "time is given twice"},
+      {"v?dims=1,2", "dims '1,2' must be three whole numbers"},
+      {"v?dims=1,2,0", "dims '1,2,0' must be three whole numbers in [1, 65535]"},
+      {"v?dims=1,2,3,4", "dims '1,2,3,4' must be"},
+      {"v?dims=1,2,99999999999", "dims '1,2,99999999999' must be"},
+      {"v?spacing=1,nan,1", "spacing '1,nan,1' must be three numbers above 0"},
+      {"v?spacing=1,0,1", "must be three numbers above 0"},
+      {"v?spacing=1,inf,1", "must be three numbers above 0"},
+      {"v?type=int12", "type 'int12' must be one of int8, uint8, int16"},
+      {"v?endian=middle", "endian 'middle' must be little or big"},
+      {"v?offset=-1", "offset '-1' must be a whole number of bytes"},
+      {"v?channel=red", "channel 'red' must be luminance or a whole number"},
+  };
+  for (const auto& [text, why] : cases) {
+    const Result<VolumeSource> source = ParseVolumeSource(text);
+    ASSERT_FALSE(source.ok()) << text;
+    EXPECT_EQ(source.status().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(source.status().message(), HasSubstr(why));
+  }
+}
+
+TEST(VolumeSource, TimesAreOneOrARangeWithBothEnds) {
+  EXPECT_EQ(ParseTimeRange("--time", "3")->count(), 1);
+  EXPECT_EQ(ParseTimeRange("--time", "3")->last, 3);
+  const TimeRange range = ParseTimeRange("--time", "0:19").value();
+  EXPECT_EQ(range.first, 0);
+  EXPECT_EQ(range.last, 19);
+  EXPECT_EQ(range.count(), 20);
+  for (const char* text : {"", ":", "1:", ":1", "2:1", "-1", "0:1:2", "0-3", "1048576", "0:1048576", "a:b"}) {
+    EXPECT_THAT(ParseTimeRange("--time", text).status().message(), HasSubstr("--time")) << text;
+  }
+}
+
+TEST(VolumeSource, IsNamedAtAnotherTime) {
+  EXPECT_EQ(AtTime("v.nii", 3), "v.nii?time=3");
+  EXPECT_EQ(AtTime("v.nii?time=0:9", 3), "v.nii?time=3");
+  EXPECT_EQ(AtTime("v.npy?spacing=1,1,2,time=0:9", 3), "v.npy?spacing=1,1,2,time=3");
+  EXPECT_EQ(AtTime("v.raw?time=0,dims=2,2,2", 3), "v.raw?dims=2,2,2,time=3");
+}
+
+TEST(VolumeSource, TakesOptionsOneByOne) {
+  std::string source = "v.raw";
+  source = WithReadOption(source, "dims", "1,2,3");
+  source = WithReadOption(source, "type", "uint8");
+  EXPECT_EQ(source, "v.raw?dims=1,2,3,type=uint8");
+  EXPECT_EQ(ParseVolumeSource(source)->options.dims, (Index3{1, 2, 3}));
+}
+
+}  // namespace
+}  // namespace slabstream

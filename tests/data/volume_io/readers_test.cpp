@@ -1,0 +1,577 @@
+// What each further format means: axes, units, types and encodings of MRC, VTK, NumPy, raw samples, pictures and OME-TIFF; several volumes
+// in one file, and several components of a voxel.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "data/volume_io/formats.h"
+#include "data/volume_io/volume_reader.h"
+#include "tests/data/volume_io/more_files.h"
+#include "tests/data/volume_io/volume_files.h"
+#include "tests/support/expect_near.h"
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+class ReadersTest : public testing::Test {
+ protected:
+  LoadedVolume Read(const std::string& name, const FileBytes& bytes, const ReadOptions& options = {}) {
+    WriteFile(directory_ / name, bytes);
+    return ReadPath(directory_ / name, options);
+  }
+  static LoadedVolume ReadPath(const std::string& path, const ReadOptions& options = {}) {
+    Result<LoadedVolume> loaded = ReadVolume(path, options);
+    CHECK(loaded.ok()) << loaded.status().message();
+    return *std::move(loaded);
+  }
+  // One line that names the path.
+  std::string WhyNot(const std::string& name, const FileBytes& bytes, const ReadOptions& options = {}) {
+    WriteFile(directory_ / name, bytes);
+    return WhyNotPath(directory_ / name, options);
+  }
+  static std::string WhyNotPath(const std::string& path, const ReadOptions& options = {}) {
+    const Result<LoadedVolume> loaded = ReadVolume(path, options);
+    EXPECT_FALSE(loaded.ok());
+    EXPECT_THAT(loaded.status().message(), testing::AllOf(HasSubstr(path), testing::Not(HasSubstr("\n"))));
+    EXPECT_EQ(loaded.status().code(), StatusCode::kInvalidArgument) << loaded.status().message();
+    return loaded.status().message();
+  }
+
+  TemporaryDirectory directory_;
+};
+
+std::vector<double> Counted(std::size_t count) {
+  std::vector<double> values;
+  for (std::size_t i = 0; i < count; ++i) values.push_back(double(i));
+  return values;
+}
+
+std::vector<double> ValuesOf(const LoadedVolume& loaded) {
+  const Volume& volume = *loaded.volume;
+  std::vector<double> values;
+  VisitScalarType(volume.description.type, [&]<class T>(const T*) {
+    for (std::size_t i = 0; i < CountIn(volume.description.geometry.size); ++i) {
+      values.push_back(volume.description.mapping.FromStored(double(volume.block.samples<T>()[i])));
+    }
+  });
+  return values;
+}
+
+FileBytes Halves(const std::vector<std::uint16_t>& halves) { return EncodeSamples(SampleType::kUint16, {halves.begin(), halves.end()}); }
+
+// 0, the least subnormal one, 1/3 rounded, 1, -2, the largest, infinity
+const std::vector<std::uint16_t> kHalves = {0x0000, 0x0001, 0x3555, 0x3c00, 0xc000, 0x7bff, 0x7c00};
+const std::vector<double> kHalfValues = {0, 0x1p-24, 0.333251953125, 1, -2, 65504, std::numeric_limits<double>::infinity()};
+
+// --- MRC
+
+TEST_F(ReadersTest, MrcHasItsModesInBothByteOrders) {
+  const struct {
+    int mode;
+    SampleType type;
+    std::vector<double> values;
+  } modes[] = {{0, SampleType::kInt8, {-128, 0, 127}},
+               {1, SampleType::kInt16, {-32768, 5, 32767}},
+               {2, SampleType::kFloat32, {-1.5, 0.25, 1e30F}},
+               {6, SampleType::kUint16, {0, 40000, 65535}}};
+  for (const auto& [mode, type, values] : modes) {
+    for (const bool big_endian : {false, true}) {
+      const LoadedVolume loaded = Read("v.mrc", MrcHeader({.size = {3, 1, 1}, .mode = mode, .big_endian = big_endian, .extension = 80}) +
+                                                    EncodeSamples(type, values, big_endian));
+      EXPECT_EQ(ValuesOf(loaded), values) << mode;
+      EXPECT_EQ(loaded.info.file_type, ToString(type));
+      EXPECT_EQ(loaded.info.format, "MRC");
+    }
+  }
+  EXPECT_EQ(ValuesOf(Read("v.mrc", MrcHeader({.size = {7, 1, 1}, .mode = 12}) + Halves(kHalves))), kHalfValues);
+  // Bytes are signed, unless IMOD wrote them and does not say so.
+  EXPECT_EQ(ValuesOf(Read("v.mrc", MrcHeader({.size = {1, 1, 1}, .imod = 2}) + "\xff")), std::vector<double>{255});
+  EXPECT_EQ(ValuesOf(Read("v.mrc", MrcHeader({.size = {1, 1, 1}, .imod = 1}) + "\xff")), std::vector<double>{-1});
+}
+
+TEST_F(ReadersTest, MrcAxesAreThoseOfTheCell) {
+  // The same object in each order of columns, rows and sections.
+  const Index3 size = {4, 3, 2};  // along x, y and z of the cell
+  const Vec3 spacing = {0.5, 1.25, 3};
+  for (const Index3 axes : {Index3{1, 2, 3}, {1, 3, 2}, {2, 1, 3}, {2, 3, 1}, {3, 1, 2}, {3, 2, 1}}) {
+    const Index3 stored = {size[axes.x - 1], size[axes.y - 1], size[axes.z - 1]};
+    FileBytes samples;
+    for (std::size_t i = 0; i < CountIn(stored); ++i) {
+      Index3 at;
+      for (int j = 0; j < 3; ++j) at[axes[j] - 1] = PlaceIn(stored, i)[j];
+      samples += char(NumberIn(size, at));
+    }
+    const LoadedVolume loaded =
+        Read("v.mrc", MrcHeader({.size = stored, .starts = {7, -8, 9}, .axes = axes, .spacing = spacing}) + samples);
+    const VolumeGeometry& geometry = loaded.info.description.geometry;
+    EXPECT_EQ(geometry.size, size);
+    ExpectNear(geometry.spacing, spacing, 1e-6);
+    EXPECT_EQ(geometry.orientation.axes, Orientation{}.axes);
+    EXPECT_EQ(ValuesOf(loaded), Counted(24)) << axes.x << axes.y << axes.z;
+    Vec3 origin;
+    for (int j = 0; j < 3; ++j) origin[axes[j] - 1] = Index3{7, -8, 9}[j] * spacing[axes[j] - 1];
+    ExpectNear(geometry.orientation.origin, origin, 1e-5);
+  }
+  const MrcSpec with_origin{.starts = {7, -8, 9}, .origin = {10, 20, 30}};
+  ExpectNear(Read("v.mrc", MrcHeader(with_origin) + FileBytes(24, 'x')).info.description.geometry.orientation.origin, {10, 20, 30}, 1e-6);
+  // A cell whose a and b enclose 60 degrees is straightened.
+  EXPECT_TRUE(Read("v.mrc", MrcHeader({.angles = {90, 90, 60}}) + FileBytes(24, 'x')).info.straightened);
+  EXPECT_THAT(WhyNot("v.mrc", MrcHeader({.axes = {1, 2, 2}}) + FileBytes(24, 'x')), HasSubstr("MAPC, MAPR and MAPS are 1, 2 and 2"));
+}
+
+TEST_F(ReadersTest, MrcSaysWhatItIsNot) {
+  EXPECT_THAT(WhyNot("v.mrc", MrcHeader({.mode = 4}) + FileBytes(192, 'x')), HasSubstr("MRC mode 4 is not supported"));
+  FileBytes old = MrcHeader({});
+  old.replace(208, 4, 4, '\0');
+  EXPECT_THAT(WhyNot("v.map", old + FileBytes(24, 'x')), HasSubstr("'MAP '"));
+  FileBytes negative = MrcHeader({});
+  negative[95] = '\xff';
+  EXPECT_THAT(WhyNot("v.mrc", negative + FileBytes(24, 'x')), HasSubstr("extended header"));
+  EXPECT_THAT(WhyNot("v.mrc", MrcHeader({.spacing = {1, std::nan(""), 1}}) + FileBytes(24, 'x')), HasSubstr("cell: the step along y is"));
+}
+
+// --- VTK
+
+TEST_F(ReadersTest, VtkImagesAreReadFromEveryEncoding) {
+  const std::vector<double> values = Counted(24);
+  for (const SampleType type : {SampleType::kUint8, SampleType::kInt16, SampleType::kFloat64, SampleType::kUint64}) {
+    for (const bool big_endian : {false, true}) {
+      for (const bool wide : {false, true}) {
+        for (const std::size_t block : {0, 1, 7, 24, 1000}) {
+          for (const auto& [format, encoding] : {std::pair{"appended", "raw"}, {"appended", "base64"}, {"binary", ""}, {"ascii", ""}}) {
+            SCOPED_TRACE(fmt::format("{} {} {} {} {} {}", ToString(type), big_endian, wide, block, format, encoding));
+            const FileSpec spec{.type = type, .big_endian = big_endian, .spacing = {0.5, 1.25, 3}};
+            const FileBytes samples = std::string(format) == "ascii" ? AsText(values) : EncodeSamples(type, values, big_endian);
+            const LoadedVolume loaded =
+                Read("v.vti", VtiFile(spec, samples, {.format = format, .encoding = encoding, .wide_header = wide, .block = block}));
+            EXPECT_EQ(ValuesOf(loaded), values);
+            EXPECT_EQ(loaded.info.description.geometry.spacing, spec.spacing);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ReadersTest, VtkImagesLieWhereTheirDirectionSays) {
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, Counted(24));
+  // Their x runs along the world's y, their y along -x.
+  const VtiOptions turned{.direction = "0 -1 0 1 0 0 0 0 1", .extent = "10 13 20 22 -1 0", .origin = {100, 200, 300}};
+  const LoadedVolume loaded = Read("v.vti", VtiFile({.spacing = {0.5, 2, 3}}, samples, turned));
+  const auto& [size, spacing, orientation] = loaded.info.description.geometry;
+  EXPECT_EQ(size, (Index3{3, 4, 2}));
+  EXPECT_EQ(spacing, (Vec3{2, 0.5, 3}));
+  EXPECT_EQ(orientation.world, World::kScene);
+  // The first voxel is at 100 - 20 * 2, 200 + 10 * 0.5, 300 - 3, and x runs back from there.
+  ExpectNear(orientation.origin, {60 - 2 * 2, 205, 297}, 1e-12);
+  EXPECT_EQ(ValuesOf(loaded)[2], 0);
+}
+
+TEST_F(ReadersTest, VtkImagesOfSeveralArraysTakeTheActiveOne) {
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, Counted(24));
+  const auto file = [&](const std::string& attributes, int arrays) {
+    return VtiFile({}, samples, {.attributes = attributes, .arrays = arrays});
+  };
+  EXPECT_EQ(ValuesOf(Read("v.vti", file("Scalars=\"density2\"", 3))), Counted(24));
+  EXPECT_EQ(ValuesOf(Read("v.vti", file("", 1))), Counted(24));
+  EXPECT_THAT(WhyNot("v.vti", file("", 3)), HasSubstr("must have one: density, density2, density3"));
+  EXPECT_THAT(WhyNot("v.vti", file("Scalars=\"other\"", 2)), HasSubstr("several arrays"));
+}
+
+TEST_F(ReadersTest, VtkFilesSayWhatTheyAreNot) {
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, Counted(24)), good = VtiFile({}, samples);
+  const auto with = [](FileBytes file, const std::string& from, const std::string& to) {
+    for (std::size_t at = file.find(from); at != FileBytes::npos; at = file.find(from, at + to.size())) file.replace(at, from.size(), to);
+    return file;
+  };
+  const std::pair<FileBytes, const char*> images[] = {
+      {with(good, "PointData", "CellData"), "belong to cells (CellData)"},
+      {with(good, "type=\"ImageData\"", "type=\"RectilinearGrid\""), "'RectilinearGrid', must be ImageData"},
+      {with(good, "<Piece Extent=\"0 3", "<Piece Extent=\"0 2"), "its piece has the extent"},
+      {with(good, "UInt8", "String"), "type 'String'"},
+      {with(VtiFile({}, samples, {.block = 8}), "vtkZLib", "vtkLZ4"), "vtkLZ4DataCompressor is not supported"},
+      {with(good, "Spacing=\"1 1 1\"", "Spacing=\"1 nan 1\""), "Direction: the step along y is"},
+      {with(good, "Spacing=\"1 1 1\"", "Spacing=\"1 one 1\""), "Spacing of ImageData is '1 one 1'"},
+      {with(good, "<?xml version=\"1.0\"?>", "<!DOCTYPE a [<!ENTITY b \"c\">]>"), "document type definition"},
+      {"<VTKFile a=\"" + FileBytes(std::size_t{2} << 20, 'x'), "too long"},
+      {with(good, "0 3 0 2 0 1", "0 3 0 2 0 70000"), "size along z is 70001"},
+  };
+  for (const auto& [file, why] : images) EXPECT_THAT(WhyNot("v.vti", file), HasSubstr(why));
+
+  const FileBytes legacy = VtkFile({}, samples, true);
+  const std::pair<FileBytes, const char*> files[] = {
+      {with(legacy, "STRUCTURED_POINTS", "POLYDATA"), "type POLYDATA, must be STRUCTURED_POINTS"},
+      {with(legacy, "POINT_DATA", "CELL_DATA"), "belong to cells (CELL_DATA)"},
+      {with(legacy, "SCALARS", "TRIANGLES"), "has 'TRIANGLES', must have a VTK keyword that is supported"},
+      {with(legacy, "unsigned_char", "bit"), "type 'bit' is not supported"},
+      {with(legacy, "LOOKUP_TABLE", "LOOKUP"), "LOOKUP_TABLE is missing"},
+      {with(legacy, "POINT_DATA 24", "POINT_DATA 25"), "POINT_DATA has 25 points, DIMENSIONS 24"},
+      {with(legacy, "BINARY", "BINARI"), "must be ASCII or BINARY"},
+      {with(legacy, "DIMENSIONS 4", "DIMENSIONS 4.5"), "size along x is 4.5"},
+      {with(legacy, "SPACING 1", "SPACING 0"), "SPACING: the step along x is (0, 0, 0)"},
+  };
+  for (const auto& [file, why] : files) EXPECT_THAT(WhyNot("v.vtk", file), HasSubstr(why));
+}
+
+TEST_F(ReadersTest, LegacyVtkIsReadAsTextAndAsBinary) {
+  const std::vector<double> values = Counted(24);
+  for (const SampleType type : {SampleType::kInt8, SampleType::kUint16, SampleType::kInt32, SampleType::kFloat32, SampleType::kFloat64}) {
+    const FileSpec spec{.type = type, .spacing = {0.5, 1.25, 3}};
+    const LoadedVolume binary = Read("v.vtk", VtkFile(spec, EncodeSamples(type, values, true), true)),
+                       text = Read("v.vtk", VtkFile(spec, AsText(values), false, " 1"));
+    for (const LoadedVolume* loaded : {&binary, &text}) {
+      EXPECT_EQ(ValuesOf(*loaded), values);
+      EXPECT_EQ(loaded->info.file_type, ToString(type));
+      EXPECT_EQ(loaded->info.description.geometry.spacing, spec.spacing);
+      EXPECT_EQ(loaded->info.description.geometry.orientation.origin, (Vec3{1, 2, 3}));
+    }
+  }
+}
+
+TEST_F(ReadersTest, LegacyVtkFieldsAreReadAndPassedBy) {
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, Counted(24));
+  const std::string start = "# vtk DataFile Version 5.1\nt\nBINARY\nDATASET STRUCTURED_POINTS\nFIELD FieldData 1\nTIME 1 1 double\n" +
+                            FileBytes(8, 'x') + "\nMETADATA\nINFORMATION 0\n\nDIMENSIONS 4 3 2\nSPACING 1 1 1\nORIGIN 0 0 0\n";
+  const std::string one = "POINT_DATA 24\nFIELD FieldData 1\nrho 1 24 unsigned_char\n" + samples + "\n";
+  const std::string two =
+      "POINT_DATA 24\nFIELD FieldData 2\nrho 1 24 unsigned_char\n" + samples + "\nT 1 24 unsigned_char\n" + samples + "\n";
+  EXPECT_EQ(ValuesOf(Read("v.vtk", start + one)), Counted(24));
+  EXPECT_THAT(WhyNot("v.vtk", start + two), HasSubstr("must have one: rho, T"));
+  const std::string cells = "CELL_DATA 6\nSCALARS c unsigned_char\nLOOKUP_TABLE default\n" + FileBytes(6, 'x') + "\n";
+  EXPECT_EQ(ValuesOf(Read("v.vtk", start + cells + one)), Counted(24));
+  EXPECT_THAT(WhyNot("v.vtk", start + cells), HasSubstr("CELL_DATA"));
+}
+
+// --- NumPy
+
+TEST_F(ReadersTest, NumPyIndicesAreZThenYThenX) {
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, Counted(24));
+  const LoadedVolume c_order = Read("v.npy", NpyHeader("|u1", "(2, 3, 4)") + samples);
+  EXPECT_EQ(c_order.info.description.geometry.size, (Index3{4, 3, 2}));
+  EXPECT_EQ(ValuesOf(c_order), Counted(24));
+  // The same array a[z, y, x] with z fastest in memory.
+  FileBytes fortran;
+  for (int x = 0; x < 4; ++x) {
+    for (int y = 0; y < 3; ++y) {
+      for (int z = 0; z < 2; ++z) fortran += char(NumberIn({4, 3, 2}, {x, y, z}));
+    }
+  }
+  const LoadedVolume loaded = Read("v.npy", NpyHeader("|u1", "(2, 3, 4)", true) + fortran, {.spacing = Vec3{0.5, 1.25, 3}});
+  EXPECT_EQ(loaded.info.description.geometry.size, (Index3{4, 3, 2}));
+  EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.5, 1.25, 3}));
+  EXPECT_EQ(ValuesOf(loaded), Counted(24));
+}
+
+TEST_F(ReadersTest, NumPyHasEveryTypeAndVersion) {
+  for (int type = 0; type <= int(SampleType::kFloat64); ++type) {
+    for (const bool big_endian : {false, true}) {
+      const FileSpec spec{.type = SampleType(type), .big_endian = big_endian};
+      EXPECT_EQ(ValuesOf(Read("v.npy", NpyHeader(spec) + EncodeSamples(spec.type, Counted(24), big_endian))), Counted(24));
+    }
+  }
+  for (const int version : {1, 2, 3}) {
+    EXPECT_EQ(ValuesOf(Read("v.npy", NpyHeader("|b1", "(1, 1, 3)", false, version) + FileBytes("\0\1\1", 3))),
+              (std::vector<double>{0, 1, 1}));
+  }
+  EXPECT_EQ(ValuesOf(Read("v.npy", NpyHeader("<f2", "(1, 1, 7)") + Halves(kHalves))), kHalfValues);
+  EXPECT_EQ(ValuesOf(Read("v.npy", NpyHeader("|u1", "(2L, 1L, 1L)") + "ab")), (std::vector<double>{'a', 'b'}));
+}
+
+TEST_F(ReadersTest, NumPySaysWhatItIsNot) {
+  const std::pair<FileBytes, const char*> files[] = {
+      {NpyHeader("|u1", "(4, 6)"), "has 2 dimensions"},
+      {NpyHeader("|u1", "(24,)"), "has 1 dimensions"},
+      {NpyHeader("|u1", "()"), "has 0 dimensions"},
+      {NpyHeader("|u1", "(2, 3, -4)"), "size along x is -4"},
+      {NpyHeader("|u1", "(2, 3, four)"), "its shape is missing"},
+      {NpyHeader("<c8", "(2, 3, 4)"), "dtype '<c8' is not supported"},
+      {NpyHeader("|u1", "(2, 3, 4)", false, 4), "version 4 is not supported"},
+      {NpyHeader("|u1", "(5, 2, 3, 4)") + FileBytes(96, 'x'), "holds 5 volumes, of which --time takes one: 0 to 4"},
+      {"not an array at all", "does not begin with \\x93NUMPY"},
+  };
+  for (const auto& [header, why] : files) EXPECT_THAT(WhyNot("v.npy", header + FileBytes(24, 'x')), HasSubstr(why));
+}
+
+// --- raw samples
+
+TEST_F(ReadersTest, RawSamplesAreWhatTheOptionsSay) {
+  const std::vector<double> values = {-5, 1000, 3, -32768, 7, 8};
+  const FileBytes file = "12345" + EncodeSamples(SampleType::kInt16, values, true);
+  ReadOptions options{.spacing = Vec3{0.5, 1.25, 3}, .dims = Index3{3, 2, 1}, .type = SampleType::kInt16, .big_endian = true, .offset = 5};
+  for (const char* name : {"v.raw", "v.dat", "without_ending"}) {
+    const LoadedVolume loaded = Read(name, file, options);
+    EXPECT_EQ(ValuesOf(loaded), values);
+    EXPECT_EQ(loaded.info.description.geometry.size, (Index3{3, 2, 1}));
+    EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.5, 1.25, 3}));
+    EXPECT_EQ(loaded.info.format, "raw");
+  }
+  options.offset = 6;
+  EXPECT_EQ(ReadVolume(directory_ / "v.raw", options).status().code(), StatusCode::kDataLoss);
+  options.type.reset();
+  EXPECT_THAT(WhyNotPath(directory_ / "v.raw", options), HasSubstr("raw files need --type TYPE, or in --data"));
+  EXPECT_THAT(WhyNotPath(directory_ / "v.raw"), HasSubstr("v.raw?dims=X,Y,Z,type=TYPE"));
+  EXPECT_FALSE(LooksLikeVolume(directory_ / "v.raw")) << "the samples of a .mhd are no volume of their own";
+}
+
+// --- several volumes, several components
+
+TEST_F(ReadersTest, OneOfSeveralVolumesIsTaken) {
+  std::vector<double> values = Counted(96);
+  const FileBytes samples = EncodeSamples(SampleType::kUint8, values);
+  const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 5 3 2 3\nkinds: domain domain domain list\n";
+  const struct {
+    const char* file;
+    FileBytes bytes;
+    int volumes;
+    std::size_t voxels;
+  } files[] = {
+      {"v.nii", NiftiHeader({.dimensions = {4, 3, 2, 4}}) + samples, 4, 24},
+      {"v.nii.gz", Gzip(NiftiHeader({.dimensions = {4, 3, 2, 4}}) + samples), 4, 24},
+      {"v.nrrd", nrrd + "encoding: raw\n\n" + samples, 3, 30},
+      {"v.nrrd", nrrd + "encoding: gzip\n\n" + Gzip(samples), 3, 30},
+      {"v.mha", "NDims = 4\nDimSize = 4 3 2 4\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + samples, 4, 24},
+      {"v.mrc", MrcHeader({.volumes = 4}) + samples, 4, 24},
+      {"v.npy", NpyHeader("|u1", "(4, 2, 3, 4)") + samples, 4, 24},
+  };
+  for (const auto& [file, bytes, volumes, voxels] : files) {
+    SCOPED_TRACE(file);
+    for (int time = 0; time < volumes; ++time) {
+      const LoadedVolume loaded = Read(file, bytes, {.time = TimeRange{time, time}});
+      EXPECT_EQ(ValuesOf(loaded),
+                std::vector<double>(values.begin() + time * std::ptrdiff_t(voxels), values.begin() + (time + 1) * std::ptrdiff_t(voxels)));
+    }
+    EXPECT_THAT(WhyNot(file, bytes), HasSubstr(fmt::format("holds {} volumes, of which --time takes one: 0 to {}", volumes, volumes - 1)));
+    EXPECT_THAT(WhyNot(file, bytes, {.time = TimeRange{volumes, volumes}}),
+                HasSubstr(fmt::format("time is {}, must be in [0, {}]", volumes, volumes - 1)));
+  }
+  EXPECT_EQ(ValuesOf(Read("v.nii", NiftiHeader({}) + FileBytes(24, 'x'), {.time = TimeRange{0, 0}})).size(), 24U);
+  // What is there of the last volume is not enough.
+  WriteFile(directory_ / "cut.nii", NiftiHeader({.dimensions = {4, 3, 2, 4}}) + samples.substr(0, 95));
+  EXPECT_EQ(ReadVolume(directory_ / "cut.nii", {.time = TimeRange{3, 3}}).status().code(), StatusCode::kDataLoss);
+  EXPECT_TRUE(ReadVolume(directory_ / "cut.nii", {.time = TimeRange{2, 2}}).ok());
+}
+
+TEST_F(ReadersTest, OneOfSeveralComponentsIsTaken) {
+  // Red is the voxel's number, green 100 more, blue 0.
+  FileBytes samples;
+  for (int i = 0; i < 24; ++i) samples += {char(i), char(i + 100), 0};
+  FileBytes nifti = NiftiHeader({});
+  nifti[70] = char(128);
+  const std::string nrrd = "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 4 3 2\nspacings: nan 1 1 1\n";
+  FileSpec tiff;
+  const std::pair<const char*, FileBytes> files[] = {
+      {"v.nii", nifti + samples},
+      {"v.nrrd", nrrd + "kinds: RGB-color domain domain domain\nencoding: raw\n\n" + samples},
+      {"v.nrrd", nrrd + "encoding: raw\n\n" + samples},
+      {"v.nrrd",
+       nrrd + "space: RAS\nspace directions: none (1,0,0) (0,1,0) (0,0,1)\nkinds: vector space space space\nencoding: raw\n\n" + samples},
+      {"v.mha", "NDims = 3\nDimSize = 4 3 2\nElementNumberOfChannels = 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + samples},
+      {"v.vtk", VtkFile({}, samples, true, " 3")},
+      {"v.vti", VtiFile({}, samples, {.components = 3})},
+  };
+  std::vector<double> luminance, green;
+  for (int i = 0; i < 24; ++i) {
+    luminance.push_back(std::nearbyint(0.2126 * i + 0.7152 * (i + 100)));
+    green.push_back(i + 100);
+  }
+  for (const auto& [file, bytes] : files) {
+    SCOPED_TRACE(file);
+    EXPECT_THAT(WhyNot(file, bytes), HasSubstr("has 3 components a voxel, of which --channel takes one: 0 to 2, or luminance"));
+    EXPECT_EQ(ValuesOf(Read(file, bytes, {.channel = 0})), Counted(24));
+    EXPECT_EQ(ValuesOf(Read(file, bytes, {.channel = 1})), green);
+    EXPECT_EQ(ValuesOf(Read(file, bytes, {.channel = kLuminance})), luminance);
+    EXPECT_THAT(WhyNot(file, bytes, {.channel = 3}), HasSubstr("channel must be 0 to 2"));
+  }
+  EXPECT_THAT(WhyNot("v.nii", NiftiHeader({}) + FileBytes(24, 'x'), {.channel = 1}), HasSubstr("has 1 component a voxel"));
+  EXPECT_THAT(WhyNot("v.mha",
+                     "NDims = 3\nDimSize = 4 3 2\nElementNumberOfChannels = 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
+                         FileBytes(48, 'x'),
+                     {.channel = kLuminance}),
+              HasSubstr("channel must be 0 to 1"));
+}
+
+TEST_F(ReadersTest, LabelsAreTold) {
+  FileBytes labels = NiftiHeader({});
+  labels[68] = char(0xea);
+  labels[69] = 3;  // 1002
+  EXPECT_TRUE(Read("v.nii", labels + FileBytes(24, 'x')).info.labels);
+  EXPECT_FALSE(Read("v.nii", NiftiHeader({}) + FileBytes(24, 'x')).info.labels);
+  FileBytes segmentation = NrrdHeader({}, "raw");
+  segmentation.insert(segmentation.size() - 1, "Segment0_ID:=liver\n");
+  EXPECT_TRUE(Read("v.seg.nrrd", segmentation + FileBytes(24, 'x')).info.labels);
+}
+
+TEST_F(ReadersTest, OptionsThatAFormatDoesNotTakeAreNamed) {
+  const FileBytes file = NiftiHeader({}) + FileBytes(24, 'x');
+  EXPECT_THAT(WhyNot("v.nii", file, {.spacing = Vec3{1, 1, 1}}), HasSubstr("spacing is no option of NIfTI, which takes time, channel"));
+  EXPECT_THAT(WhyNot("v.nii", file, {.dims = Index3{1, 1, 1}}), HasSubstr("dims is no option of NIfTI"));
+  EXPECT_THAT(WhyNot("v.tif", file, {.offset = 3}), HasSubstr("offset is no option of TIFF"));
+}
+
+// --- pictures
+
+TEST_F(ReadersTest, FoldersOfPicturesAreVolumes) {
+  const auto slice = [](int z) {
+    FileBytes bytes;
+    for (int i = 0; i < 12; ++i) bytes += char(z * 12 + i);
+    return bytes;
+  };
+  for (const int z : {0, 1, 2}) WritePng(directory_ / fmt::format("s{}.png", z * 5), {4, 3, 1}, 8, 0, slice(z), z == 1);
+  EXPECT_TRUE(LooksLikeVolume(directory_.path()));
+  const LoadedVolume loaded = ReadPath(directory_.path(), {.spacing = Vec3{0.5, 0.5, 2}});
+  EXPECT_EQ(loaded.info.format, "PNG");
+  EXPECT_EQ(loaded.info.description.geometry.size, (Index3{4, 3, 3}));
+  EXPECT_EQ(loaded.info.description.geometry.spacing, (Vec3{0.5, 0.5, 2}));
+  EXPECT_EQ(ValuesOf(loaded), Counted(36));
+  WritePng(directory_ / "s7.png", {4, 3, 1}, 16, 0, slice(0) + slice(1));
+  EXPECT_THAT(ReadVolume(directory_.path()).status().message(), testing::AllOf(HasSubstr("s7.png is 4 x 3 uint16, must be 4 x 3 uint8")));
+  // One picture is none, nor are pictures of several names, nor those beside a volume.
+  std::filesystem::remove(directory_ / "s7.png");
+  WritePng(directory_ / "t8.png", {4, 3, 1}, 8, 0, slice(0));
+  EXPECT_FALSE(LooksLikeVolume(directory_.path()));
+  std::filesystem::remove(directory_ / "t8.png");
+  EXPECT_TRUE(LooksLikeVolume(directory_.path()));
+  WriteFile(directory_ / "v.nii", NiftiHeader({}) + FileBytes(24, 'x'));
+  EXPECT_FALSE(LooksLikeVolume(directory_.path()));
+}
+
+TEST_F(ReadersTest, PicturesOfEveryKindHaveTheirSamples) {
+  const auto both = [&](int bits, int kind, const FileBytes& samples, const ReadOptions& options) {
+    for (const int z : {1, 2}) WritePng(directory_ / fmt::format("{}.png", z), {2, 2, 1}, bits, kind, samples);
+    const std::vector<double> values = ValuesOf(ReadPath(directory_.path(), options));
+    return std::vector<double>(values.begin(), values.begin() + 4);
+  };
+  using Values = std::vector<double>;
+  EXPECT_EQ(both(8, 0, {1, 2, 3, char(255)}, {}), (Values{1, 2, 3, 255}));
+  EXPECT_EQ(both(2, 0, {0, 1, 2, 3}, {}), (Values{0, 1, 2, 3}));
+  EXPECT_EQ(both(16, 0, EncodeSamples(SampleType::kUint16, {1, 2, 300, 65535}), {}), (Values{1, 2, 300, 65535}));
+  EXPECT_EQ(both(8, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}, {.channel = 1}), (Values{2, 5, 8, 11}));
+  EXPECT_EQ(both(8, 3, {0, 1, 1, 0}, {.channel = 2}), (Values{30, 220, 220, 30}));
+  EXPECT_EQ(both(8, 4, {1, 2, 3, 4, 5, 6, 7, 8}, {.channel = 0}), (Values{1, 3, 5, 7}));
+  EXPECT_EQ(both(8, 6, FileBytes(16, 'x'), {.channel = 3}), (Values(4, 'x')));
+  EXPECT_THAT(WhyNotPath(directory_.path()), HasSubstr("has 4 components a voxel, of which --channel takes one: 0 to 3, or luminance"));
+}
+
+TEST_F(ReadersTest, FoldersOfJpegAreVolumes) {
+  for (const bool progressive : {false, true}) {
+    FileBytes samples;
+    for (int i = 0; i < 16 * 16; ++i) samples += char(100 + i % 16 + i / 16);
+    for (const int z : {1, 2}) WriteJpeg(directory_ / fmt::format("{}.jpg", z), {16, 16, 1}, 1, samples, progressive);
+    const LoadedVolume loaded = ReadPath(directory_.path());
+    EXPECT_EQ(loaded.info.format, "JPEG");
+    const std::vector<double> values = ValuesOf(loaded);
+    for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(values[i], 100 + double(i % 16) + double(i % 256 / 16), 2);
+    for (const int z : {1, 2}) WriteJpeg(directory_ / fmt::format("{}.jpg", z), {16, 16, 1}, 3, samples + samples + samples, progressive);
+    EXPECT_THAT(WhyNotPath(directory_.path()), HasSubstr("has 3 components a voxel"));
+  }
+}
+
+TEST_F(ReadersTest, PicturesThatAreCutOffOrDamagedFail) {
+  Random random(31);
+  SCOPED_TRACE(random.trace());
+  FileBytes samples;
+  for (int i = 0; i < 32 * 32; ++i) samples += char(random.Integer(0, 255));
+  WritePng(directory_ / "1.png", {32, 32, 1}, 8, 0, samples);
+  std::filesystem::create_directory(directory_ / "jpeg");
+  for (const bool progressive : {false, true}) {
+    WriteJpeg(directory_ / "jpeg/1.jpg", {32, 32, 1}, 1, samples, progressive);
+    for (const auto& [folder, first, second] : {std::tuple{directory_.path(), directory_ / "1.png", directory_ / "2.png"},
+                                                {directory_ / "jpeg", directory_ / "jpeg/1.jpg", directory_ / "jpeg/2.jpg"}}) {
+      const FileBytes good = ReadFile(first);
+      WriteFile(second, good);
+      ASSERT_TRUE(ReadVolume(folder).ok());
+      for (std::size_t length = 0; length + 2 < good.size(); length += 1 + length / 16) {
+        WriteFile(second, good.substr(0, length));
+        const Result<LoadedVolume> loaded = ReadVolume(folder);
+        ASSERT_FALSE(loaded.ok()) << second << " cut to " << length << " of " << good.size();
+        EXPECT_THAT(loaded.status().message(), testing::AllOf(HasSubstr(second), testing::Not(HasSubstr("\n"))));
+      }
+      for (int i = 0; i < 200; ++i) {
+        FileBytes bytes = good;
+        bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] ^= char(1 << random.Integer(0, 7));
+        WriteFile(second, bytes);
+        const Result<LoadedVolume> loaded = ReadVolume(folder);
+        if (!loaded.ok()) {
+          EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
+        }
+      }
+    }
+  }
+}
+
+// --- OME-TIFF
+
+std::string Ome(const std::string& pixels, const std::string& channels = "") {
+  return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><Image ID=\"Image:0\">"
+         "<Pixels ID=\"Pixels:0\" Type=\"uint8\" SizeX=\"4\" SizeY=\"3\" " +
+         pixels + ">" + channels + "<TiffData/></Pixels></Image></OME>";
+}
+
+class OmeTest : public ReadersTest {
+ protected:
+  // A page for each of `pages`, filled with its number.
+  std::string Write(const std::string& description, int pages) {
+    FileBytes samples;
+    for (int page = 0; page < pages; ++page) samples += FileBytes(12, char(page));
+    WriteTiff(directory_ / "v.ome.tif", {.size = {4, 3, pages}}, samples, {.description = description});
+    return directory_ / "v.ome.tif";
+  }
+  // The first voxel of each slice.
+  std::vector<double> Slices(const std::string& path, const ReadOptions& options) {
+    const std::vector<double> values = ValuesOf(ReadPath(path, options));
+    std::vector<double> slices;
+    for (std::size_t i = 0; i < values.size(); i += 12) slices.push_back(values[i]);
+    return slices;
+  }
+};
+
+TEST_F(OmeTest, PhysicalSizesAreMicrometres) {
+  const auto spacing = [&](const std::string& sizes) {
+    return ReadPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" " + sizes), 2))
+        .info.description.geometry.spacing;
+  };
+  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\""), (Vec3{0.25, 0.5, 2}));
+  ExpectNear(
+      spacing(
+          "PhysicalSizeX=\"250\" PhysicalSizeXUnit=\"nm\" PhysicalSizeY=\"0.5\" PhysicalSizeYUnit=\"\xc2\xb5m\" PhysicalSizeZ=\"0.002\" "
+          "PhysicalSizeZUnit=\"mm\""),
+      {0.25, 0.5, 2}, 1e-12);
+  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\""), (Vec3{1, 1, 1})) << "not all are known";
+  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\" PhysicalSizeZUnit=\"pixel\""), (Vec3{1, 1, 1}));
+}
+
+TEST_F(OmeTest, OneChannelAndTimeIsTaken) {
+  const std::string sizes = "SizeZ=\"2\" SizeC=\"3\" SizeT=\"2\" DimensionOrder=",
+                    channels = "<Channel Name=\"DAPI\"/><Channel Name=\"GFP\"/>";
+  using Values = std::vector<double>;
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZCT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{10, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYCZT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{8, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYTCZ\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{5, 11}));
+  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZTC\""), 12), {.time = TimeRange{0, 0}, .channel = 0}), (Values{0, 1}));
+  const std::string path = Write(Ome(sizes + "\"XYZCT\"", channels), 12);
+  EXPECT_THAT(WhyNotPath(path), HasSubstr("holds 2 volumes, of which --time takes one"));
+  EXPECT_THAT(WhyNotPath(path, {.time = TimeRange{0, 0}}),
+              HasSubstr("has 3 channels, of which --channel takes one: 0 to 2 (0: DAPI, 1: GFP)"));
+  EXPECT_THAT(WhyNotPath(path, {.time = TimeRange{0, 0}, .channel = 3}), HasSubstr("0 to 2"));
+}
+
+TEST_F(OmeTest, DescriptionsThatDoNotFitAreRefused) {
+  const std::string order = " DimensionOrder=\"XYZCT\"";
+  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"3\" SizeC=\"1\" SizeT=\"1\"" + order), 2)),
+              HasSubstr("speaks of 3 slices, 1 channels and 1 times, the file has 2 pages"));
+  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\"" + order), 2)), HasSubstr("SizeT is ''"));
+  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZZZ\""), 2)),
+              HasSubstr("DimensionOrder is 'XYZZZ'"));
+  EXPECT_THAT(WhyNotPath(Write("<OME><Image>", 2)), HasSubstr("its OME description"));
+  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = TimeRange{0, 0}}), HasSubstr("time is for OME-TIFF files that state several"));
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,212 @@
+// The ray caster's kernel on every instruction set against its definition, and what it leaps with.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/random.h"
+#include "tests/support/random_box.h"
+#include "tests/support/simd_targets.h"
+#include "tests/worker/renderers/render_support.h"
+#include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/march.h"
+
+namespace slabstream {
+namespace {
+
+using namespace slabstream::testing;  // NOLINT(google-build-using-namespace): test support
+
+// A box of a volume, ready to be marched through.
+struct Scene {
+  Scene(const Volume& volume, const Box& box, const FrameSetup& setup, double rate)
+      : camera(setup.camera),
+        rays(MakeViewRays(camera, volume.description.geometry, rate, setup.clip)),
+        padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
+        cells(FindCellRanges(padded)),
+        look(MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description, camera, setup.shading,
+                         rate)),
+        distances(EmptyDistances(cells, VisibleSamples(look))),
+        ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)) {}
+
+  MarchWork Work(float termination = 0) const { return {&rays, &ray_box, &look, distances.data(), termination}; }
+
+  Camera camera;
+  ViewRays rays;
+  PaddedVoxels padded;
+  CellRanges cells;
+  RayLook look;
+  std::vector<std::uint8_t> distances;
+  RayBox ray_box;
+};
+
+LocalImage Marched(const Scene& scene, float termination = 0) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, scene.camera.width, scene.camera.height});
+  MarchTile(scene.Work(termination), image.bounds, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
+  return image;
+}
+LocalImage MarchedByReference(const Scene& scene) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, scene.camera.width, scene.camera.height});
+  MarchTileReference(scene.Work(), image.bounds, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
+  return image;
+}
+
+// A random scene: view, box, transfer function, lights and rate by the number `i`.
+struct RandomScene {
+  Volume volume;
+  SetupOptions options;
+  Box box;
+  double rate = 1;
+
+  RandomScene(int i, Random& random, std::mt19937& views) {
+    const ScalarType type = ScalarType(1 + i % 3);
+    const Projection projection = i % 2 == 0 ? Projection::kOrthographic : Projection::kPerspective;
+    volume = MakeBlobs({{23, 19, 27}, {1, 0.7, 1.4}}, type, unsigned(i));
+    if (type == ScalarType::kFloat32) volume.block.samples<float>()[4000] = std::numeric_limits<float>::quiet_NaN();
+    options.view = RandomView(projection, views);
+    options.view.zoom *= i % 5 == 0 ? 4 : 1;
+    options.transfer = Ramp(random.Real(0.05, 0.9));
+    if (i % 3 == 0) options.transfer.opacities = {{90, 0, 0.5, 0}, {110, 0.7, 0.5, 0}, {130, 0, 0.5, 0}};
+    if (i % 7 == 3) options.shading.model = ShadingModel::kNone;
+    if (i % 2 == 1) options.shading.lights = {{1, 2, 3}, {-1, 0.3, -0.2}};
+    options.size = {45, 38};
+    box = i % 4 == 0 ? volume.block.box : RandomBox(random, volume.block.box);
+    if (i % 4 == 1) rate = 2.5;
+  }
+
+  Scene Make() const {
+    FrameSetup setup = MakeSetup(volume, options);
+    setup.camera = MakeCamera(options.view, options.size, volume.description.geometry);
+    return {volume, box, setup, rate};
+  }
+};
+
+TEST(MarchTile, AgreesWithTheReference) {
+  Random random(81);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(81);
+  for (int i = 0; i < 18; ++i) {
+    const RandomScene setup(i, random, views);
+    const Scene scene = setup.Make();
+    const LocalImage expected = MarchedByReference(scene);
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-5F) << "case " << i; });
+  }
+}
+
+TEST(MarchTile, AgreesWithTheReferenceOnClippedVolumes) {
+  Random random(84);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(84);
+  for (int i = 0; i < 24; ++i) {
+    RandomScene setup(i, random, views);
+    setup.options.clipping = RandomClipping(setup.volume.description.geometry, views);
+    setup.options.clipping.mode = i / 2 % 2 == 0 ? ClipMode::kKeep : ClipMode::kCutAway;
+    const Scene scene = setup.Make();
+    const LocalImage expected = MarchedByReference(scene);
+    // What a sample beside a cut stands for is a difference of large numbers in single precision.
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-4F) << "case " << i; });
+  }
+}
+
+TEST(MarchTile, AgreesWithTheReferenceOnGradientOpacity) {
+  Random random(85);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(85);
+  for (int i = 0; i < 18; ++i) {
+    RandomScene setup(i, random, views);
+    setup.options.transfer.gradient_opacities = {{2, 0.1}, {20, 0.9}, {60, 0.3}};
+    if (i % 5 == 1) setup.options.transfer.opacity_distance = 2.5;
+    const Scene scene = setup.Make();
+    const LocalImage expected = MarchedByReference(scene);
+    // A rounding may move a gradient to the next of 4096 entries.
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 5e-4F) << "case " << i; });
+  }
+}
+
+// How many pixels of two images differ by more than `tolerance`, and how many of the first one show something.
+std::pair<int, int> DifferentPixels(const LocalImage& a, const LocalImage& b, float tolerance) {
+  std::pair<int, int> count = {0, 0};
+  for (int y = a.bounds.y_begin; y < a.bounds.y_end; ++y) {
+    for (int x = a.bounds.x_begin; x < a.bounds.x_end; ++x) {
+      const auto p = PixelOf(a, x, y), q = PixelOf(b, x, y);
+      bool differs = false;
+      for (std::size_t c = 0; c < 4; ++c) differs = differs || !(std::abs(p[c] - q[c]) <= tolerance);
+      count.first += differs ? 1 : 0;
+      count.second += p[3] > 0 ? 1 : 0;
+    }
+  }
+  return count;
+}
+
+TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
+  Random random(86);
+  int all_seen = 0;
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(86);
+  for (int i = 0; i < 36; ++i) {
+    RandomScene setup(i, random, views);
+    const double a = random.Real(1, 100), b = random.Real(101, 199);
+    setup.options.transfer.isosurfaces = {{a, {1, 0.5F, 0.2F}, i % 3 == 0 ? 1 : 0.3}, {b, {0.2F, 0.5F, 1}, 0.5}};
+    if (i % 2 == 0) setup.options.transfer.opacities = {{0, 0}};  // surfaces alone
+    if (i % 6 == 5) setup.rate = 0.1;
+    if (i % 4 == 3) {
+      setup.options.clipping = RandomClipping(setup.volume.description.geometry, views);
+      setup.options.clipping.mode = i % 8 == 3 ? ClipMode::kKeep : ClipMode::kCutAway;
+    }
+    const Scene scene = setup.Make();
+    const LocalImage expected = MarchedByReference(scene);
+    ForEachTarget([&] {
+      const auto [differ, seen] = DifferentPixels(expected, Marched(scene), 1e-3F);
+      EXPECT_LE(differ, seen / 200) << "case " << i << ": rays that touch a surface may miss it";
+      all_seen += seen;
+    });
+  }
+  EXPECT_GT(all_seen, 20000);
+}
+
+// Empty space that is leapt over, and rays that end early, do not show.
+TEST(MarchTile, EarlyTerminationChangesNoMoreThanItsThreshold) {
+  std::mt19937 views(82);
+  const Volume volume = MakeBlobs({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, 7);
+  for (Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    SetupOptions options;
+    options.view = RandomView(projection, views);
+    options.transfer = Ramp(0.8);
+    const Scene scene(volume, volume.block.box, MakeSetup(volume, options), 1);
+    EXPECT_LE(LargestDifference(Marched(scene, 0.01F), Marched(scene)), 0.01F + 1e-5F);
+    EXPECT_GT(LargestDifference(Marched(scene, 0.1F), Marched(scene)), 0);
+  }
+}
+
+TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCell) {
+  Random random(83);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 6; ++i) {
+    const Volume volume = MakeVolume({{37, 30, 41}, {1, 1, 1}}, ScalarType::kUint8,
+                                     [&](const Index3&) { return random.Integer(0, 400 * (1 + i)) == 0 ? 100 : 0; });
+    SetupOptions options;
+    const FrameSetup setup = MakeSetup(volume, options);
+    const Scene scene(volume, volume.block.box, setup, 1);
+    const Index3& n = scene.cells.counts;
+    std::vector<Index3> visible;
+    for (Index3 c; c.z < n.z; ++c.z) {
+      for (c.y = 0; c.y < n.y; ++c.y) {
+        for (c.x = 0; c.x < n.x; ++c.x) {
+          if (scene.cells.ranges[NumberIn(n, c)].max > 0) visible.push_back(c);
+        }
+      }
+    }
+    for (Index3 c; c.z < n.z; ++c.z) {
+      for (c.y = 0; c.y < n.y; ++c.y) {
+        for (c.x = 0; c.x < n.x; ++c.x) {
+          int nearest = 255;
+          for (const Index3& v : visible)
+            nearest = std::min(nearest, std::max({std::abs(v.x - c.x), std::abs(v.y - c.y), std::abs(v.z - c.z)}));
+          ASSERT_EQ(int(scene.distances[NumberIn(n, c)]), nearest) << c.x << "," << c.y << "," << c.z;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

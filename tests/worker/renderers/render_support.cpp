@@ -1,0 +1,237 @@
+#include "tests/worker/renderers/render_support.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <type_traits>
+
+#include "common/base/check.h"
+#include "common/decomposition/decomposition.h"
+#include "common/kernels/combine.h"
+#include "common/mesh/mesh_part.h"
+#include "tests/common/mesh/mesh_samples.h"
+#include "tests/support/renderers.h"
+
+namespace slabstream::testing {
+
+Volume MakeVolume(const VolumeGeometry& geometry, ScalarType type, const std::function<double(const Index3&)>& value) {
+  Volume volume{{geometry, type, {}}, MakeVoxelBlock(geometry.bounds(), type)};
+  VisitScalarType(type, [&](auto* tag) {
+    auto* samples = volume.block.samples<std::remove_cvref_t<decltype(*tag)>>();
+    for (Index3 v; v.z < geometry.size.z; ++v.z) {
+      for (v.y = 0; v.y < geometry.size.y; ++v.y) {
+        for (v.x = 0; v.x < geometry.size.x; ++v.x) samples[volume.block.Offset(v)] = std::remove_cvref_t<decltype(*tag)>(value(v));
+      }
+    }
+  });
+  return volume;
+}
+
+Volume MakeBlobs(const VolumeGeometry& geometry, ScalarType type, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  struct Wave {
+    Vec3 k;
+    double phase;
+  };
+  std::vector<Wave> waves;
+  for (int i = 0; i < 5; ++i) waves.push_back({{uniform(random), uniform(random), uniform(random)}, 6 * uniform(random)});
+  return MakeVolume(geometry, type, [&](const Index3& v) {
+    double sum = 0;
+    for (const Wave& wave : waves) sum += std::sin(Dot(wave.k, ToVec3(v)) + wave.phase);
+    return std::clamp(100 * sum, 0.0, 200.0);
+  });
+}
+
+Volume MakeBlock(const VolumeGeometry& geometry) {
+  return MakeVolume(geometry, ScalarType::kUint8, [](const Index3&) { return 100; });
+}
+
+TransferFunction Ramp(double opacity) {
+  TransferFunction transfer;
+  transfer.colors = {{0, {0.9F, 0.2F, 0.1F}}, {100, {0.3F, 0.8F, 0.2F}}, {200, {0.2F, 0.4F, 1.0F}}};
+  transfer.opacities = {{0, 0, 0.5, 0}, {200, opacity, 0.5, 0}};
+  return transfer;
+}
+
+TransferFunction Uniform(double opacity, Rgb color) {
+  TransferFunction transfer;
+  transfer.colors = {{0, color}};
+  transfer.opacities = {{0, 0, 0.5, 0}, {1, opacity, 0.5, 0}};
+  return transfer;
+}
+
+FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
+  FrameSetup setup;
+  setup.description = volume.description;
+  setup.range = Summarize(volume).range;
+  SetRenderer(*options.renderer, setup);
+  SetView(options.view, options.size, setup);
+  setup.clip = MakeClipRegion(options.clipping, volume.description.geometry).value();
+  setup.transfer = options.transfer;
+  setup.shading = options.shading;
+  setup.termination = options.termination;
+  return setup;
+}
+
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel) {
+  options.renderer = FindRenderer("raycast");
+  FrameSetup setup = MakeSetup(volume, options);
+  setup.parameters = {samples_per_voxel};
+  return setup;
+}
+
+double LengthInside(const FrameSetup& setup, int x, int y) {
+  const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
+  double enter = -1e300, leave = 1e300;
+  for (const Axis axis : kAxes) {
+    const double low = (-0.5 - ray.origin[axis]) / ray.direction[axis];
+    const double high = (setup.description.geometry.size[axis] - 0.5 - ray.origin[axis]) / ray.direction[axis];
+    enter = std::max(enter, std::min(low, high));
+    leave = std::min(leave, std::max(low, high));
+  }
+  return std::max(leave - enter, 0.0) * Length(setup.camera.spacing * ray.direction);
+}
+
+ViewParameters RandomView(Projection projection, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ViewParameters view;
+  view.projection = projection;
+  view.azimuth_degrees = 360 * uniform(random);
+  view.elevation_degrees = std::asin(2 * uniform(random) - 1) * 57.29577951308232;
+  view.roll_degrees = 360 * uniform(random);
+  view.zoom = 0.5 + uniform(random);
+  view.fov_degrees = 10 + 50 * uniform(random);
+  return view;
+}
+
+Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
+  Clipping clipping;
+  for (int planes = 1 + int(random() % 3); planes > 0; --planes) {
+    const Vec3 normal = {uniform(random), uniform(random), uniform(random)};
+    const Vec3 through = extent * Vec3{0.5 + 0.3 * uniform(random), 0.5 + 0.3 * uniform(random), 0.5 + 0.3 * uniform(random)};
+    clipping.planes.push_back({normal, -Dot(normal, through)});
+  }
+  if (random() % 2 == 0) {
+    clipping.box = ClipBox{{20 + 15 * uniform(random), -1e9, 10}, {80 + 15 * uniform(random), 70, 1e9}, ClipUnit::kPercent};
+  }
+  return clipping;
+}
+
+std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
+
+Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.draws_cells() ? AsGrid(volume) : std::move(volume); }
+
+std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
+  const Box slab_box = Grown(box, halo, volume.block.box);
+  SlabLayers layers;
+  if (kind.draws_cells() && volume.cells != nullptr) layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(slab_box));
+  return std::make_unique<SlabData>(CutBlock(volume.block, slab_box), std::move(layers));
+}
+
+namespace {
+
+LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
+  const auto slab = SlabFor(*setup.renderer, volume, box, setup.halo);
+  RankReport report;
+  return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value();
+}
+
+}  // namespace
+
+LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
+  return RenderBox(volume, setup, volume.description.geometry.bounds());
+}
+
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition) {
+  LocalImage frame = MakeLocalImage(setup.format, {});
+  for (BoxId id : VisibilityOrder(partition, setup.camera)) {
+    Combine(frame, RenderBox(volume, setup, partition.boxes()[id]), Side::kBack);
+  }
+  return frame;
+}
+
+LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup) { return FinishPicture(RenderWhole(volume, setup), setup); }
+
+Partition CutIntoSlabs(const Volume& volume, int boxes, Axis axis) {
+  const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
+  return MakeSlabs({.work = &voxels, .boxes = boxes, .axis = axis});
+}
+
+Partition CutAtRandom(const Box& bounds, int boxes, std::mt19937& random) {
+  std::vector<Partition::Node> nodes(1);
+  std::vector<Box> extents = {bounds};
+  std::vector<std::uint32_t> leaves = {0};
+  for (int tries = 0; int(leaves.size()) < boxes; ++tries) {
+    CHECK_LT(tries, 1000) << "no room for so many boxes";
+    const std::size_t at = std::uniform_int_distribution<std::size_t>(0, leaves.size() - 1)(random);
+    const std::uint32_t node = leaves[at];
+    const Axis axis = kAxes[std::uniform_int_distribution<std::size_t>(0, 2)(random)];
+    const Box extent = extents[node];
+    if (extent.size()[axis] < 2) continue;
+    const auto position = std::uniform_int_distribution<std::int32_t>(extent.begin[axis] + 1, extent.end[axis] - 1)(random);
+    Box lower = extent, upper = extent;
+    lower.end[axis] = upper.begin[axis] = position;
+    nodes[node] = {false, axis, position, std::uint32_t(nodes.size()), std::uint32_t(nodes.size() + 1), 0};
+    leaves[at] = std::uint32_t(nodes.size());
+    leaves.push_back(std::uint32_t(nodes.size() + 1));
+    nodes.resize(nodes.size() + 2);
+    extents.push_back(lower);
+    extents.push_back(upper);
+  }
+  BoxId id = 0;
+  for (Partition::Node& node : nodes) {
+    if (node.leaf) node.box = id++;
+  }
+  return {bounds, std::move(nodes)};
+}
+
+std::array<float, 4> PixelOf(const LocalImage& image, int x, int y) {
+  const PixelBounds& b = image.bounds;
+  if (x < b.x_begin || x >= b.x_end || y < b.y_begin || y >= b.y_end) return {};
+  const float* pixel = &image.rgba[4 * (std::size_t(y - b.y_begin) * std::size_t(b.width()) + std::size_t(x - b.x_begin))];
+  return {pixel[0], pixel[1], pixel[2], pixel[3]};
+}
+
+float LargestDifference(const LocalImage& a, const LocalImage& b) {
+  float largest = 0;
+  const PixelBounds bounds = Union(a.bounds, b.bounds);
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    for (int x = bounds.x_begin; x < bounds.x_end; ++x) {
+      const auto pa = PixelOf(a, x, y), pb = PixelOf(b, x, y);
+      for (std::size_t c = 0; c < 4; ++c) {
+        const float difference = std::abs(pa[c] - pb[c]);
+        if (!(difference <= largest)) largest = difference;  // keeps NaN
+      }
+    }
+  }
+  return largest;
+}
+
+void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random) {
+  const PixelBounds frame = FrameBounds(setup);
+  OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
+  std::bernoulli_distribution hidden(part);
+  for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
+  const LocalImage whole = RenderWhole(volume, setup);
+  const auto slab = SlabFor(*setup.renderer, volume, volume.block.box, 0);
+  RankReport report;
+  const LocalImage masked =
+      MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, mask, std::atomic<bool>(false), report).value();
+  for (int y = 0; y < frame.height(); ++y) {
+    for (int x = 0; x < frame.width(); ++x) {
+      if (!mask.Hides(x, y)) {
+        ASSERT_EQ(PixelOf(masked, x, y), PixelOf(whole, x, y)) << "at " << x << ' ' << y;
+      }
+    }
+  }
+  if (part == 1) {
+    EXPECT_EQ(report.drawn_voxels, 0U);
+  }
+}
+
+}  // namespace slabstream::testing
