@@ -6,7 +6,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "tests/common/mesh/vtu_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "data/volume_io/mesh_reader.h"
-#include "tests/common/mesh/vtu_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/temporary_directory.h"
 

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "tests/common/mesh/mesh_samples.h"
-#include "tests/common/mesh/vtu_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/service/multi_process_fixture.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random.h"

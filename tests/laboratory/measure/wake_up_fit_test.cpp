@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "laboratory/measure/wake_up_probe.h"
-#include "tests/simulator/model/support.h"
+#include "tests/simulator/support.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

@@ -8,8 +8,8 @@
 
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
-#include "tests/worker/renderers/reference_splatting.h"
 #include "tests/worker/renderers/render_support.h"
+#include "tests/worker/renderers/splat/reference_splatting.h"
 #include "worker/kernels/normal_code.h"
 #include "worker/renderers/splat/splat_cache.h"
 #include "worker/renderers/zbuffer/surface.h"

@@ -1,4 +1,4 @@
-#include "tests/worker/renderers/reference_shear.h"
+#include "tests/worker/renderers/shear/reference_shear.h"
 
 #include <algorithm>
 #include <array>

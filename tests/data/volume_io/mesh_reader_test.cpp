@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <limits>
 
-#include "tests/common/mesh/vtu_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "tests/support/renderers.h"
-#include "tests/worker/renderers/reference_splatting.h"
 #include "tests/worker/renderers/render_support.h"
+#include "tests/worker/renderers/splat/reference_splatting.h"
 
 namespace slabstream {
 namespace {

@@ -1,4 +1,4 @@
-#include "tests/common/mesh/vtu_files.h"
+#include "tests/data/volume_io/vtu_files.h"
 
 #include <fmt/format.h>
 

@@ -7,8 +7,8 @@
 
 #include "common/renderers/shear/shear_parameters.h"
 #include "tests/support/renderers.h"
-#include "tests/worker/renderers/reference_shear.h"
 #include "tests/worker/renderers/render_support.h"
+#include "tests/worker/renderers/shear/reference_shear.h"
 
 namespace slabstream {
 namespace {

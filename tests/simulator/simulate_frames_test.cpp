@@ -11,7 +11,7 @@
 
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/frame_window.h"
-#include "tests/simulator/model/support.h"
+#include "tests/simulator/support.h"
 #include "tests/support/random_combining.h"
 #include "tests/support/renderers.h"
 

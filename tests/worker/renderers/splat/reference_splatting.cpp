@@ -1,4 +1,4 @@
-#include "tests/worker/renderers/reference_splatting.h"
+#include "tests/worker/renderers/splat/reference_splatting.h"
 
 #include <algorithm>
 #include <array>
