@@ -62,8 +62,8 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
                                                    const CountDataset& action) {
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
-  OccupancyGrid grid = renderer.draws_cells() ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
-                                              : count(samples.view(), drawn);
+  OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
+                                                     : count(samples.view(), drawn);
   AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
   return std::make_shared<const OccupancyGrid>(std::move(grid));
 }

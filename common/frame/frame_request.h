@@ -55,8 +55,8 @@ struct TransferChoice {
   // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
   // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
   std::optional<ScalarRange> scalar_range = {};
-  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (RendererKind::isosurfaces)
-  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (RendererKind::gradient_opacity)
+  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (Ability::kIsosurfaces)
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (Ability::kGradientOpacity)
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 

@@ -67,7 +67,7 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
 }  // namespace
 
 Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary) {
-  if (!renderer.draws_cells() || !summary.cells.empty()) return Status::Ok();
+  if (!renderer.Can(Ability::kCells) || !summary.cells.empty()) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume", renderer.name(), dataset));
 }

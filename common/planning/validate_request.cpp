@@ -77,12 +77,12 @@ Status CheckCurvesAlone(const TransferChoice& overlay) {
   return Status::InvalidArgument("overlay.transfer has isosurfaces or gradient_opacities, which are of the volume alone");
 }
 
-// Refuses `option` unless the renderer has it, which is named by `has`.
-Status RequireAbility(std::string_view option, const RendererKind& renderer, bool (RendererKind::*has)() const) {
-  if ((renderer.*has)()) return Status::Ok();
+// Refuses `option` unless the renderer has the ability.
+Status RequireAbility(std::string_view option, const RendererKind& renderer, Ability ability) {
+  if (renderer.Can(ability)) return Status::Ok();
   std::string names;
   for (const RendererKind* kind : Renderers()) {
-    if ((kind->*has)()) names.append(names.empty() ? "" : ", ").append(kind->name());
+    if (kind->Can(ability)) names.append(names.empty() ? "" : ", ").append(kind->name());
   }
   return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, names));
 }
@@ -107,29 +107,28 @@ Status Validate(const FrameRequest& request) {
   if (!renderer.ok()) return renderer.status();
   const auto parameters = ParseParameters(**renderer, request.parameters);
   if (!parameters.ok()) return parameters.status();
-  if (request.shading.model == ShadingModel::kDepthGradient && (*renderer)->FormatOf(*parameters) != PixelFormat::kDepth) {
-    return Status::InvalidArgument("shading 'depth-gradient' needs a renderer with depths, such as zbuffer, not '" + request.renderer +
-                                   "'");
+  if (request.shading.model == ShadingModel::kDepthGradient) {
+    if (Status s = RequireAbility("shading 'depth-gradient'", **renderer, Ability::kDepthShading); !s.ok()) return s;
   }
   if (request.view.projection == Projection::kPerspective) {
-    if (Status s = RequireAbility("projection 'perspective'", **renderer, &RendererKind::perspective); !s.ok()) return s;
+    if (Status s = RequireAbility("projection 'perspective'", **renderer, Ability::kPerspective); !s.ok()) return s;
   }
   if (!request.transfer.isosurfaces.empty()) {
-    if (Status s = RequireAbility("isovalue", **renderer, &RendererKind::isosurfaces); !s.ok()) return s;
+    if (Status s = RequireAbility("isovalue", **renderer, Ability::kIsosurfaces); !s.ok()) return s;
   }
   if (!request.transfer.gradient_opacities.empty()) {
-    if (Status s = RequireAbility("gradient-opacity", **renderer, &RendererKind::gradient_opacity); !s.ok()) return s;
+    if (Status s = RequireAbility("gradient-opacity", **renderer, Ability::kGradientOpacity); !s.ok()) return s;
   }
   if (Status s = Validate(request.size); !s.ok()) return s;
   if (Status s = Validate(request.view); !s.ok()) return s;
   if (Status s = Validate(request.clipping); !s.ok()) return s;
   if (Status s = Validate(request.transfer); !s.ok()) return s;
   if (request.labels) {
-    if (Status s = RequireAbility("labels", **renderer, &RendererKind::shows_labels); !s.ok()) return s;
+    if (Status s = RequireAbility("labels", **renderer, Ability::kLabels); !s.ok()) return s;
     if (Status s = Validate(*request.labels); !s.ok()) return s;
   }
   if (request.overlay) {
-    if (Status s = RequireAbility("overlay", **renderer, &RendererKind::shows_overlays); !s.ok()) return s;
+    if (Status s = RequireAbility("overlay", **renderer, Ability::kOverlay); !s.ok()) return s;
     if (Status s = Validate(request.overlay->transfer); !s.ok()) return Status(s.code(), "overlay." + s.message());
     if (Status s = CheckCurvesAlone(request.overlay->transfer); !s.ok()) return s;
     if (Status s = InRange("overlay.weight", request.overlay->weight, 0, 1); !s.ok()) return s;

@@ -186,7 +186,7 @@ class AtAService(WithAService):
     def test_the_services_sentence_is_the_exceptions(self) -> None:
         for options, kind, sentence in (
             ({"dataset": "foot"}, ss.NotFound, "foot"),
-            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "shading 'depth-gradient' needs a renderer with depths"),
+            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"),
             ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'splat', but isovalue needs one of: zbuffer, raycast"),
             ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
         ):

@@ -104,7 +104,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
 // Boxes with a surface are rendered, whatever says where boxes are.
 TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
   for (const RendererKind* renderer : Renderers()) {
-    if (!renderer->isosurfaces()) continue;
+    if (!renderer->Can(Ability::kIsosurfaces)) continue;
     FrameRequest request = TestRequest(renderer, 120, 1);
     request.transfer.choice = std::string(kNoTransfer);
     request.transfer.isosurfaces = {{100, {1, 0.5F, 0.2F}, 0.5}};

@@ -73,6 +73,7 @@ class MipKind : public RendererKind {
                       .purpose = "the largest, least or mean value along each ray, for vessels",
                       .format = PixelFormat::kMaximum,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                      .abilities = {Ability::kPerspective},
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate(),

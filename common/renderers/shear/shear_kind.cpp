@@ -48,8 +48,7 @@ class ShearKind : public RendererKind {
                       .purpose = "the volume resampled onto the picture's pixels by three one-dimensional passes, with a cubic kernel",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // worker/renderers/shear/shear_passes.h says why it suffices
-                      .perspective = false,
-                      .gradient_opacity = true,
+                      .abilities = {Ability::kGradientOpacity, Ability::kLights},
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate(),
