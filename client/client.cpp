@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "common/base/log.h"
-#include "common/planning/validate_request.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
+#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {

@@ -186,6 +186,10 @@ class Gateway::Impl : public HttpApplication {
                                                       static const std::string text = JsonText(OpenApi());
                                                       return HttpReply{.body = text};
                                                     })};
+    routes["/api/v1/options"] = {.open = true, .handle = answer([] {
+                                                 static const std::string text = JsonText(OfferedOptions());
+                                                 return HttpReply{.body = text};
+                                               })};
     routes["/api/v1/status"] = {
         .handle = answer([this] { return news_->health == ServiceHealth::kGone ? ServiceGone() : JsonReply(StatusJson(news_->status)); })};
     routes["/api/v1/datasets"] = {.handle = answer([this] {

@@ -33,7 +33,7 @@ void DeclareRender(const CommandLine& line) {
   auto options = std::make_shared<RenderOptions>();
   sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
   AddFrameOptions(*sub, options->frame);
-  sub->add_flag("--previews", options->frame.request.previews, "Write the picture anew after each group, nearest first (see --groups)");
+  AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
   RunWith(*sub, line.run, options, RunRender);
 }
 
@@ -84,10 +84,11 @@ void DeclareInfo(const CommandLine& line) {
   auto options = std::make_shared<InfoOptions>();
   CLI::Option* source =
       sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr")->required();
-  AddTransferOptions(*sub, options->transfer);
+  for (const char* name : {"transfer", "scalar-range", "opacity-distance"})
+    AddRequestOption(*sub, *FindRequestOption(name), options->request);
   AddLayerFiles(*sub, options->layers);
   AddReadOptions(*sub);
-  ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
+  ResolveSource(*sub, source, options->path, options->request.transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunInfo);
 }
@@ -108,7 +109,7 @@ void DeclareTransfer(const CommandLine& line) {
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
   AddParsed(
-      *sub, "PRESET", options->transfer.choice,
+      *sub, "PRESET", options->request.transfer.choice,
       [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
         const Result<std::string> name = is_name(option, text);
         if (!name.ok()) return name.status();
@@ -117,7 +118,7 @@ void DeclareTransfer(const CommandLine& line) {
       "Which" + Explained(TransferPresets()))
       ->required();
   sub->add_option("SOURCE", options->path, "The volume file that it is made for: presets depend on the values of the volume")->required();
-  AddScalarRange(*sub, options->transfer);
+  AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);
   AddReadOptions(*sub);
   sub->parse_complete_callback([sub, options] { options->path = WithReadOptions(*sub, options->path); });
   RunWith(*sub, line.run, options, RunTransfer);

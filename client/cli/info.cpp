@@ -214,14 +214,14 @@ Status RunInfo(const InfoOptions& options) {
   if (!loaded.ok()) return loaded.status();
   const VolumeSummary summary = Summarize(*loaded->volume);
 
-  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, summary);
+  const Result<TransferFunction> transfer = ResolveTransfer(options.request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
   const double occupancy = EstimateOccupancy(summary, *transfer);
 
   const Result<Layers> layers = ReadLayers(options.layers, loaded->info.description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
 
-  const std::string name = TransferName(options.transfer);
+  const std::string name = TransferName(options.request.transfer);
   std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series, *layers)
                              : InfoText(loaded->info, summary, name, occupancy) + LayersText(*layers));
   return Status::Ok();

@@ -73,7 +73,7 @@ Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
 }  // namespace
 
 Status RunMeshInfo(const InfoOptions& options) {
-  if (options.transfer != TransferChoice{} || options.layers.any()) {
+  if (options.request.transfer != TransferChoice{} || options.layers.any()) {
     return Status::InvalidArgument(
         fmt::format("SOURCE '{}' is an unstructured grid; transfer functions and layers are for volumes", options.path));
   }

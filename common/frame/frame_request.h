@@ -35,7 +35,7 @@ constexpr std::string_view NameOf(AxisChoice axis) { return kAxisChoiceNames.at(
 
 struct Policy {
   std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
-  std::string load_metric = "auto";    // of LoadMetrics(): what boxes have equal shares of
+  std::string balance_by = "auto";     // of BalanceByChoices(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
   std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
@@ -60,10 +60,11 @@ struct TransferChoice {
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
-// How the overlay of a dataset is shown.
+// How the overlay of a dataset is shown: as a TransferChoice without isosurfaces and opacity by gradient, which are of the volume alone.
 struct OverlayChoice {
-  TransferChoice transfer;  // of its values
-  double weight = 1;        // [0, 1]: factor of its density in the mix
+  std::variant<std::string, TransferFunction> choice = std::string("auto");
+  std::optional<ScalarRange> scalar_range = {};
+  double weight = 1;  // [0, 1]: factor of its density in the mix
   friend bool operator==(const OverlayChoice&, const OverlayChoice&) = default;
 };
 

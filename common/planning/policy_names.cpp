@@ -4,7 +4,7 @@
 
 namespace slabstream {
 
-const std::vector<NamedChoice>& LoadMetrics() {
+const std::vector<NamedChoice>& BalanceByChoices() {
   static const std::vector<NamedChoice> choices = {
       {kAutomatic, "what suits the decomposition"},
       {"voxels", "equal voxels"},
@@ -14,14 +14,14 @@ const std::vector<NamedChoice>& LoadMetrics() {
   return choices;
 }
 
-std::optional<LoadMetric> FindLoadMetric(std::string_view name) {
-  const std::vector<NamedChoice>& choices = LoadMetrics();
+std::optional<BalanceBy> FindBalanceBy(std::string_view name) {
+  const std::vector<NamedChoice>& choices = BalanceByChoices();
   const auto found = std::ranges::find(choices.begin() + 1, choices.end(), name, &NamedChoice::name);
   if (found == choices.end()) return std::nullopt;
-  return LoadMetric(found - choices.begin() - 1);
+  return BalanceBy(found - choices.begin() - 1);
 }
 
-std::string_view NameOf(LoadMetric metric) { return LoadMetrics()[std::size_t(metric) + 1].name; }
+std::string_view NameOf(BalanceBy metric) { return BalanceByChoices()[std::size_t(metric) + 1].name; }
 
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {

@@ -55,7 +55,8 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
   }
   if (request.overlay) {
     if (summary.overlay == nullptr) return Missing(request, "overlay", "--overlay-transfer, --overlay-range or --overlay-weight");
-    Result<TransferFunction> transfer = ResolveTransfer(request.overlay->transfer, *summary.overlay);
+    Result<TransferFunction> transfer =
+        ResolveTransfer({.choice = request.overlay->choice, .scalar_range = request.overlay->scalar_range}, *summary.overlay);
     if (!transfer.ok()) return transfer.status();
     if (request.overlay->weight > 0) {
       looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};

@@ -64,9 +64,6 @@ struct Clipping {
   friend bool operator==(const Clipping&, const Clipping&) = default;
 };
 
-// InvalidArgument naming field, value and limits.
-Status Validate(const Clipping& clipping);
-
 // The points p of data space with Distance(p) >= 0. Distance is in the unit of the spacing: |normal / spacing| is 1.
 struct HalfSpace {
   Vec3 normal;

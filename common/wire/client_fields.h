@@ -47,7 +47,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 0, kMaxNameBytes);
   io.Text("axis", m.axis, &P::axis, &P::mutable_axis, 0, kMaxNameBytes);
   io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 0, kMaxNameBytes);
-  io.Text("load_metric", m.load_metric, &P::load_metric, &P::mutable_load_metric, 0, kMaxNameBytes);
+  io.Text("balance_by", m.balance_by, &P::balance_by, &P::mutable_balance_by, 0, kMaxNameBytes);
   io.Text("assignment", m.assignment, &P::assignment, &P::mutable_assignment, 0, kMaxNameBytes);
   io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 0, kMaxNameBytes);
   io.Any(m.queued_ns, &P::queued_ns, &P::set_queued_ns);
@@ -226,6 +226,8 @@ void Fields(auto& io, Is<SummaryQuery> auto& m) {
     if (check.ok()) check.Adopt(Validate(m.transfer));
   });
 }
+
+inline void Read(const v1::SummaryQuery& in, SummaryQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
 
 void Fields(auto& io, Is<Percentile> auto& m) {
   using P = v1::Percentile;

@@ -18,7 +18,7 @@ constexpr std::uint32_t kSlowWorker = 1;
 
 ViewParameters Turntable(double part) { return {.azimuth_degrees = 180 * part, .elevation_degrees = kBenchElevationDegrees}; }
 
-bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame) || LoadMetricOf(frame.policy) == NameOf(LoadMetric::kCost); }
+bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame) || BalanceByOf(frame.policy) == NameOf(BalanceBy::kCost); }
 
 KeyedFrame ForSequence(ExperimentContext& context, const ViewSequence& sequence) {
   Json views = Json::array();

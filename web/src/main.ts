@@ -14,6 +14,7 @@ import { LabelsSection, lightSection, renderingSection, surfacesSection } from "
 import { Machine } from "./machine";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
+import { loadOffers, renderers } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
@@ -227,8 +228,13 @@ function askForToken(reason: string): void {
 
 applyTheme();
 const token = takeToken();
-if (token) new Page(token);
-else {
-  document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, "Slabstream")));
+const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
+if (token) {
+  loadOffers().then(() => {
+    INITIAL.renderer = renderers()[0]?.name ?? "";
+    new Page(token);
+  }).catch((error: unknown) => showAlone(`The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`));
+} else {
+  showAlone("Slabstream");
   askForToken("This link holds no access.");
 }

@@ -307,7 +307,7 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
-      resolved.load_metric = LoadMetric::kVoxels;
+      resolved.balance_by = BalanceBy::kVoxels;
       EXPECT_LE(occupied.frame, PredictionOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
     }
   }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
