@@ -176,8 +176,9 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   return Post(
       answers_, "an answer to a question",
       [action, refusal, samples = slabs_.Find(action.dataset)] {
-        const Result<AnyMessage> answer = AnswerTo(action, samples);
-        return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
+        Result<QuestionReply> answer = AnswerTo(action, samples);
+        if (!answer.ok()) return News{refusal(answer.status())};
+        return News{QuestionAnswered{action.id, Widen<CoordinatorToClient>(*std::move(answer))}};
       },
       refusal);
 }

@@ -25,7 +25,7 @@ class ServiceKeys {
   std::optional<Role> RoleOf(const Incoming& incoming) const;
 
   struct Done {
-    AnyMessage answer;                   // KeysReply or OrderRefused
+    CoordinatorToClient answer;          // KeysReply or OrderRefused
     std::optional<std::string> revoked;  // a public key whose connections must end
   };
   Done CarryOut(const KeysOrder& order);

@@ -287,12 +287,12 @@ WorkerEvent FrameSimulation::Answer(Job& job) {
 
 // ---------------------------------------------------------------- messages
 
-Arrivals FrameSimulation::ToWorker(Node, AnyMessage& message, double sent) {
+Arrivals FrameSimulation::ToWorker(Node, CoordinatorToWorker& message, double sent) {
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) BeginGroup(*assignment);
   return Arrivals::At(sent + machine_.link.latency_seconds);
 }
 
-Arrivals FrameSimulation::ToCoordinator(Node, AnyMessage& message) {
+Arrivals FrameSimulation::ToCoordinator(Node, WorkerToCoordinator& message) {
   if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) CHECK(false) << trouble->status.message();
   double arrival = service_.now() + machine_.link.latency_seconds;
   if (const auto* picture = std::get_if<FrameImage>(&message)) {

@@ -94,7 +94,7 @@ class SimulatedService {
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 
-  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action).Take(), {}); }
+  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
@@ -109,7 +109,7 @@ class SimulatedService {
   Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
-  void SendToCoordinator(Node from, AnyMessage message, const Bytes& payload);
+  void SendToCoordinator(Node from, WorkerToCoordinator message, const Bytes& payload);
   void SendToPeer(std::uint32_t place);
   void Deliver(std::uint32_t place);
 

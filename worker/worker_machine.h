@@ -91,8 +91,9 @@ struct IncomingImage {
 };
 
 // ---- events
+using MessageToWorker = Merged<CoordinatorToWorker, SlabsToWorker, WorkerToWorker>;
 struct MessageReceived {
-  AnyMessage message;
+  MessageToWorker message;
   Bytes payload;
 };  // from any plane; payload lengths are already checked, runs are checked when they are combined
 struct ChunkStored {
@@ -141,10 +142,7 @@ using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, Combi
 
 // ---- actions
 struct SendControl {
-  std::variant<Register, Heartbeat, GroupDone, WorkerTrouble, Leave> message;
-  AnyMessage Take() && {
-    return std::visit([](auto& each) { return AnyMessage(std::move(each)); }, message);
-  }
+  WorkerToCoordinator message;
 };
 struct SendChunkRequest {
   ChunkRequest request;

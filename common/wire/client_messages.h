@@ -32,6 +32,7 @@
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
+#include "common/wire/volume_messages.h"
 #include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
@@ -274,6 +275,11 @@ struct PickReply {
   double depth = 0;                    // of it, as depths of the picture's pixels
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
+
+using ClientToCoordinator = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown, KeysOrder, DataOrder, SummaryQuery,
+                                         SampleQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using CoordinatorToClient = std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply,
+                                         DataReply, OrderRefused, SummaryReply, SampleReply, PickReply, VolumeCredit>;
 
 using Question = std::variant<SummaryQuery, SampleQuery, PickQuery>;
 using QuestionReply = std::variant<SummaryReply, SampleReply, PickReply>;
