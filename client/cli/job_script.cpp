@@ -144,8 +144,7 @@ std::string TextOf(const JobScript& script) {
   for (const std::string& data : script.data) text += fmt::format("{}--data {}", text.ends_with('(') ? "" : " ", ShellWord(data));
   text += fmt::format(")\ndataset={}\nworkers={}\n", ShellWord(script.dataset), script.workers_per_node);
   text += fmt::format("threads={}\n", script.threads > 0 ? std::to_string(script.threads) : "$((SLURM_CPUS_ON_NODE / workers))");
-  text += fmt::format("drain={}s # that workers have to finish what they have, after a notice\n",
-                      script.notice_seconds - script.notice_seconds / 4);
+  text += fmt::format("drain={}s # for workers to finish their work after a notice\n", script.notice_seconds - script.notice_seconds / 4);
   text += "patience=600 # seconds without a coordinator after which workers end\n";
   return text + std::string(kBody);
 }

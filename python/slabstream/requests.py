@@ -68,7 +68,7 @@ class Requests:
         self._received_bytes = self._told_bytes = 0
         self._next_ping = 0.0
         self._unanswered_since: float | None = None  # time of the first ping since the last message
-        self._gone: str = ""  # why nothing will be answered any more
+        self._gone: str = ""  # why nothing more will be answered
 
     def submit(self, frame: Any, deadline_seconds: float, observer: Observer, now: float) -> int:
         """Opens a request and returns its number. The deadline counts from its arrival at the service."""
@@ -104,7 +104,7 @@ class Requests:
         return self._last_nonce
 
     def forget(self, nonce: int) -> None:
-        """Nobody waits for that answer any more."""
+        """Nobody waits for that answer now."""
         self._questions.pop(nonce, None)
 
     def begin_upload(self, order: Any, answer: concurrent.futures.Future[Any], credited: Callable[[int], None], now: float) -> int:
@@ -176,7 +176,7 @@ class Requests:
         return min(self._next_ping, self._unanswered_since + SILENCE_SECONDS)
 
     def fail_all(self, why: str, for_good: bool = False) -> None:
-        """Ends everything that is open, and if `for_good` whatever comes later."""
+        """Ends everything that is open, and if `for_good` everything that comes later."""
         if for_good:
             self._gone = why
             for answer in self._questions.values():
