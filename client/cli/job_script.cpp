@@ -27,7 +27,7 @@ is_over() {
 }
 
 # Runs the workers of this node until the service ends. A coordinator that was requeued runs elsewhere: it writes another
-# service file, and the workers start anew. After a notice the workers leave, but this waits on: Slurm does not requeue a
+# service file, and the workers restart. After a notice the workers leave, but this waits on: Slurm does not requeue a
 # preempted job that ends by itself.
 run_workers() {
   local file="" waited step
@@ -107,7 +107,7 @@ while kill -0 "$coordinator" 2> /dev/null; do # a trap ends `wait` early
   wait "$coordinator"
   status=$?
 done
-if [[ "$ended_by_slurm" == no ]]; then # nobody will start the coordinator anew
+if [[ "$ended_by_slurm" == no ]]; then # nobody will restart the coordinator
   touch "$folder/ended"
   scancel --quiet --state=PENDING "$SLURM_ARRAY_JOB_ID"
   wait

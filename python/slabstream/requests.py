@@ -249,7 +249,7 @@ class Requests:
         if pong.nonce not in self._pinged:
             return
         asked = self._pinged[pong.nonce]
-        self._fail_uploads(f"the service at {self._endpoint} was started anew, and what was sent of the volume is lost", pong.epoch)
+        self._fail_uploads(f"the service at {self._endpoint} was restarted, and the part of the volume that was sent is lost", pong.epoch)
         self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
         known = set(pong.known)
         for request in asked:
@@ -262,7 +262,7 @@ class Requests:
                 self._submit_again(state, now)
 
     def _submit_again(self, lost: _Open, now: float) -> None:
-        """The service has lost the request: it was started anew. The deadline is still that of the first time."""
+        """The service was restarted and lost the request. The deadline is still that of the first time."""
         request = lost.message.request
         left_ms = int((lost.deadline - now) * 1000)
         if lost.cancelled:
