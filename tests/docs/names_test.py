@@ -27,7 +27,8 @@ def files() -> dict[str, str]:
     """Path from the root -> text, of all files but documents and what a build makes; of folders, '' and a path that ends in /."""
     found = {}
     for folder, folders, names in os.walk(ROOT):
-        folders[:] = [f for f in folders if f not in (".git", "__pycache__", "node_modules") and not (ROOT / folder / f / "CMakeCache.txt").exists()]
+        made = {f for f in folders if (ROOT / folder / f / "CMakeCache.txt").exists()} | {".git", "__pycache__", "node_modules"}
+        folders[:] = [f for f in folders if f not in made]
         here = pathlib.Path(folder).relative_to(ROOT)
         found |= {f"{here / f}/": "" for f in folders}
         for name in names:
@@ -65,7 +66,8 @@ def matching(path: str) -> list[str]:
     pattern = re.sub(r"NAME", "*", path)
     if pattern in files():
         return [pattern]
-    return [f for f in files() for whole in (f.rstrip("/"), f) if fnmatch.fnmatchcase(whole, pattern) or fnmatch.fnmatchcase(whole, f"*/{pattern}")]
+    pattern = pattern.rstrip("/")
+    return [f for f in files() if any(fnmatch.fnmatchcase(f.rstrip("/"), wanted) for wanted in (pattern, f"*/{pattern}"))]
 
 
 def is_path(span: str) -> bool:
@@ -156,7 +158,8 @@ class Names(unittest.TestCase):
         self.check(wrong)
 
     def test_options_exist(self) -> None:
-        ours = [(t.name, o) for t in texts() for s in t.spans + t.commands() for o in re.findall(r"(?:^|[\s\[(])(--[a-z][a-z_-]*)", s)]
+        option = re.compile(r"(?:^|[\s\[(])(--[a-z][a-z_-]*)")
+        ours = [(t.name, o) for t in texts() for s in t.spans + t.commands() for o in option.findall(s)]
         self.check(sorted({f"{name}: {option}" for name, option in ours if option not in FOREIGN_OPTIONS and option not in options()}))
 
     def test_subcommands_exist(self) -> None:
