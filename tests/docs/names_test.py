@@ -84,7 +84,8 @@ def is_name(span: str) -> bool:
 
 def identifiers(span: str) -> set[str]:
     """The parts of a name that are no ordinary words."""
-    return {word for word in re.findall(r"\w+", span) if not re.fullmatch(r"[a-z]+|[A-Z]|\w*NAME|\w*_", word)} - FOREIGN
+    ordinary = re.compile(r"[a-z]+|[A-Z]|\w*NAME|\w*_")
+    return {word for word in re.findall(r"\w+", span) if not ordinary.fullmatch(word)} - FOREIGN
 
 
 def exists(name: str) -> bool:
@@ -96,11 +97,10 @@ def exists(name: str) -> bool:
 
 @functools.cache
 def options() -> set[str]:
-    """As they are typed; or, as options of requests may be made, names in quotes and fields of the schema."""
+    """As they are typed; or, as options of requests may be made, fields of the schema and entries of a list, {"name", ...}."""
     fields = re.findall(r"\b([a-z_]+) = \d+", "\n".join(text for path, text in files().items() if path.endswith(".proto")))
-    return set(re.findall(r"--[a-z][a-z-]*", production())) | {
-        f"--{name.replace('_', '-')}" for name in fields + re.findall(r"""["']([a-z-]+)["']""", production())
-    }
+    entries = re.findall(r'(?:\{|name(?: =|:) )"([a-z-]+)"', production())
+    return set(re.findall(r"--[a-z][a-z-]*", production())) | {f"--{name.replace('_', '-')}" for name in fields + entries}
 
 
 @functools.cache
@@ -128,7 +128,8 @@ class Text:
         """Command lines of our own programs."""
         lines = [line.split("#")[0] for line in self.listings] + self.spans
         parts = [part.strip() for line in lines for part in re.split(r"&&|\|| -- |\$\(", line)]
-        return [part for part in parts if part.split() and (part.split()[0] in TOOLS or part.startswith(("deploy/", "bench/", "build/bin/")))]
+        ours = ("deploy/", "bench/", "build/bin/")
+        return [part for part in parts if part.startswith(ours) or part.split() and part.split()[0] in TOOLS]
 
 
 class Names(unittest.TestCase):
