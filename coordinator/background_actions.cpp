@@ -140,7 +140,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
   return Post(
-      looks_, "a look at the files of a dataset",
+      looks_, "checking the files of a dataset",
       [action] {
         return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
       },
@@ -151,7 +151,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
   return Post(
-      looks_, "a look at the watched folders", [action] { return News{LookThrough(action)}; },
+      looks_, "searching the watched folders", [action] { return News{LookThrough(action)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};
@@ -174,7 +174,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
     return QuestionAnswered{id, OrderRefused{nonce, why}};
   };
   return Post(
-      answers_, "an answer to a question",
+      answers_, "answering a question",
       [action, refusal, samples = slabs_.Find(action.dataset)] {
         Result<QuestionReply> answer = AnswerTo(action, samples);
         if (!answer.ok()) return News{refusal(answer.status())};
@@ -205,7 +205,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
 BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
   const auto whole = uploads_.extract(action.upload);
   return Post(
-      loads_, "the end of a volume",
+      loads_, "finishing a volume",
       [upload = action.upload, buffer = whole.mapped()] {
         return News{UploadFinished{upload, buffer->Finish()}};
       },

@@ -21,7 +21,7 @@ class ServiceKeys {
   // Once the planes are bound: writes the service files, with new keys where they are missing. Errors of KeyFolder::Publish.
   Status Publish(const std::string& client_endpoint, const std::string& worker_endpoint);
 
-  // Of the sender of a message that came over an encrypted connection; nullopt: its key is not admitted any more.
+  // Of the sender of a message that came over an encrypted connection; nullopt: its key is no longer admitted.
   std::optional<Role> RoleOf(const Incoming& incoming) const;
 
   struct Done {

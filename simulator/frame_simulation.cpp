@@ -13,7 +13,7 @@ namespace slabstream {
 namespace {
 
 constexpr Duration kNever = std::chrono::hours(24 * 40);  // as milliseconds it fits 32 bits
-constexpr double kAlarm = 20 * 24 * 3600.0;               // seconds: what is due that much later is an alarm of a machine
+constexpr double kAlarm = 20 * 24 * 3600.0;               // seconds: an event due later than this is an alarm of a machine
 constexpr Epoch kEpoch = 1;
 constexpr PeerToken kClient = ~std::uint32_t{0};
 constexpr char kDataset[] = "simulated";
@@ -41,7 +41,7 @@ CoordinatorConfig MakeCoordinatorConfig() {
 WorkerConfig MakeWorkerConfig(std::uint32_t index) {
   WorkerConfig config;
   config.incarnation = index + 1;
-  config.cache_bytes = 0;  // costs alone say whether voxels are fetched, whatever earlier frames had
+  config.cache_bytes = 0;  // costs alone say whether voxels are fetched; earlier frames do not matter
   config.credit_bytes = ~std::uint64_t{0} >> 1U;
   config.register_interval = config.chunk_timeout = kNever;
   config.early_image_bytes = ~std::uint64_t{0} >> 1U;

@@ -7,7 +7,7 @@
 // holds, also from another coordinator: the names of datasets outlive coordinators.
 //
 // Leaving (LeaveRequested): it says so in each heartbeat and goes on with what it has, until the coordinator stops it, or until `drain` is
-// over, or until it is not registered any more.
+// over, or until it is no longer registered.
 //
 // A group on this worker:
 //   GroupAssignment   fetch the voxels of its boxes that no cached slab holds (chunk requests within the byte credit); a box that is

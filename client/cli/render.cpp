@@ -137,7 +137,7 @@ std::string FileOf(const TurntableOptions& options, int index) {
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
     return Status::InvalidArgument(
-        "--eye stands still, but a turntable turns by --azimuth, about --look-at; --turns 0 keeps the view still");
+        "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; --turns 0 fixes the view");
   }
   if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
   const std::string first_output = FileOf(options, 0);

@@ -6,10 +6,10 @@ namespace slabstream {
 
 const std::vector<NamedChoice>& BalanceByChoices() {
   static const std::vector<NamedChoice> choices = {
-      {kAutomatic, "what suits the decomposition"},
+      {kAutomatic, "chosen to suit the decomposition"},
       {"voxels", "equal voxels"},
-      {"occupied", "equal work, by what is visible under the transfer function"},
-      {"cost", "equal render time, as earlier frames took it; until there are any, occupied"},
+      {"occupied", "equal work, by visibility under the transfer function"},
+      {"cost", "equal render time, as measured in earlier frames; occupied until then"},
   };
   return choices;
 }
@@ -25,8 +25,8 @@ std::string_view NameOf(BalanceBy metric) { return BalanceByChoices()[std::size_
 
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {
-      {kStaticBalance, "boxes stay as they were made"},
-      {kDynamicBalance, "boxes are resized between frames where what is won pays for the voxels that move"},
+      {kStaticBalance, "boxes do not change"},
+      {kDynamicBalance, "box boundaries move between frames if that saves more time than moving the voxels costs"},
   };
   return choices;
 }

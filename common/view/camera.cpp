@@ -151,7 +151,7 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
   if (look.distance >= least) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("view.{} is {:.6g} from the point that it looks at, but must be at least {:.6g} in this direction, so that "
-                  "the whole volume lies before it; view.zoom magnifies the picture",
+                  "the whole volume is in front of it; view.zoom magnifies the picture",
                   view.eye ? "eye" : "distance: the eye", look.distance, least));
 }
 

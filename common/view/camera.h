@@ -99,7 +99,7 @@ struct Camera {
 };
 
 // The view in the same direction whose target is `centre` (data space), and in which a ball of `radius` > 0 (physical) round it touches the
-// shorter side of the picture at zoom 1. The eye's distance stays. Not `fit` any more.
+// shorter side of the picture at zoom 1. The eye's distance stays. `fit` is off afterwards.
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius);
 
 // `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.

@@ -80,7 +80,7 @@ inline constexpr std::size_t kMaxClipSides = kMaxClipPlanes + 6 + 2;  // planes,
 inline constexpr double kFaceDepth = 2.5;
 
 struct ClipRegion {
-  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, whatever the mode
+  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, in either mode
   ClipMode mode = ClipMode::kKeep;
 
   bool empty() const { return sides.empty(); }

@@ -86,7 +86,7 @@ const std::vector<ViewMotion>& ViewMotions() {
        }},
       {"turn-over", "half a turn about the x axis, over the top, orthographic",
        [](double part) { return ViewParameters{.elevation_degrees = 180 * part}; }},
-      {"fly-through", "a quarter of a turn ever nearer to the volume, perspective",
+      {"fly-through", "a quarter of a turn while approaching the volume, perspective",
        [](double part) {
          return ViewParameters{.projection = Projection::kPerspective,
                                .azimuth_degrees = 90 * part,

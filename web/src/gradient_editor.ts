@@ -62,7 +62,7 @@ export class GradientEditor {
     this.body.hidden = !on;
     this.hint.hidden = !on;
     const volume = this.context.volume(), unit = volume ? unitName(volume.unit).replace(/s$/, "") : "unit";
-    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in data values per ${unit}.` : "Ray casting alone shows opacity by the gradient.";
+    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in data values per ${unit}.` : "Only ray casting shows opacity by the gradient.";
     if (!on) return;
     const scale = this.scale(), first = list[0] as SlopePoint, last = list[list.length - 1] as SlopePoint;
     this.selected = clamp(this.selected, 0, list.length - 1);

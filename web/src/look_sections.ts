@@ -125,7 +125,7 @@ export function lightSection(context: Context): HTMLElement {
     };
   });
   const at = (right: number, up: number): void => store.update({ lights: [...store.state.lights, fromEye(right, up, context)] }, "light");
-  const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay when the volume turns; they come from one side of the present view.");
+  const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay in place when the volume turns; they start at one side of the present view.");
   const adders = h("div", { class: "button-row" }, button("Left", "add", () => at(-50, 35), "quiet"), button("Above", "add", () => at(0, 70), "quiet"), button("Right", "add", () => at(50, 35), "quiet"));
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Towards x"), h("span", {}, "y"), h("span", {}, "z"));
   const update = (): void => {

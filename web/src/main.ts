@@ -137,7 +137,7 @@ class Page {
   // A socket does not say why it was refused; a request does.
   private async checkToken(): Promise<void> {
     const answer = await fetch("api/v1/datasets", { headers: { Authorization: `Bearer ${this.api.token}` } }).catch(() => null);
-    if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("The token is not that of this gateway: it is new at each start.");
+    if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("This gateway has another token: each start makes a new one.");
   }
 
   // ---- what can be done
@@ -157,7 +157,7 @@ class Page {
   private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
 
   private copyLink(withToken: boolean): void {
-    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Whoever has it can use this gateway until it ends." : "The link is copied. It holds no access: others need their own."));
+    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it can use this gateway until it ends." : "The link is copied. It gives no access: others need their own."));
   }
 
   private actions(): ConstructorParameters<typeof Shell>[0] {
@@ -236,5 +236,5 @@ if (token) {
   }).catch((error: unknown) => showAlone(`The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`));
 } else {
   showAlone("Slabstream");
-  askForToken("This link holds no access.");
+  askForToken("This link gives no access.");
 }

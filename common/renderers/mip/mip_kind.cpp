@@ -82,7 +82,7 @@ class MipKind : public RendererKind {
                                       .standard = double(ProjectionMode::kMaximum),
                                       .choices = {"maximum", "minimum", "mean"}},
                                      {.name = "interpolation",
-                                      .purpose = "Values between voxels: trilinear, or those of the nearest voxel",
+                                      .purpose = "Values between voxels: trilinear, or of the nearest voxel",
                                       .standard = 0,
                                       .choices = {"linear", "nearest"}}}}) {}
 
@@ -99,7 +99,7 @@ class MipKind : public RendererKind {
     return PickRule::kNone;
   }
 
-  // Whatever its value, a sample may be the one that a pixel shows.
+  // A sample of any value may be the one that a pixel shows.
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     ClassificationTable table = Classify(transfer, summary.description, summary.range);
     std::ranges::fill(table.opacity, 1.0F);

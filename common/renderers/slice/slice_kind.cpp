@@ -10,7 +10,7 @@
 namespace slabstream::slice {
 namespace {
 
-// Every tetrahedron that may show is cut, whatever lies before it: time grows with their number and with samples in drawn voxels of the
+// Every tetrahedron that may show is cut, even if it is hidden: time grows with their number and with samples in drawn voxels of the
 // lattice. Those of a brick lie evenly in its voxels, as far as is known.
 class SliceCost : public AnalyticCost {
  public:
