@@ -80,11 +80,7 @@ Status CheckCurvesAlone(const TransferChoice& overlay) {
 // Refuses `option` unless the renderer has the ability.
 Status RequireAbility(std::string_view option, const RendererKind& renderer, Ability ability) {
   if (renderer.Can(ability)) return Status::Ok();
-  std::string names;
-  for (const RendererKind* kind : Renderers()) {
-    if (kind->Can(ability)) names.append(names.empty() ? "" : ", ").append(kind->name());
-  }
-  return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, names));
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer.name(), option, NamesOfAble(ability)));
 }
 
 Status Validate(const Policy& policy) {
