@@ -71,7 +71,7 @@ struct OverlayChoice {
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
-inline constexpr std::string_view kDefaultRenderer = "splat";
+inline constexpr std::string_view kDefaultRenderer = SLABSTREAM_DEFAULT_RENDERER;  // common/renderers/CMakeLists.txt
 
 struct FrameRequest {
   std::string dataset;                     // a name of the catalogue, 1 ... kMaxNameBytes
