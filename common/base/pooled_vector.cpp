@@ -19,7 +19,7 @@ constexpr std::size_t kMostKept = std::size_t{96} << 20;  // bytes in all
 #endif
 
 // Images of neighbouring views differ in size; rounding lets them reuse each other's blocks. Pages never written take no memory.
-std::size_t RoundedUp(std::size_t bytes) { return std::bit_ceil(bytes); }
+std::size_t BlockBytes(std::size_t bytes) { return std::bit_ceil(bytes); }
 
 void* AllocatePrivate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
 void FreePrivate(void* block) { ::operator delete(block, std::align_val_t(kBufferAlignment)); }
@@ -131,13 +131,13 @@ Pool& TheBlocks() {
 
 }  // namespace
 
-void* TakeBlock(std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : TheBlocks().Take(RoundedUp(bytes)); }
+void* TakeBlock(std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : TheBlocks().Take(BlockBytes(bytes)); }
 
 void GiveBackBlock(void* block, std::size_t bytes) {
   if (bytes < kLeastKept) {
     FreePrivate(block);
   } else {
-    TheBlocks().GiveBack(block, RoundedUp(bytes));
+    TheBlocks().GiveBack(block, BlockBytes(bytes));
   }
 }
 

@@ -10,7 +10,7 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kTextBytes = 40, kKeyBytes = 32;
+constexpr std::size_t kTextBytes = 40, kRawKeyBytes = 32;
 using Text = std::array<char, kTextBytes + 1>;  // with the closing zero
 
 }  // namespace
@@ -22,7 +22,7 @@ KeyPair MakeKeyPair() {
 }
 
 bool IsKey(std::string_view text) {
-  std::array<std::uint8_t, kKeyBytes> bytes{};
+  std::array<std::uint8_t, kRawKeyBytes> bytes{};
   return text.size() == kTextBytes && zmq_z85_decode(bytes.data(), std::string(text).c_str()) != nullptr;
 }
 
@@ -33,7 +33,7 @@ std::optional<std::string> PublicKeyOf(const std::string& secret_key) {
 }
 
 std::string IdOfKey(const std::string& public_key) {
-  std::array<std::uint8_t, kKeyBytes> bytes{};
+  std::array<std::uint8_t, kRawKeyBytes> bytes{};
   if (!IsKey(public_key)) return "";
   zmq_z85_decode(bytes.data(), public_key.c_str());
   constexpr char kDigits[] = "0123456789abcdef";

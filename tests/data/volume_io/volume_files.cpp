@@ -178,7 +178,7 @@ void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& s
 
 std::string SharedVolumes() {
   const char* path = std::getenv("SLABSTREAM_SHARED_VOLUMES");
-  return path != nullptr ? path : SLABSTREAM_SHARED_VOLUMES_DEFAULT;
+  return path != nullptr ? path : "";
 }
 
 void Damage(char& byte, Random& random) {

@@ -53,7 +53,7 @@ struct TiffOptions {
 };
 void WriteTiff(const std::string& path, const FileSpec& spec, const FileBytes& samples, const TiffOptions& options = {});
 
-// The folder of real volumes: SLABSTREAM_SHARED_VOLUMES, or one beside the source tree. It may not be there.
+// The folder of real volumes that SLABSTREAM_SHARED_VOLUMES names; empty: it names none.
 std::string SharedVolumes();
 
 // Does what may happen to a byte of a file: another value, or one bit of it.
