@@ -38,12 +38,12 @@ struct Options {
 
 Policy Automatic() {
   Policy policy;
-  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
+  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = kAutomatic;
   return policy;
 }
 
 std::string Text(const Policy& policy) {
-  return fmt::format("{} by {}, {} groups, {}, {}", policy.decomposition, LoadMetricOf(policy), policy.groups, policy.assignment,
+  return fmt::format("{} by {}, {} groups, {}, {}", policy.decomposition, BalanceByOf(policy), policy.groups, policy.assignment,
                      policy.combine);
 }
 
@@ -151,7 +151,7 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
         for (const AssignmentEntry& assignment : Assignments()) {
           for (const CombiningEntry& scheme : CombiningSchemes()) {
             const Policy policy{.decomposition = std::string(decomposition.name),
-                                .load_metric = split,
+                                .balance_by = split,
                                 .groups = groups,
                                 .assignment = std::string(assignment.name),
                                 .combine = std::string(scheme.name)};
@@ -193,7 +193,7 @@ void Serve(const Options& options, const Subject& subject, int workers) {
           run.predicted.push_back(statistics.predicted->latency_seconds);
           run.predicted_render.push_back(statistics.predicted->render_seconds);
         }
-        run.text = fmt::format("{} by {}, {} groups, {}, {}", statistics.decomposition, statistics.load_metric, statistics.groups,
+        run.text = fmt::format("{} by {}, {} groups, {}, {}", statistics.decomposition, statistics.balance_by, statistics.groups,
                                statistics.assignment, statistics.combine);
       }
     }

@@ -132,7 +132,7 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
     if (options.verbose && options.frames > 0) fmt::print("\n");
     balanced.Add(measured, view.whole, PredictionError(*cost, measured), moved);
   }
-  fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, {}\n", subject.name, policy.decomposition, LoadMetricOf(policy), policy.assignment, boxes,
+  fmt::print("{:22} {:8} {:9} {:10} {:4} boxes, {}\n", subject.name, policy.decomposition, BalanceByOf(policy), policy.assignment, boxes,
              fixed.Text());
   if (options.frames > 0) fmt::print("{:46} after {} frames, {}\n", "", options.frames, balanced.Text());
   (void)std::fflush(stdout);
@@ -147,7 +147,7 @@ Status Run(const Options& options) {
       Policy policy = options.policy;
       policy.decomposition = decomposition;
       for (const std::string& split : options.splits) {
-        policy.load_metric = split;
+        policy.balance_by = split;
         if (decomposition == "octree" && split != "voxels") continue;  // blind to work
         Compare(*subject, views, policy, options);
       }

@@ -239,7 +239,7 @@ class Coordinator {
     return sum;
   }
 
-  void Send(const std::string& identity, const AnyMessage& message) { CHECK(control_.Send(identity, Encode(message)).ok()); }
+  void Send(const std::string& identity, MessageView message) { CHECK(control_.Send(identity, Encode(message)).ok()); }
 
   void Serve() {
     const std::vector<Socket*> sockets = {&control_, &slabs_};
@@ -262,8 +262,7 @@ class Coordinator {
       }
     }
     while (const auto incoming = slabs_.TryReceive()) {
-      const AnyMessage message = Decode(incoming->header()).value();
-      const auto& request = std::get<ChunkRequest>(message);
+      const auto request = std::get<ChunkRequest>(Decode(incoming->header()).value());
       const auto bytes = std::size_t(request.box.voxel_count()) * BytesPerSample(setup_.description.type);
       Chunk chunk = {.epoch = kEpoch, .dataset = kDataset, .box = request.box, .chunk = request.chunk};
       const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::min<std::size_t>(bytes, kChunkBytes))), Codec::kRaw, chunk);

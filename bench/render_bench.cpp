@@ -83,7 +83,7 @@ const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t
 // That draws volumes.
 std::vector<std::int64_t> EveryRenderer() {
   std::vector<std::int64_t> numbers = benchmark::CreateDenseRange(0, std::int64_t(Renderers().size()) - 1, 1);
-  std::erase_if(numbers, [](std::int64_t number) { return KindAt(number).draws_cells(); });
+  std::erase_if(numbers, [](std::int64_t number) { return KindAt(number).Can(Ability::kCells); });
   return numbers;
 }
 
@@ -95,7 +95,7 @@ void Boxes(benchmark::State& state) {
 BENCHMARK(Boxes)->ArgNames({"class", "p", "renderer"})->ArgsProduct({{1, 2}, {1, 2}, EveryRenderer()})->Unit(benchmark::kMillisecond);
 
 void Turn(benchmark::State& state) {
-  if (Projection(state.range(1)) == Projection::kPerspective && !KindAt(state.range(3)).perspective()) {
+  if (Projection(state.range(1)) == Projection::kPerspective && !KindAt(state.range(3)).Can(Ability::kPerspective)) {
     state.SkipWithError("draws no perspective");
     return;
   }

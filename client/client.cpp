@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "common/base/log.h"
-#include "common/planning/validate_request.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
+#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {
@@ -60,7 +60,7 @@ struct OpenQuestion {
 constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 // Of an answer to a question or an order.
-std::optional<std::uint64_t> NonceOfAnswer(const AnyMessage& message) {
+std::optional<std::uint64_t> NonceOfAnswer(const CoordinatorToClient& message) {
   if (const auto* status = std::get_if<StatusReply>(&message)) return status->nonce;
   if (const auto* end = std::get_if<ShutDownReply>(&message)) return end->nonce;
   if (const auto* keys = std::get_if<KeysReply>(&message)) return keys->nonce;
@@ -75,7 +75,7 @@ struct Client::Impl {
   Impl(std::string service_endpoint, Socket service_socket, ClientTiming client_timing)
       : endpoint(std::move(service_endpoint)), socket(std::move(service_socket)), timing(client_timing) {}
 
-  Status Send(const AnyMessage& message) { return socket.Send({}, Encode(message)); }
+  Status Send(MessageView message) { return socket.Send({}, Encode(message)); }
 
   void Submit(const SubmitFrame& message);
 
@@ -106,7 +106,7 @@ struct Client::Impl {
   Result<Answer> Ask(Question question_message, Duration timeout);
   void SendPing(Time now);
   bool Receive();  // true: something came
-  void Handle(AnyMessage& message, const Bytes& payload);
+  void Handle(CoordinatorToClient& message, const Bytes& payload);
   void Handle(FrameReply& reply, const Bytes& payload);
   void Handle(const ClientPong& pong);
   void SubmitAgain(OpenRequest& lost);
@@ -129,8 +129,8 @@ struct Client::Impl {
   std::map<std::uint64_t, OpenQuestion> questions;         // by nonce
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
   std::deque<ClientEvent> events;
-  std::optional<AnyMessage> answer;  // to the one question or order that waits for it
-  std::uint64_t question = 0;        // its nonce
+  std::optional<CoordinatorToClient> answer;  // to the one question or order that waits for it
+  std::uint64_t question = 0;                 // its nonce
   Time next_ping;
   std::optional<Time> unanswered_since;  // time of the first ping since the last message
 };
@@ -182,12 +182,10 @@ bool Client::Impl::Receive() {
   bool received = false;
   while (const std::optional<Incoming> incoming = socket.TryReceive()) {
     received = true;
-    Result<AnyMessage> message = Decode(incoming->header());
     const Bytes payload = incoming->payload();
-    if (!message.ok() || payload.size() != ExpectedPayloadBytes(*message)) {
-      LogWarning("client plane: dropped a message: " +
-                 (message.ok() ? std::string(NameOf(*message)) + " with a payload of " + std::to_string(payload.size()) + " bytes"
-                               : message.status().message()));
+    Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(incoming->header(), payload.size());
+    if (!message.ok()) {
+      LogWarning("client plane: dropped a message: " + message.status().message());
       continue;
     }
     unanswered_since.reset();
@@ -198,7 +196,7 @@ bool Client::Impl::Receive() {
   return received;
 }
 
-void Client::Impl::Handle(AnyMessage& message, const Bytes& payload) {
+void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
   if (const auto* progress = std::get_if<FrameProgress>(&message)) {
     if (open.contains(progress->request)) events.push_back({progress->request, *progress});
   } else if (auto* reply = std::get_if<FrameReply>(&message)) {
@@ -363,13 +361,12 @@ RequestId Client::Submit(Question question, Duration deadline) {
   std::visit([id](auto& query) { query.nonce = id; }, question);
   const Time now = MonotonicNow();
   impl_->questions.emplace(id, OpenQuestion{now, now + deadline});
-  const AnyMessage message = std::visit([](auto& query) -> AnyMessage { return std::move(query); }, question);
   // What the service would refuse to decode is refused here, by the same rules.
-  if (Result<AnyMessage> checked = Decode(Encode(message)); !checked.ok()) {
+  if (const auto checked = Decode<ClientToCoordinator>(Encode(question), 0); !checked.ok()) {
     impl_->EndQuestion(id, checked.status());
   } else if (impl_->questions.size() > kMaxOpenQuestions) {
     impl_->EndQuestion(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenQuestions) + " questions may be open at once"));
-  } else if (const Status sent = impl_->Send(message); !sent.ok()) {
+  } else if (const Status sent = impl_->Send(question); !sent.ok()) {
     impl_->EndQuestion(id, Status::Unavailable("no service at " + impl_->endpoint + ": " + sent.message()));
   }
   return id;

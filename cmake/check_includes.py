@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Checks that every file includes only headers of targets that its own target links.
+"""Checks that every file includes only headers of targets that its own target links, and that renderers do not link each other.
 
     check_includes.py ROOT TARGETS
 
 TARGETS is written by SlabstreamIncludeCheck.cmake. A file may use what its target links, what those targets link publicly, and so
 on. A header that other targets include may use only what its target links publicly. A header belongs to the target that compiles
 the source of the same name; if none does, to the targets of its folder, or of the next folder above that has any. Headers without
-a source below tests/ belong to whoever includes them. Prints a line for each violation; exit status 1 if there is any.
+a source below tests/ belong to whoever includes them. A renderer is a folder of common/renderers or worker/renderers. Prints a line for each violation; exit status 1 if there is any.
 """
 import re
 import sys
@@ -23,6 +23,11 @@ class Target:
         self.sources = {self.folder / source for source in sources.split(";") if source and not Path(source).is_absolute()}
         self.public = names(interface)  # without $<LINK_ONLY:...>, the private links of a static library
         self.links = names(links) | self.public
+
+    def renderer(self):
+        """None: the target is no half of a renderer."""
+        above, name = self.folder.parent, self.folder.name
+        return name if above in (Path("common/renderers"), Path("worker/renderers")) else None
 
 
 def names(links):
@@ -66,7 +71,15 @@ class Check:
             elif match and (self.root / match.group(1)).is_file():
                 yield number, match.group(1), self.owners(Path(match.group(1)))
 
+    def linked_renderers(self):
+        halves = {name: target for name, target in self.targets.items() if target.renderer()}
+        for name, target in halves.items():
+            for link in sorted(target.links & halves.keys()):
+                if halves[link].renderer() != target.renderer():
+                    yield f"{target.folder}: {name} links {link}, which is of another renderer"
+
     def violations(self):
+        yield from self.linked_renderers()
         shared = {text for file in self.files for _, text, of in self.includes(file) if not self.owners(file) & of}
         for file in self.files:
             own = self.owners(file)

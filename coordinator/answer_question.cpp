@@ -16,7 +16,7 @@ struct Dataset {
   DatasetId id;
 };
 
-Result<AnyMessage> Answer(const SummaryQuery& query, const Dataset& dataset) {
+Result<QuestionReply> Answer(const SummaryQuery& query, const Dataset& dataset) {
   const VolumeSummary& summary = dataset.summary;
   Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
   if (!transfer.ok()) return transfer.status();
@@ -30,16 +30,16 @@ Result<AnyMessage> Answer(const SummaryQuery& query, const Dataset& dataset) {
                      .labels = {}};
   if (summary.label_table != nullptr) reply.labels = summary.label_table->labels;
   for (const double percent : kPercents) reply.percentiles.push_back({percent, PercentileOf(summary, percent)});
-  return AnyMessage(std::move(reply));
+  return QuestionReply(std::move(reply));
 }
 
-Result<AnyMessage> Answer(const SampleQuery& query, const Dataset& dataset) {
+Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
   SampleReply reply{.nonce = query.nonce};
   for (const Vec3& point : query.points) reply.samples.push_back(SampleAt(dataset.volume, dataset.summary, point));
-  return AnyMessage(std::move(reply));
+  return QuestionReply(std::move(reply));
 }
 
-Result<AnyMessage> Answer(const PickQuery& query, const Dataset& dataset) {
+Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   const Result<FrameSetup> setup = MakeFrameSetup(query.frame, dataset.id, dataset.summary);
   if (!setup.ok()) return setup.status();
   PickReply reply{.nonce = query.nonce};
@@ -47,12 +47,12 @@ Result<AnyMessage> Answer(const PickQuery& query, const Dataset& dataset) {
     reply.sample = SampleAtVoxel(dataset.volume, dataset.summary, dataset.summary.description.geometry.ToWorld(picked->at), picked->voxel);
     reply.depth = picked->depth;
   }
-  return AnyMessage(std::move(reply));
+  return QuestionReply(std::move(reply));
 }
 
 }  // namespace
 
-Result<AnyMessage> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples) {
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples) {
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   const ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
   const Dataset dataset{volume, *asked.summary, asked.dataset};

@@ -9,6 +9,6 @@
 namespace slabstream {
 
 // Errors: as of MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
-Result<AnyMessage> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples);
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples);
 
 }  // namespace slabstream

@@ -62,8 +62,8 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
                                                    const CountDataset& action) {
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
-  OccupancyGrid grid = renderer.draws_cells() ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
-                                              : count(samples.view(), drawn);
+  OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
+                                                     : count(samples.view(), drawn);
   AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
   return std::make_shared<const OccupancyGrid>(std::move(grid));
 }
@@ -140,7 +140,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
   return Post(
-      looks_, "a look at the files of a dataset",
+      looks_, "checking the files of a dataset",
       [action] {
         return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
       },
@@ -151,7 +151,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
   return Post(
-      looks_, "a look at the watched folders", [action] { return News{LookThrough(action)}; },
+      looks_, "searching the watched folders", [action] { return News{LookThrough(action)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};
@@ -174,10 +174,11 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
     return QuestionAnswered{id, OrderRefused{nonce, why}};
   };
   return Post(
-      answers_, "an answer to a question",
+      answers_, "answering a question",
       [action, refusal, samples = slabs_.Find(action.dataset)] {
-        const Result<AnyMessage> answer = AnswerTo(action, samples);
-        return News{answer.ok() ? QuestionAnswered{action.id, *answer} : refusal(answer.status())};
+        Result<QuestionReply> answer = AnswerTo(action, samples);
+        if (!answer.ok()) return News{refusal(answer.status())};
+        return News{QuestionAnswered{action.id, Widen<CoordinatorToClient>(*std::move(answer))}};
       },
       refusal);
 }
@@ -204,7 +205,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
 BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
   const auto whole = uploads_.extract(action.upload);
   return Post(
-      loads_, "the end of a volume",
+      loads_, "finishing a volume",
       [upload = action.upload, buffer = whole.mapped()] {
         return News{UploadFinished{upload, buffer->Finish()}};
       },

@@ -284,8 +284,7 @@ Result<LoadedSource> LoadSource(const DataSource& source) {
     if (!read.ok()) return read.status();
     return LoadedSource{std::move(read->volume), std::move(read->layers), std::make_shared<const FileStamp>(*stamp)};
   }
-  return Status::Unavailable(source.path.substr(0, source.path.find('?')) +
-                             ": the file is being written; it is read again when it is asked for again");
+  return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
 }
 
 }  // namespace slabstream

@@ -29,7 +29,7 @@ inline constexpr std::size_t kKeptAnswerBytesOfAll = std::size_t{64} << 20;  // 
 // What ended a request: its final FrameReply, or FrameFailed.
 struct Answer {
   RequestId request = 0;
-  AnyMessage message;
+  CoordinatorToClient message;
   Bytes payload;
   Time sent;
 };

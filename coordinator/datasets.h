@@ -2,7 +2,7 @@
 // is tried again at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that
 // nobody uses may be unloaded, the least recently used one first; they are loaded again when they are asked for.
 //
-// Names come and go, and files change. Voxels that the table does not have any more, but that frames are still rendered from, are retired:
+// Names come and go, and files change. Voxels that have left the table, but that frames are still rendered from, are retired:
 // they stay until no frame uses them.
 #pragma once
 

@@ -282,7 +282,7 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
   for (const WorkerId worker : out.workers) SendWorker(worker, out.assignment);
 }
 
-void FrameMachine::State::StopAll(const AnyMessage& goodbye, const std::string& reason) {
+void FrameMachine::State::StopAll(const CoordinatorToWorker& goodbye, const std::string& reason) {
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
   for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));

@@ -97,18 +97,18 @@ struct CoordinatorConfig {
 // ---- events
 struct FromWorker {
   PeerToken from = 0;
-  AnyMessage message;
+  WorkerToCoordinator message;
   Bytes payload;
 };
 struct FromClient {
   PeerToken from = 0;
-  AnyMessage message;
+  ClientToCoordinator message;
   Bytes payload = {};
 };
 // A SubmitFrame or question that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
   PeerToken from = 0;
-  AnyMessage answer;
+  CoordinatorToClient answer;
   Status why;
 };
 // The socket says that nobody is there.
@@ -149,7 +149,7 @@ struct DatasetsFound {
 // The end of an AnswerQuestion: a reply, or OrderRefused.
 struct QuestionAnswered {
   QuestionId question = 0;
-  AnyMessage answer;
+  CoordinatorToClient answer;
 };
 // The end of a BeginUpload: whether there is room.
 struct UploadBegun {
@@ -183,11 +183,11 @@ using CoordinatorEvent = std::variant<FromWorker, FromClient, BadRequest, Worker
 // ---- actions
 struct ToWorker {
   PeerToken to = 0;
-  AnyMessage message;
+  CoordinatorToWorker message;
 };
 struct ToClient {
   PeerToken to = 0;
-  AnyMessage message;
+  CoordinatorToClient message;
   Bytes payload;
 };
 // -> DatasetLoaded or DatasetFailed

@@ -121,7 +121,7 @@ void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {
   SendClient(client, answer.message, answer.payload);
 }
 
-void FrameMachine::State::EndRequest(PeerToken client, RequestId request, AnyMessage message, Bytes payload) {
+void FrameMachine::State::EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload) {
   SendClient(client, message, payload);
   clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
 }

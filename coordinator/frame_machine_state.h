@@ -19,7 +19,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/any_of.h"
 #include "coordinator/clients.h"
 #include "coordinator/datasets.h"
 #include "coordinator/frame_machine.h"
@@ -150,13 +149,6 @@ struct FrameMachine::State {
   bool IsFrom(const FromWorker& event, Epoch epoch, WorkerId worker) const {
     return epoch == config.epoch && roster.PeerOf(worker) == event.from;
   }
-  // Drops what no worker sends here.
-  template <AnyOf<Welcome, Ping, GroupAssignment, Retire, Stop, ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused,
-                  ImageReceived, SubmitFrame, FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery,
-                  StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery,
-                  SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
-                Message>
-  void OnWorkerMessage(const FromWorker&, const Message&) {}
 
   // ---- messages of clients
   void OnClientMessage(PeerToken client, const SubmitFrame& message);
@@ -172,19 +164,13 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const DropVolume& message);
   void OnClientMessage(PeerToken, const VolumePart&) {}  // see On(FromClient)
   void OnVolumePart(PeerToken client, const VolumePart& part, const Bytes& payload);
-  // Drops what no client sends.
-  template <
-      AnyOf<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop, ChunkRequest,
-            Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply,
-            ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataReply, SummaryReply, SampleReply, PickReply, VolumeCredit>
-          Message>
-  void OnClientMessage(PeerToken, const Message&) {}
+  void OnClientMessage(PeerToken, const KeysOrder&) {}  // its executor carries them out
 
   // ---- requests
   bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
   Status WithinQuota(PeerToken client) const;
   void SendQueued(const OpenRequest& request);
-  void EndRequest(PeerToken client, RequestId request, AnyMessage message, Bytes payload);
+  void EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload);
   using Refusal = std::uint64_t RefusedRequests::*;
   void RefuseRequest(const OpenRequest& request, const Status& status, Refusal reason);
   void FailRequest(const OpenRequest& request, const Status& status);
@@ -254,7 +240,7 @@ struct FrameMachine::State {
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker, LiveRoster::Loss loss);
   void RemoveWorker(WorkerId worker, LiveRoster::Loss loss);
-  void StopAll(const AnyMessage& goodbye, const std::string& reason);
+  void StopAll(const CoordinatorToWorker& goodbye, const std::string& reason);
   Ping MakePing(WorkerId to) const {
     return {.epoch = config.epoch,
             .finished_before = frames.finished_before(),
@@ -270,10 +256,10 @@ struct FrameMachine::State {
     if (level < config.log_level) return;
     actions.emplace_back(Note{about, level, fmt::format(format, std::forward<Values>(values)...)});
   }
-  void SendWorker(WorkerId worker, AnyMessage message) {
+  void SendWorker(WorkerId worker, CoordinatorToWorker message) {
     if (const Member* member = roster.Find(worker)) actions.emplace_back(ToWorker{.to = member->peer, .message = std::move(message)});
   }
-  void SendClient(PeerToken client, AnyMessage message, Bytes payload = {}) {
+  void SendClient(PeerToken client, CoordinatorToClient message, Bytes payload = {}) {
     clients.Sent(client, payload.size());
     actions.emplace_back(ToClient{.to = client, .message = std::move(message), .payload = std::move(payload)});
   }

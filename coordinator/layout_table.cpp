@@ -81,7 +81,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   if (known && policy.dynamic_balance) {
     if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
       better = Rebalance(*entry.layout, entry.seconds, with_cost(), entry.frames_seen);
-  } else if (known && !entry.by_cost && policy.load_metric == LoadMetric::kCost) {
+  } else if (known && !entry.by_cost && policy.balance_by == BalanceBy::kCost) {
     better = MakeLayout(with_cost());
     entry.by_cost = true;
   }
@@ -98,7 +98,7 @@ std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
   const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots), &Entry::key);
   if (found == entries_.end() || policy.dynamic_balance) return nullptr;
-  if (policy.load_metric == LoadMetric::kCost && !found->by_cost) return nullptr;
+  if (policy.balance_by == BalanceBy::kCost && !found->by_cost) return nullptr;
   entries_.splice(entries_.begin(), entries_, found);
   return entries_.front().layout;
 }

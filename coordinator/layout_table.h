@@ -1,6 +1,6 @@
 // LayoutTable: the layouts that frames are planned with, and the costs learnt from their render times.
 //
-// A layout is made once for a volume, transfer function, renderer, policy and number of slots, and stays whatever the view. Two things
+// A layout is made once for a volume, transfer function, renderer, policy and number of slots, and stays for all views. Two things
 // change it. If boxes are split by cost, it is made anew once, when costs are first known. With dynamic balance, it changes between frames
 // when Rebalance says so. Another number of slots (a worker has joined, a vacancy was given up) has another layout; learnt costs hold for
 // all of them.

@@ -13,7 +13,7 @@ class LookCounter {
   LookId Want() { return wanted_ = begun_ + 1; }  // the look that answers a question of now
   bool MustBegin() const { return begun_ == ended_ && wanted_ > begun_; }
   void Begin() { ++begun_; }
-  void End() { ended_ = begun_; }          // the one under way, if any, or its answer is not wanted any more
+  void End() { ended_ = begun_; }          // the one under way, if any, or its answer is no longer wanted
   LookId Last() const { return wanted_; }  // that was asked for
   bool UnderWay() const { return begun_ > ended_; }
   bool IsOver(LookId look) const { return look <= ended_; }

@@ -38,32 +38,32 @@ int Run(int argc, char** argv) {
   std::vector<std::string> data;
   bool compress = false;
 
-  CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams slabs to workers.", "slabstream-coordinator");
+  CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams boxes to workers.", "slabstream-coordinator");
   SetUp(app, std::string(Version()));
-  app.add_option("--listen", options.client_endpoint, "Where clients reach the service; port * is any")
+  app.add_option("--listen", options.client_endpoint, "Address for clients; port * takes any free port")
       ->type_name("ENDPOINT")
       ->default_str(options.client_endpoint);
-  app.add_option("--worker-listen", options.worker_endpoint, "Where workers reach it")
+  app.add_option("--worker-listen", options.worker_endpoint, "Address for workers")
       ->type_name("ENDPOINT")
       ->default_str("the next port, or the path with .workers");
-  app.add_option("--slabs-listen", options.slabs_endpoint, "Where workers get voxels")
+  app.add_option("--slabs-listen", options.slabs_endpoint, "Address from which workers get voxels")
       ->type_name("ENDPOINT")
       ->default_str("any port, or the path with .slabs");
   app.add_option("--keys", options.keys_folder,
-                 "Encrypt tcp connections with the keys of this folder, which is made if it does not exist and gets the service files "
-                 "client.json, worker.json and admin.json; needed by addresses that are not loopback")
+                 "Encrypt tcp connections with the keys in this folder; make it, with the service files client.json, worker.json and "
+                 "admin.json, if it does not exist; required for addresses that are not loopback")
       ->type_name("FOLDER");
   AddRepeated(app, "--data", data, kDataHelp)->type_name("NAME=FILE");
-  app.add_flag("--compress", compress, "Pack voxels for workers with zstd: pays on links slower than about 300 MB/s, not within a machine");
+  app.add_flag("--compress", compress,
+               "Pack voxels for workers with zstd: saves time on links slower than about 300 MB/s, not within a machine");
   options.machine.memory_bytes = DefaultMemory().coordinator;
   AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
-            "Limit of its memory. Datasets that nobody needs are unloaded, least recently used first")
+            "Memory limit. Datasets that no request needs are unloaded, least recently used first")
       ->type_name("SIZE")
       ->default_str(fmt::format("a quarter of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
   options.surroundings.link = *ParseLink("--link", kDefaultLink);
-  AddParsed(
-      app, "--link", options.surroundings.link, ParseLink,
-      "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
+  AddParsed(app, "--link", options.surroundings.link, ParseLink,
+            "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
       ->type_name("LINK")
       ->default_str(kDefaultLink);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {

@@ -1,7 +1,7 @@
 // PolicyTable: the choices made for open policies ("auto"), and what was predicted of their frames.
 //
 // A choice is made once for a volume, transfer function, renderer, policy and set of workers, with the first frame that asks for it
-// (ChoosePolicy). Its partition then stays whatever the view, so that turning the view moves no voxels. Combining moves none, so the scheme
+// (ChoosePolicy). Its partition then stays for all views, so turning the view moves no voxels. Combining moves none, so the scheme
 // is chosen anew for each kind of view. When costs are first measured, the choice is made once more: another partition must then be
 // predicted to gain kRevisitGain. Measured render times correct later predictions.
 //

@@ -5,7 +5,7 @@
 // period, so that a replacement takes over its boxes and nobody else's voxels move; then it is given up, and the slots after it move down.
 // A worker that had a slot before, of an earlier coordinator too, gets the same one if it is vacant. So the first worker of an earlier
 // coordinator brings the number of slots with it, and for return_wait the others are awaited.
-// A worker that is leaving has no slot any more, but is a member until it is removed.
+// A worker that is leaving has no slot, but is a member until it is removed.
 #pragma once
 
 #include <cstdint>

@@ -305,7 +305,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .groups = group_count(),
                              .attempts = attempt(),
                              .decomposition = std::string(policy.decomposition->name),
-                             .load_metric = std::string(NameOf(policy.load_metric)),
+                             .balance_by = std::string(NameOf(policy.balance_by)),
                              .axis = std::string(1, Letter(policy.axis)),
                              .assignment = std::string(policy.assignment->name),
                              .balance = request_.submit.frame.policy.balance,

@@ -72,8 +72,8 @@ struct CoordinatorService::Impl {
   void ReceiveFromWorkers();
   // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
   std::optional<Role> RoleOf(const Incoming& incoming) const { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
-  bool CarryOut(const Incoming& incoming, const AnyMessage& message, Role role);
-  void Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload, const CoordinatorEvent& gone);
+  bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
+  void Send(Socket& socket, PeerTable& peers, PeerToken to, MessageView message, const Bytes& payload, const CoordinatorEvent& gone);
 
   // One for each kind of action.
   void Perform(ToWorker& action) { Send(control, worker_peers, action.to, action.message, {}, WorkerGone{action.to}); }
@@ -161,7 +161,7 @@ void CoordinatorService::Impl::HandleEvent(CoordinatorEvent event) {
 
 // A peer is gone if it cannot be reached, does not take its messages, or cannot be sent one for want of memory. The machine hears of it
 // after the actions at hand, not between them.
-void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, const AnyMessage& message, const Bytes& payload,
+void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, MessageView message, const Bytes& payload,
                                     const CoordinatorEvent& gone) {
   const std::string* identity = peers.IdentityOf(to);
   const Status sent = identity == nullptr ? Status::Unavailable("forgotten connection")
@@ -178,7 +178,8 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
     if (!incoming) return;
     if (!RoleOf(*incoming)) continue;
     Bytes payload = incoming->payload();
-    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(Plane::kControl, incoming->header(), payload.size()); });
+    Result<WorkerToCoordinator> message =
+        Guarded("decoding", [&] { return Decode<WorkerToCoordinator>(incoming->header(), payload.size()); });
     if (!message.ok()) {
       complaints.Warning("control plane: dropped a message: " + message.status().message());
       continue;
@@ -193,12 +194,12 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     if (!incoming) return;
     const std::optional<Role> role = RoleOf(*incoming);
     if (!role) continue;
-    Result<AnyMessage> message =
-        Guarded("decoding", [&] { return DecodeOn(Plane::kClient, incoming->header(), incoming->payload().size()); });
+    Result<ClientToCoordinator> message =
+        Guarded("decoding", [&] { return Decode<ClientToCoordinator>(incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
-      if (std::optional<AnyMessage> refusal = RefusalOf(incoming->header(), message.status())) {
+      if (std::optional<CoordinatorToClient> refusal = RefusalOf(incoming->header(), message.status())) {
         HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});
       }
       continue;
@@ -209,8 +210,8 @@ void CoordinatorService::Impl::ReceiveFromClients() {
 }
 
 // True: the message was an order about keys, or one that its sender may not give. Datasets may be listed by every client.
-bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const AnyMessage& message, Role role) {
-  const auto reply = [&](const AnyMessage& answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
+bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role) {
+  const auto reply = [&](MessageView answer) { (void)clients.Send(incoming.identity, Encode(answer)); };
   const auto refuse = [&](std::uint64_t nonce, std::string why) { reply(OrderRefused{nonce, Status::InvalidArgument(std::move(why))}); };
   if (const auto* end = std::get_if<ShutDown>(&message); end != nullptr && role != Role::kAdmin) {
     refuse(end->nonce, fmt::format("ending the service needs the service file of role admin, not {}", NameOf(role)));

@@ -21,11 +21,11 @@ class ServiceKeys {
   // Once the planes are bound: writes the service files, with new keys where they are missing. Errors of KeyFolder::Publish.
   Status Publish(const std::string& client_endpoint, const std::string& worker_endpoint);
 
-  // Of the sender of a message that came over an encrypted connection; nullopt: its key is not admitted any more.
+  // Of the sender of a message that came over an encrypted connection; nullopt: its key is no longer admitted.
   std::optional<Role> RoleOf(const Incoming& incoming) const;
 
   struct Done {
-    AnyMessage answer;                   // KeysReply or OrderRefused
+    CoordinatorToClient answer;          // KeysReply or OrderRefused
     std::optional<std::string> revoked;  // a public key whose connections must end
   };
   Done CarryOut(const KeysOrder& order);

@@ -135,20 +135,16 @@ void SlabServer::Run(const std::stop_token& stop) {
 }
 
 void SlabServer::Answer(const Incoming& incoming) {
-  const Result<AnyMessage> decoded = DecodeOn(Plane::kSlabs, incoming.header(), incoming.payload().size());
-  const auto* request = decoded.ok() ? std::get_if<ChunkRequest>(&*decoded) : nullptr;
-  if (request == nullptr) {
-    complaints_.Warning("slabs plane: dropped " + (decoded.ok() ? std::string(NameOf(*decoded)) : decoded.status().message()));
-    return;
-  }
-  if (request->epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
+  const Result<WorkerToSlabs> decoded = Decode<WorkerToSlabs>(incoming.header(), incoming.payload().size());
+  if (!decoded.ok()) return complaints_.Warning("slabs plane: dropped a message: " + decoded.status().message());
+  const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
+  if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
   const Status served = Guarded("chunk request", [&] {
-    const Samples samples = Find(request->dataset);
-    if (Status status = Check(*request, samples); !status.ok()) return status;
-    Chunk chunk{.epoch = epoch_, .dataset = request->dataset, .box = request->box, .chunk = request->chunk};
-    Result<Bytes> cut = IsCellChunk(request->chunk)
-                            ? CutCells(samples, *request, chunk)
-                            : Cut(samples, request->box, PartOfChunk(request->box, samples.types(), request->chunk));
+    const Samples samples = Find(request.dataset);
+    if (Status status = Check(request, samples); !status.ok()) return status;
+    Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+    Result<Bytes> cut = IsCellChunk(request.chunk) ? CutCells(samples, request, chunk)
+                                                   : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
     if (!cut.ok()) return cut.status();
     const Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
     const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
@@ -157,7 +153,7 @@ void SlabServer::Answer(const Incoming& incoming) {
   });
   if (served.ok()) return;
   complaints_.Warning(served.message());
-  const ChunkRefused refused{epoch_, request->dataset, request->box, request->chunk, served};
+  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, served};
   (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
 }
 

@@ -59,7 +59,7 @@ class Gateway::Impl : public HttpApplication {
   Status Start() {
     if (!options_.listen.loopback && !options_.tls && options_.proxy_origin.empty()) {
       return Status::InvalidArgument(
-          fmt::format("--listen {} leaves this machine: that needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
+          fmt::format("--listen {} is not loopback: it needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
     }
     if (Status status = CheckToken(options_.token); !status.ok()) return status;
     Result<std::unique_ptr<HttpServer>> server =
@@ -186,6 +186,10 @@ class Gateway::Impl : public HttpApplication {
                                                       static const std::string text = JsonText(OpenApi());
                                                       return HttpReply{.body = text};
                                                     })};
+    routes["/api/v1/options"] = {.open = true, .handle = answer([] {
+                                                 static const std::string text = JsonText(OfferedOptions());
+                                                 return HttpReply{.body = text};
+                                               })};
     routes["/api/v1/status"] = {
         .handle = answer([this] { return news_->health == ServiceHealth::kGone ? ServiceGone() : JsonReply(StatusJson(news_->status)); })};
     routes["/api/v1/datasets"] = {.handle = answer([this] {
@@ -249,7 +253,7 @@ class Gateway::Impl : public HttpApplication {
 
   HttpReply NoToken() {
     CountRefusal("token");
-    HttpReply answer = Failure(401, "the token is missing or wrong; it stands in the address that the gateway printed");
+    HttpReply answer = Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed");
     answer.headers.emplace_back("WWW-Authenticate", "Bearer");
     return answer;
   }

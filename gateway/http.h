@@ -51,7 +51,7 @@ class BodyStream {
   virtual ~BodyStream() = default;
   // Calls `next` once, later: with the next bytes; with none, at the end; or with an error, which cuts the connection off.
   virtual void Read(std::function<void(Result<std::string>)> next) = 0;
-  // Nobody reads it any more. Drops `next`.
+  // It is no longer read. Drops `next`.
   virtual void Abandon() = 0;
 };
 

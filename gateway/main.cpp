@@ -58,23 +58,22 @@ Status Serve(Options options) {
 
 int Run(int argc, char** argv) {
   Options options;
-  CLI::App app("Slabstream gateway: pictures of a service for browsers and scripts, over HTTP and WebSockets.", "slabstream-gateway");
+  CLI::App app("Slabstream gateway: serves pictures to browsers and scripts, over HTTP and WebSockets.", "slabstream-gateway");
   SetUp(app, std::string(Version()));
   AddService(app, options.service);
   AddParsed(app, "--listen", options.gateway.listen, ParseListenAddress,
-            "Where it is reached: an address of this machine; port 0 is any free one. Addresses that are not loopback need TLS or a proxy")
+            "Address of this machine to listen at; port 0 takes any free port. Addresses that are not loopback need TLS or a proxy")
       ->type_name("HOST:PORT")
       ->default_str("127.0.0.1:0");
   CLI::Option* const certificate =
-      app.add_option("--tls-cert", options.tls.certificate, "Speak TLS with this certificate, and those that vouch for it (PEM)")
-          ->type_name("FILE");
-  CLI::Option* const key = app.add_option("--tls-key", options.tls.key, "Its private key (PEM)")->type_name("FILE");
+      app.add_option("--tls-cert", options.tls.certificate, "Certificate for TLS, with its chain (PEM)")->type_name("FILE");
+  CLI::Option* const key = app.add_option("--tls-key", options.tls.key, "Private key of the certificate (PEM)")->type_name("FILE");
   certificate->needs(key);
   key->needs(certificate);
   AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
-            "A proxy in front of it ends TLS and is reached at this address, such as https://viewer.example.org")
+            "Public address of a proxy that ends TLS, such as https://viewer.example.org")
       ->type_name("ORIGIN");
-  app.add_option("--token-file", options.token_file, "Ask for the token in this file, 16 to 128 letters, digits, - and _")
+  app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
       ->type_name("FILE")
       ->default_str("a new random one at each start");
   return RunService(app, argc, argv, "gateway", [&] { return Serve(std::move(options)); });

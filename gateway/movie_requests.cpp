@@ -41,7 +41,8 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
                                                std::int64_t{width} * height, kMaxMoviePixels));
   }
   if (request.render.frame.view.eye && request.turns > 0) {
-    return Status::InvalidArgument("--eye stands still, but a turntable turns by --azimuth, about --look-at; turns=0 keeps the view still");
+    return Status::InvalidArgument(
+        "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; turns=0 fixes the view");
   }
   if (Status status = CheckShape(StreamFormat(), {request.render.frame.size, *fps}); !status.ok()) return status;
   if (Status status = CheckCanDraw(request.render.format.annotations); !status.ok()) return status;

@@ -16,40 +16,49 @@
 namespace slabstream {
 namespace {
 
-bool IsRequired(std::string_view name) { return name == "dataset" || name == "x" || name == "y" || name == "at"; }
+// Fields are as DescribeOptions has them.
 
-Json SchemaOf(const FieldDescription& field) {
-  Json schema = {{"type", field.value.empty() ? "boolean" : field.value == "NUMBER" ? "number" : "string"}};
-  if (field.repeated) return {{"type", "array"}, {"items", std::move(schema)}};
+std::string TextOf(const Json& field, const char* name) { return field.value(name, std::string()); }
+
+Json SchemaOf(const Json& field) {
+  const std::string type = TextOf(field, "type");
+  Json schema = {{"type", type.empty() ? "boolean" : type == "NUMBER" ? "number" : type == "N" ? "integer" : "string"}};
+  if (field.contains("choices")) schema["enum"] = field["choices"];
+  if (field.contains("max") && schema["type"] != "string") {
+    schema["minimum"] = field.contains("above") ? field["above"] : field["min"];
+    if (field.contains("above")) schema["exclusiveMinimum"] = true;
+    schema["maximum"] = field["max"];
+  }
+  if (field.contains("repeatable")) return {{"type", "array"}, {"items", std::move(schema)}};
   return schema;
 }
 
-std::string DescriptionOf(const FieldDescription& field) {
-  std::string text = field.purpose;
-  if (!field.value.empty()) text += " [" + field.value + "]";
-  if (!field.standard.empty()) text += " (default: " + field.standard + ")";
+std::string DescriptionOf(const Json& field) {
+  std::string text = TextOf(field, "help");
+  if (field.contains("type")) text += " [" + TextOf(field, "type") + "]";
+  if (field.contains("default")) text += " (default: " + TextOf(field, "default") + ")";
   return text;
 }
 
-Json Parameters(const std::vector<FieldDescription>& fields) {
+Json Parameters(const Json& fields) {
   Json parameters = Json::array();
-  for (const FieldDescription& field : fields) {
-    parameters.push_back({{"name", field.name},
+  for (const Json& field : fields) {
+    parameters.push_back({{"name", field["name"]},
                           {"in", "query"},
-                          {"required", IsRequired(field.name)},
+                          {"required", field.contains("required")},
                           {"description", DescriptionOf(field)},
-                          {"x-group", field.group},
+                          {"x-group", field["group"]},
                           {"schema", SchemaOf(field)}});
   }
   return parameters;
 }
 
-Json Body(const std::vector<FieldDescription>& fields) {
+Json Body(const Json& fields) {
   Json properties = Json::object();
-  for (const FieldDescription& field : fields) {
+  for (const Json& field : fields) {
     Json property = SchemaOf(field);
     property["description"] = DescriptionOf(field);
-    properties[field.name] = std::move(property);
+    properties[TextOf(field, "name")] = std::move(property);
   }
   return {{"required", false},
           {"content", {{"application/json", {{"schema", {{"type", "object"}, {"properties", std::move(properties)}}}}}}}};
@@ -74,20 +83,20 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
 struct Operation {
   const char *path, *summary, *type;
   bool open = false;
-  std::vector<FieldDescription> fields = {};
+  Json fields = Json::array();
   bool takes_post = false;
 };
 
 // Those of `fields` with these names.
-std::vector<FieldDescription> Named(const std::vector<FieldDescription>& fields, std::initializer_list<std::string_view> names) {
-  std::vector<FieldDescription> named;
-  for (const FieldDescription& field : fields) {
-    if (std::find(names.begin(), names.end(), field.name) != names.end()) named.push_back(field);
+Json Named(const Json& fields, std::initializer_list<std::string_view> names) {
+  Json named = Json::array();
+  for (const Json& field : fields) {
+    if (std::find(names.begin(), names.end(), TextOf(field, "name")) != names.end()) named.push_back(field);
   }
   return named;
 }
 
-std::vector<FieldDescription> With(std::vector<FieldDescription> fields, const std::vector<FieldDescription>& more) {
+Json With(Json fields, std::initializer_list<Json> more) {
   fields.insert(fields.begin() + 1, more.begin(), more.end());  // behind the dataset
   return fields;
 }
@@ -109,16 +118,22 @@ Json Describe(const Operation& operation) {
 
 }  // namespace
 
+Json OfferedOptions() { return {{"render", RenderFields()}, {"slice", SliceFields()}}; }
+
 Json OpenApi() {
-  const std::vector<FieldDescription> render = RenderFields(), dataset = Named(render, {"dataset"});
-  const auto field = [](const char* name, const char* purpose, const char* value, const std::string& standard = "") {
-    return FieldDescription{.name = name, .group = "Options", .purpose = purpose, .value = value, .standard = standard};
+  const Json render = RenderFields(), dataset = Named(render, {"dataset"});
+  const auto field = [](const char* name, const char* help, const char* type, const std::string& standard = "") {
+    Json json = {{"name", name}, {"group", "Options"}, {"type", type}, {"help", help}};
+    json[standard.empty() ? "required" : "default"] = standard.empty() ? Json(true) : Json(standard);
+    return json;
   };
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
       {"/readyz", "The service answers and has a worker", "text/plain", true},
       {"/metrics", "Counters and histograms for Prometheus", "text/plain"},
       {"/api/v1/openapi.json", "This document", "application/json", true},
+      {"/api/v1/options", "The options of pictures and slices with their limits, as `slabstream options` prints them", "application/json",
+       true},
       {"/api/v1/status", "The service: workers, frames, memory", "application/json"},
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
       {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, render, true},
@@ -130,7 +145,8 @@ Json OpenApi() {
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
       {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
-      {"/api/v1/value", "What a dataset holds at a point", "application/json", false, With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
+      {"/api/v1/value", "The voxel, value and label of a dataset at a point", "application/json", false,
+       With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,

@@ -11,4 +11,7 @@ inline constexpr char kPointHelp[] = "A point of the world";
 
 Json OpenApi();
 
+// The options of pictures and slices, as DescribeOptions has them: {"render", "slice"}.
+Json OfferedOptions();
+
 }  // namespace slabstream

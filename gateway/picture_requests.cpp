@@ -73,12 +73,12 @@ void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& 
   record.request = render->frame;
   record.format = render->format;
   Json files = Json::object();  // those that the line names
-  const auto add = [&files](const TransferChoice& transfer, const char* name) {
-    const auto* function = std::get_if<TransferFunction>(&transfer.choice);
+  const auto add = [&files](const auto& shown, const char* name) {
+    const auto* function = std::get_if<TransferFunction>(&shown.choice);
     if (function != nullptr) files[name] = FormatParaViewColorMap(*function, name);
   };
   add(render->frame.transfer, kColorMapFile);
-  if (render->frame.overlay) add(render->frame.overlay->transfer, kOverlayMapFile);
+  if (render->frame.overlay) add(*render->frame.overlay, kOverlayMapFile);
   reply(JsonReply({{"command", CommandText(record, "picture.png")}, {"files", std::move(files)}}));
 }
 

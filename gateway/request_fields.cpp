@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "common/base/printable.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 
 namespace slabstream {
 

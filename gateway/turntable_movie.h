@@ -45,7 +45,7 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
  private:
   Status RenderAndEncode();
   Status StartEncoder();
-  // Waits for the frame. Errors are the service's; Cancelled: nobody reads any more.
+  // Waits for the frame. Errors are the service's; Cancelled: it is no longer read.
   Result<Picture> Take(int index);
   void ReadSome();
   void Answer(Result<std::string> part);

@@ -55,8 +55,8 @@ class Conditions {
   virtual void AfterStep(Node) {}
 
   // ---- messages. They may be changed on their way; the coordinator's leave at `sent`
-  virtual Arrivals ToWorker(Node to, AnyMessage& message, double sent) = 0;
-  virtual Arrivals ToCoordinator(Node from, AnyMessage& message) = 0;
+  virtual Arrivals ToWorker(Node to, CoordinatorToWorker& message, double sent) = 0;
+  virtual Arrivals ToCoordinator(Node from, WorkerToCoordinator& message) = 0;
   virtual Arrivals ToPeer(Node to, Job& sends) = 0;  // its SendPartial
 
   // ---- the coordinator

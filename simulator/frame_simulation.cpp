@@ -13,7 +13,7 @@ namespace slabstream {
 namespace {
 
 constexpr Duration kNever = std::chrono::hours(24 * 40);  // as milliseconds it fits 32 bits
-constexpr double kAlarm = 20 * 24 * 3600.0;               // seconds: what is due that much later is an alarm of a machine
+constexpr double kAlarm = 20 * 24 * 3600.0;               // seconds: an event due later than this is an alarm of a machine
 constexpr Epoch kEpoch = 1;
 constexpr PeerToken kClient = ~std::uint32_t{0};
 constexpr char kDataset[] = "simulated";
@@ -41,7 +41,7 @@ CoordinatorConfig MakeCoordinatorConfig() {
 WorkerConfig MakeWorkerConfig(std::uint32_t index) {
   WorkerConfig config;
   config.incarnation = index + 1;
-  config.cache_bytes = 0;  // costs alone say whether voxels are fetched, whatever earlier frames had
+  config.cache_bytes = 0;  // costs alone say whether voxels are fetched; earlier frames do not matter
   config.credit_bytes = ~std::uint64_t{0} >> 1U;
   config.register_interval = config.chunk_timeout = kNever;
   config.early_image_bytes = ~std::uint64_t{0} >> 1U;
@@ -287,12 +287,12 @@ WorkerEvent FrameSimulation::Answer(Job& job) {
 
 // ---------------------------------------------------------------- messages
 
-Arrivals FrameSimulation::ToWorker(Node, AnyMessage& message, double sent) {
+Arrivals FrameSimulation::ToWorker(Node, CoordinatorToWorker& message, double sent) {
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) BeginGroup(*assignment);
   return Arrivals::At(sent + machine_.link.latency_seconds);
 }
 
-Arrivals FrameSimulation::ToCoordinator(Node, AnyMessage& message) {
+Arrivals FrameSimulation::ToCoordinator(Node, WorkerToCoordinator& message) {
   if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) CHECK(false) << trouble->status.message();
   double arrival = service_.now() + machine_.link.latency_seconds;
   if (const auto* picture = std::get_if<FrameImage>(&message)) {

@@ -53,8 +53,8 @@ class FrameSimulation : private Conditions {
   void OnWorked(const Job& job, const LaneTask& task) override;
   WorkerEvent Answer(Job& job) override;
   void Perform(Node node, SendChunkRequest& action) override;
-  Arrivals ToWorker(Node to, AnyMessage& message, double sent) override;
-  Arrivals ToCoordinator(Node from, AnyMessage& message) override;
+  Arrivals ToWorker(Node to, CoordinatorToWorker& message, double sent) override;
+  Arrivals ToCoordinator(Node from, WorkerToCoordinator& message) override;
   Arrivals ToPeer(Node to, Job& sends) override;
   void BeforeStep(const CoordinatorEvent& event) override;
   void Perform(ToClient& action) override;

@@ -111,9 +111,10 @@ void SimulatedService::Perform(ToWorker& action) {
   if (arrivals.nobody) TellCoordinator(now(), WorkerGone{action.to});
   for (int i = 0; i < arrivals.count; ++i) {
     const double arrival = wakes ? threads_.Begin(Threads::Machine(*node), arrivals.times[i]) : arrivals.times[i];
-    AnyMessage message = i + 1 < arrivals.count ? action.message : std::move(action.message);
-    queue_.At(arrival,
-              [this, to = *node, received = MessageReceived{std::move(message), {}}]() mutable { StepWorker(to, std::move(received)); });
+    CoordinatorToWorker message = i + 1 < arrivals.count ? action.message : std::move(action.message);
+    queue_.At(arrival, [this, to = *node, received = MessageReceived{Widen<MessageToWorker>(std::move(message)), {}}]() mutable {
+      StepWorker(to, std::move(received));
+    });
   }
 }
 
@@ -212,7 +213,7 @@ void SimulatedService::Finish(std::uint32_t place) {
   StepWorker(node, conditions_.Answer(job));
 }
 
-void SimulatedService::SendToCoordinator(Node from, AnyMessage message, const Bytes& payload) {
+void SimulatedService::SendToCoordinator(Node from, WorkerToCoordinator message, const Bytes& payload) {
   const Arrivals arrivals = conditions_.ToCoordinator(from, message);
   for (int i = 0; i < arrivals.count; ++i) {
     queue_.At(threads_.Begin(Threads::kCoordinator, arrivals.times[i]), [this, from, message, payload] {

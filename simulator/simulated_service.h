@@ -31,7 +31,7 @@ class SimulatedService {
   EventQueue& queue() { return queue_; }
   double now() const { return queue_.now(); }
   Time time() const { return TimeAt(now()); }  // as machines see it
-  // When the next event is due; infinity: nothing happens any more.
+  // When the next event is due; infinity: nothing more happens.
   double next();
   void RunNext();
 
@@ -59,7 +59,7 @@ class SimulatedService {
   void HoldCoordinator(double until) { coordinator_held_ = std::max(coordinator_held_, until); }
   void HoldWorker(Node node, double until) { workers_[node].held = std::max(workers_[node].held, until); }
   bool Held(Node node) const { return now() < workers_[node].held; }
-  // The coordinator's clock jumps forward, and stays that much ahead.
+  // The coordinator's clock jumps forward, and stays ahead.
   void JumpCoordinator(Duration by);
 
   // How often in a row a machine asked to be woken at once, the coordinator's included.
@@ -94,7 +94,7 @@ class SimulatedService {
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 
-  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action).Take(), {}); }
+  void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
   void Perform(Node, ConnectSlabs&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
@@ -109,7 +109,7 @@ class SimulatedService {
   Job& JobAt(std::uint32_t place) { return jobs_[place / kChunk][place % kChunk]; }
   void OnWorked(const LaneTask& task);
   void Finish(std::uint32_t place);
-  void SendToCoordinator(Node from, AnyMessage message, const Bytes& payload);
+  void SendToCoordinator(Node from, WorkerToCoordinator message, const Bytes& payload);
   void SendToPeer(std::uint32_t place);
   void Deliver(std::uint32_t place);
 

@@ -75,7 +75,7 @@ class GroupRun {
   static constexpr std::uint32_t kNone = StepOrder::kNoNote;
   struct Arrival {  // a place in arrivals_. The first one of a step is noted for its turn
     ImagePiece piece;
-    bool taken = false;          // the piece has no image any more
+    bool taken = false;          // the piece has given its image away
     std::uint32_t next = kNone;  // the next piece of the step, or the next unused place
   };
 

@@ -38,7 +38,7 @@ int Run(int argc, char** argv) {
   bool frames_only = false;
   static constexpr Duration kLongestDrain = std::chrono::hours(24);
 
-  CLI::App app("Slabstream worker: renders slabs and combines images for a coordinator.", "slabstream-worker");
+  CLI::App app("Slabstream worker: renders boxes and combines images for a coordinator.", "slabstream-worker");
   SetUp(app, std::string(Version()));
   CLI::Option* coordinator =
       app.add_option("--coordinator", options.coordinator_endpoint, "The coordinator's endpoint for workers, such as tcp://127.0.0.1:7421")
@@ -47,34 +47,34 @@ int Run(int argc, char** argv) {
       ->type_name("FILE")
       ->default_str("$SLABSTREAM_SERVICE, if there is no --coordinator")
       ->excludes(coordinator);
-  app.add_option("--listen", options.images_endpoint, "Where other workers send partial images")
+  app.add_option("--listen", options.images_endpoint, "Address for images from other workers")
       ->type_name("ENDPOINT")
-      ->default_str("any port beside the coordinator");
+      ->default_str("any port, at the address that reaches the coordinator");
   AddInteger(app, "--threads", options.machine.threads, 1, int(kMaxThreads), "Render threads");
   options.machine.memory_bytes = DefaultMemory().worker;
   AddParsed(app, "--memory", options.machine.memory_bytes, ParseMemoryLimit,
-            "Limit of its memory: voxels and images. It gets no frame that needs more")
+            "Memory limit for voxels and images. The worker gets no frame that needs more")
       ->type_name("SIZE")
       ->default_str(fmt::format("half of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
   AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames")->default_str("what --memory leaves");
   AddOptionalValue(app, "--compress", compress, "on", OneOf({"auto", "on", "off"}),
-                   "Pack images with zstd. auto: for workers behind links that are slower than zstd. on, which --compress alone means: "
+                   "Pack images with zstd. auto: for workers behind links that are slower than zstd. on (--compress alone): "
                    "all images, and the pictures for clients. off: none")
       ->type_name("[=MODE]")
       ->default_str(compress);
   AddParsed(
       app, "--drain", options.machine.drain,
       [](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongestDrain); },
-      "On SIGTERM or SIGINT: how long it may finish what it has begun, while it gets no new work. It ends as soon as nothing needs it. 0s, "
-      "or a second signal: at once")
+      "Time to finish begun work after SIGTERM or SIGINT. The worker gets no new work, and ends as soon as no frame needs it. 0s, or a "
+      "second signal: at once")
       ->type_name("TIME")
       ->default_str("30s");
-  app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host in frames as well");
+  app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host over sockets, too");
   return RunService(app, argc, argv, "worker " + std::to_string(::getpid()), [&] {
     if (options.coordinator_endpoint.empty()) {
       const char* const variable = std::getenv("SLABSTREAM_SERVICE");
       if (service.empty() && variable != nullptr) service = variable;
-      if (service.empty()) return Status::InvalidArgument("--coordinator or --service is missing: where the service is");
+      if (service.empty()) return Status::InvalidArgument("--coordinator or --service is missing");
       const Result<ServiceFile> file = ReadServiceFile(service);
       if (!file.ok()) return file.status();
       if (file->role != Role::kWorker)

@@ -59,7 +59,7 @@ Result<BorrowedImage> PeerMemory::Borrow(const SharedImage& image, PixelFormat f
   view.depth = reinterpret_cast<const float*>(first[1]);
   view.voxel = reinterpret_cast<const std::uint32_t*>(first[2]);
   Clip(view, range, frame.width());
-  if (!borrowed.Intact()) return Status::DataLoss("shared image: it is not lent any more");
+  if (!borrowed.Intact()) return Status::DataLoss("shared image: it is no longer lent");
   return borrowed;
 }
 

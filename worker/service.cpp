@@ -45,7 +45,7 @@ Incarnation RandomIncarnation() {
 }
 
 // The worker that sent a message of the images plane.
-WorkerId SenderOf(const AnyMessage& message) {
+WorkerId SenderOf(const MessageToWorker& message) {
   if (const auto* partial = std::get_if<PartialImage>(&message)) return partial->from_worker;
   if (const auto* refused = std::get_if<ImageRefused>(&message)) return refused->from_worker;
   const auto* received = std::get_if<ImageReceived>(&message);
@@ -85,18 +85,19 @@ struct WorkerService::Impl {
 
   void Run();
   Status Loop();  // not ok: why the worker leaves though nobody told it to
+  template <class Messages>
   void Receive(Socket& socket, Plane plane);
   // False: the key of the connection is not that of the worker whom the message names.
-  bool ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const;
+  bool ComesFromItsSender(const Incoming& incoming, const MessageToWorker& message) const;
   void HandleEvent(WorkerEvent event);
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
   void LookAtConnections();
-  void Remember(const AnyMessage& message);
-  bool OpenShared(const AnyMessage& message);
+  void Remember(const MessageToWorker& message);
+  bool OpenShared(const MessageToWorker& message);
   void Refuse(const PartialImage& partial);
-  void Acknowledge(const AnyMessage& message, std::size_t payload_bytes);
-  bool Answer(WorkerId sender, const AnyMessage& message);
+  void Acknowledge(const MessageToWorker& message, std::size_t payload_bytes);
+  bool Answer(WorkerId sender, MessageView message);
   // Workers with the same scope are on this host; 0: unknown.
   bool OnThisHost(const Peer& peer) const { return options.machine.memory_scope != 0 && peer.memory_scope == options.machine.memory_scope; }
   bool IsTimed(const Peer& peer) const;
@@ -112,7 +113,7 @@ struct WorkerService::Impl {
   void Perform(Action& action) {
     executor->Perform(std::move(action));
   }
-  void Send(Socket& socket, const AnyMessage& message);
+  void Send(Socket& socket, MessageView message);
 
   Context& context;
   const WorkerOptions options;
@@ -166,9 +167,9 @@ Status WorkerService::Impl::Loop() {
     Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     if (executor->broken()) throw std::runtime_error("a task could not report its failure");
     for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
-    Receive(control, Plane::kControl);
-    Receive(images, Plane::kImages);
-    if (slabs) Receive(*slabs, Plane::kSlabs);
+    Receive<CoordinatorToWorker>(control, Plane::kControl);
+    Receive<WorkerToWorker>(images, Plane::kImages);
+    if (slabs) Receive<SlabsToWorker>(*slabs, Plane::kSlabs);
     const Time now = MonotonicNow();
     if (machine.NextWake() <= now) HandleEvent(Tick{});
     if (now >= next_look) {
@@ -199,34 +200,36 @@ void WorkerService::Impl::LookAtConnections() {
 }
 
 // Only what belongs to the plane is heard: everybody may send to the images plane, the coordinator alone to the others.
+template <class Messages>
 void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = socket.TryReceive();
     if (!incoming) return;
     Bytes payload = incoming->payload();
-    Result<AnyMessage> message = Guarded("decoding", [&] { return DecodeOn(plane, incoming->header(), payload.size()); });
-    if (!message.ok()) {
-      complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + message.status().message());
+    Result<Messages> decoded = Guarded("decoding", [&] { return Decode<Messages>(incoming->header(), payload.size()); });
+    if (!decoded.ok()) {
+      complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + decoded.status().message());
       continue;
     }
-    if (!ComesFromItsSender(*incoming, *message)) {
+    MessageToWorker message = Widen<MessageToWorker>(*std::move(decoded));
+    if (!ComesFromItsSender(*incoming, message)) {
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message of another worker than it says");
       continue;
     }
-    Remember(*message);
-    Acknowledge(*message, payload.size());
-    if (OpenShared(*message)) HandleEvent(MessageReceived{std::move(*message), std::move(payload)});
+    Remember(message);
+    Acknowledge(message, payload.size());
+    if (OpenShared(message)) HandleEvent(MessageReceived{std::move(message), std::move(payload)});
   }
 }
 
-bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const AnyMessage& message) const {
+bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const MessageToWorker& message) const {
   if (incoming.user.empty()) return true;
   const Peer* const sender = others.Find(SenderOf(message));
   return sender == nullptr || sender->images_key == incoming.user;
 }
 
 // Handles memory shared between workers, and the links between them: the machine knows nothing of either.
-void WorkerService::Impl::Remember(const AnyMessage& message) {
+void WorkerService::Impl::Remember(const MessageToWorker& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (welcome->epoch != epoch || welcome->worker != machine.worker()) {
       LogInfo("registered as worker " + std::to_string(welcome->worker) + " at " + options.coordinator_endpoint);
@@ -254,14 +257,14 @@ void WorkerService::Impl::Remember(const AnyMessage& message) {
   }
 }
 
-void WorkerService::Impl::Acknowledge(const AnyMessage& message, std::size_t payload_bytes) {
+void WorkerService::Impl::Acknowledge(const MessageToWorker& message, std::size_t payload_bytes) {
   const auto* partial = std::get_if<PartialImage>(&message);
   if (partial == nullptr || partial->acknowledge == 0 || payload_bytes < kLeastAcknowledgedBytes || partial->epoch != epoch) return;
   Answer(partial->from_worker, ImageReceived{epoch, machine.worker(), partial->acknowledge});  // without it, the sender asks again
 }
 
 // False: the sender is not known yet.
-bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
+bool WorkerService::Impl::Answer(WorkerId sender, MessageView message) {
   const Peer* const peer = others.Find(sender);
   if (peer == nullptr) return false;
   const Status sent = peers.Send(*peer, Encode(message), {}, MonotonicNow());
@@ -270,7 +273,7 @@ bool WorkerService::Impl::Answer(WorkerId sender, const AnyMessage& message) {
 }
 
 // True if the message is for the machine. A shared image is, only if it can be read here.
-bool WorkerService::Impl::OpenShared(const AnyMessage& message) {
+bool WorkerService::Impl::OpenShared(const MessageToWorker& message) {
   if (const auto* refused = std::get_if<ImageRefused>(&message)) {
     if (refused->epoch == epoch && takes_frames_only.insert(refused->from_worker).second) {
       LogWarning("worker " + std::to_string(refused->from_worker) + " cannot read this worker's memory: its images travel in frames");
@@ -332,14 +335,14 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
 }
 
 // Lost messages are not sent again here: registration, heartbeats and requests repeat.
-void WorkerService::Impl::Send(Socket& socket, const AnyMessage& message) {
+void WorkerService::Impl::Send(Socket& socket, MessageView message) {
   if (const Status sent = socket.Send({}, Encode(message)); !sent.ok())
     LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
 }
 
 void WorkerService::Impl::Perform(SendControl& action) {
   if (auto* done = std::get_if<GroupDone>(&action.message)) executor->AddSent(done->key, done->reports);
-  Send(control, std::move(action).Take());
+  Send(control, action.message);
 }
 
 void WorkerService::Impl::Perform(StopProcess& action) {

@@ -1,6 +1,6 @@
 // WorkerService: runs a WorkerMachine over ZeroMQ.
 //
-// One thread owns all sockets and runs the machine; those of the Executor compute. So heartbeats are on time whatever is computed. If a
+// One thread owns all sockets and runs the machine; those of the Executor compute. So heartbeats are on time during any computation. If a
 // task throws, its group fails, and the coordinator is told at once. If the thread that runs the machine throws, or the coordinator refuses
 // the worker's key, the worker leaves and logs why.
 #pragma once
@@ -41,7 +41,7 @@ class WorkerService {
   void WaitUntilRegistered();
 
   // From any thread or a signal handler; return at once.
-  void RequestLeave();  // ends when nothing needs it any more, after the machine's `drain` at the latest. The second time: like RequestStop
+  void RequestLeave();  // ends when no frame needs it, after the machine's `drain` at the latest. The second time: like RequestStop
   void RequestStop();   // ends now
   void WaitUntilStopped();
   bool stopped() const;

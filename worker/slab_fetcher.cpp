@@ -138,7 +138,7 @@ std::uint64_t SlabFetcher::BegunBytes() const {
 void SlabFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions) {
   const ChunkPlace place{chunk.box, chunk.chunk};
   Slab* slab = FindRequested(chunk.dataset, place);
-  if (slab == nullptr) return;  // a duplicate, or nobody waits for it any more
+  if (slab == nullptr) return;  // a duplicate, or nobody waits for it now
   InFlight& request = in_flight_.at({slab->key.generation, place});
   if (chunk.chunk == kFirstCellChunk) {
     SetCellBytes(*slab, chunk.cell_bytes);

@@ -62,13 +62,7 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(PartialImage&& partial, const Bytes& payload);
-  // Drops what a worker sends, what its service handles (ImageRefused, ImageReceived), and the messages of the client plane.
-  template <AnyOf<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave, ChunkRequest, ImageRefused, ImageReceived, SubmitFrame,
-                  FrameProgress, FrameReply, FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown,
-                  ShutDownReply, KeysOrder, KeysReply, OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery,
-                  SampleReply, PickQuery, PickReply, AddVolume, VolumeCredit, VolumePart, DropVolume>
-                Message>
-  void On(const Message&, const Bytes&) {}
+  void On(const AnyOf<ImageRefused, ImageReceived> auto&, const Bytes&) {}  // its service handles them
 
   // ---- registration
   bool Heard(Epoch from);  // false: not from the coordinator that this worker is registered with

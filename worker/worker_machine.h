@@ -7,7 +7,7 @@
 // holds, also from another coordinator: the names of datasets outlive coordinators.
 //
 // Leaving (LeaveRequested): it says so in each heartbeat and goes on with what it has, until the coordinator stops it, or until `drain` is
-// over, or until it is not registered any more.
+// over, or until it is no longer registered.
 //
 // A group on this worker:
 //   GroupAssignment   fetch the voxels of its boxes that no cached slab holds (chunk requests within the byte credit); a box that is
@@ -91,8 +91,9 @@ struct IncomingImage {
 };
 
 // ---- events
+using MessageToWorker = Merged<CoordinatorToWorker, SlabsToWorker, WorkerToWorker>;
 struct MessageReceived {
-  AnyMessage message;
+  MessageToWorker message;
   Bytes payload;
 };  // from any plane; payload lengths are already checked, runs are checked when they are combined
 struct ChunkStored {
@@ -141,10 +142,7 @@ using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, Combi
 
 // ---- actions
 struct SendControl {
-  std::variant<Register, Heartbeat, GroupDone, WorkerTrouble, Leave> message;
-  AnyMessage Take() && {
-    return std::visit([](auto& each) { return AnyMessage(std::move(each)); }, message);
-  }
+  WorkerToCoordinator message;
 };
 struct SendChunkRequest {
   ChunkRequest request;

@@ -33,7 +33,7 @@ void DeclareRender(const CommandLine& line) {
   auto options = std::make_shared<RenderOptions>();
   sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
   AddFrameOptions(*sub, options->frame);
-  sub->add_flag("--previews", options->frame.request.previews, "Write the picture anew after each group, nearest first (see --groups)");
+  AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
   RunWith(*sub, line.run, options, RunRender);
 }
 
@@ -43,19 +43,19 @@ void DeclareTurntable(const CommandLine& line) {
   auto options = std::make_shared<TurntableOptions>();
   sub->option_defaults()->group(kOutputGroup);
   AddParsed(*sub, "-o,--output", options->output, ParseTurntableOutput,
-            "The pictures: a name with a place for the number, such as 'frame_%04d.png'; or a movie, " + MovieEndings() +
-                ", which the program ffmpeg makes")
+            "Pictures: a name with a place for the number, such as 'frame_%04d.png'; or a movie, " + MovieEndings() +
+                ", encoded by the program ffmpeg")
       ->required()
       ->type_name("PATTERN|MOVIE");
   AddParsed(
       *sub, "--frames", options->frames,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxTurntableFrames); },
-      "How many frames, which are spread evenly over turns and times")
+      "Number of frames, spread evenly over turns and times")
       ->type_name("N")
-      ->default_str("one for each time, if there are several");
+      ->default_str("one for each time of --time");
   AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
   AddParsed(*sub, "--time", options->times, ParseTimeRange,
-            "Which of the volumes in a file of several, such as a time series; counted from 0, FIRST and LAST included")
+            "Which volumes of a file with several, such as a time series; counted from 0, FIRST and LAST included")
       ->type_name("T|FIRST:LAST");
   AddParsed(
       *sub, "--fps", options->frames_per_second,
@@ -65,13 +65,13 @@ void DeclareTurntable(const CommandLine& line) {
       kFramesPerSecondHelp)
       ->type_name("NUMBER")
       ->default_str(fmt::format("{:g}", MovieShape().frames_per_second));
-  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "How many frames are requested at the same time");
+  AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
   AddFrameOptions(*sub, options->frame, {"time"});
   RunWith(*sub, line.run, options, RunTurntable);
 }
 
 void DeclareSlice(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("slice", "Render planes through a volume, or slabs of it");
+  CLI::App* sub = line.app.add_subcommand("slice", "Render planes or thick slabs of a volume");
   auto options = std::make_shared<SliceOptions>();
   sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
   AddSliceOptions(*sub, *options);
@@ -80,20 +80,21 @@ void DeclareSlice(const CommandLine& line) {
 
 void DeclareInfo(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand(
-      "info", "Describe a volume file (size, samples, values, histogram, occupancy), an unstructured grid or a picture (how it was made)");
+      "info", "Print size, type, orientation and values of a volume file, the cells of an unstructured grid, or the record of a picture");
   auto options = std::make_shared<InfoOptions>();
   CLI::Option* source =
       sub->add_option("SOURCE", options->path, "A volume file, as FILE or FILE:TRANSFER, or a picture, .png or .exr")->required();
-  AddTransferOptions(*sub, options->transfer);
+  for (const char* name : {"transfer", "scalar-range", "opacity-distance"})
+    AddRequestOption(*sub, *FindRequestOption(name), options->request);
   AddLayerFiles(*sub, options->layers);
   AddReadOptions(*sub);
-  ResolveSource(*sub, source, options->path, options->transfer, [] { return true; });
+  ResolveSource(*sub, source, options->path, options->request.transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunInfo);
 }
 
 void DeclareValue(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("value", "Print what a dataset or a volume file holds at points: voxel, value, label");
+  CLI::App* sub = line.app.add_subcommand("value", "Print voxel, value and label at points of a dataset or a volume file");
   auto options = std::make_shared<ValueOptions>();
   AddSource(*sub, options->source, options->connection);
   AddRepeated(*sub, "--at", options->points, "A point of the world")->required()->type_name("X,Y,Z");
@@ -103,12 +104,12 @@ void DeclareValue(const CommandLine& line) {
 }
 
 void DeclareTransfer(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("transfer", "Print a preset transfer function as JSON that --transfer takes");
+  CLI::App* sub = line.app.add_subcommand("transfer", "Print a preset transfer function as JSON for --transfer");
   auto options = std::make_shared<TransferOptions>();
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
   AddParsed(
-      *sub, "PRESET", options->transfer.choice,
+      *sub, "PRESET", options->request.transfer.choice,
       [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
         const Result<std::string> name = is_name(option, text);
         if (!name.ok()) return name.status();
@@ -116,8 +117,8 @@ void DeclareTransfer(const CommandLine& line) {
       },
       "Which" + Explained(TransferPresets()))
       ->required();
-  sub->add_option("SOURCE", options->path, "The volume file that it is made for: presets depend on the values of the volume")->required();
-  AddScalarRange(*sub, options->transfer);
+  sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values")->required();
+  AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);
   AddReadOptions(*sub);
   sub->parse_complete_callback([sub, options] { options->path = WithReadOptions(*sub, options->path); });
   RunWith(*sub, line.run, options, RunTransfer);
@@ -136,9 +137,9 @@ void DeclareConvert(const CommandLine& line) {
         return status.ok() ? Result(parsed.type) : status;
       },
       "Type of the samples in OUTPUT: " + SampleTypeNames() +
-          "; every value must fit. It is also that of raw samples in SOURCE, unless ?type=... stands there")
+          "; every value must fit. Raw samples in SOURCE have this type too, unless SOURCE says ?type=...")
       ->type_name("TYPE")
-      ->default_str("that of SOURCE, or the smallest that holds its values");
+      ->default_str("the type of SOURCE, or the smallest that holds its values");
   sub->add_flag("--progress", options->progress, "Show progress on stderr");
   AddReadOptions(*sub, {"type"});
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
@@ -173,31 +174,31 @@ void DeclareUp(const CommandLine& line) {
   AddThreads(*sub, options->threads, "Render threads of each worker");
   AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("NAME=FILE");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
-            "Where clients reach the service: an address of this machine; port * is any free one. Addresses that are not loopback get keys")
+            "Address of this machine for clients; port * takes any free port. An address that is not loopback gets keys")
       ->type_name("ENDPOINT")
       ->default_str(options->listen);
   AddOptionalValue(
       *sub, "--compress", options->compress, "on", OneOf({"auto", "on", "off"}),
-      "Compress images with zstd. auto: between workers whose link is slower than the compression. on, which --compress alone means: all "
-      "images between workers, and pictures for clients behind a slow tunnel. off: never")
+      "Compress images with zstd. auto: between workers whose link is slower than zstd. on (--compress alone): all images between workers, "
+      "and pictures for clients behind a slow tunnel. off: never")
       ->type_name("[=MODE]")
       ->default_str("auto");
   AddParsed(
       *sub, "--link", options->link,
       [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); },
-      "Between workers of different hosts, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
+      "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
       ->type_name("LINK")
       ->default_str(kDefaultLink);
-  sub->add_option("--keys", options->keys, "Encrypt connections with the keys of this folder, which is made if need be")
+  sub->add_option("--keys", options->keys, "Encrypt connections with the keys in this folder; make it if it does not exist")
       ->type_name("FOLDER")
-      ->default_str("a folder beside the logs if --listen leaves this machine, else none");
+      ->default_str("a folder beside the logs if --listen is not loopback, else none");
   options->memory = DefaultServiceMemory();
   AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit,
-            "Limit of the memory of all processes: a third is the coordinator's, the rest is shared by the workers")
+            "Memory limit of all processes: the coordinator gets a third, the workers share the rest")
       ->type_name("SIZE")
       ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
-  AddLogLevel(*sub, line.log_level)->default_str("info of the processes that it starts, warning of its own");
+  AddLogLevel(*sub, line.log_level)->default_str("info for the processes that it starts, warning for itself");
   sub->callback([&run = line.run, options, &log_level = line.log_level] {
     run = [options, &log_level] {
       options->log_level = log_level;
@@ -207,12 +208,13 @@ void DeclareUp(const CommandLine& line) {
 }
 
 void DeclareView(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("view", "Look at a volume in the browser: starts what is missing, and ends it at Ctrl-C");
+  CLI::App* sub =
+      line.app.add_subcommand("view", "Show a volume in the browser; starts a service and a gateway if needed, and ends them at Ctrl-C");
   auto options = std::make_shared<ViewOptions>();
-  sub->add_option("SOURCE", options->source, "A volume file, which gets a service of its own, or a dataset's name at the service")
+  sub->add_option("SOURCE", options->source, "A volume file, which a new service serves, or the name of a dataset at the service")
       ->required();
   AddService(*sub, options->service);
-  sub->add_option("--listen", options->listen, "Where the gateway is reached; port 0 is any free one")
+  sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
       ->type_name("HOST:PORT")
       ->default_str(options->listen);
   sub->add_flag("!--no-browser", options->browser, "Only print the address");
@@ -247,18 +249,18 @@ void DeclareKeys(const CommandLine& line) {
   };
   declare("list", "List the public keys, their roles and when they were made", KeysAction::kList);
   const auto [rotate, rotate_options] =
-      declare("rotate", "Put a new key into the service file of a role; the old ones hold until they are revoked", KeysAction::kRotate);
+      declare("rotate", "Put a new key into the service file of a role; old keys stay valid until they are revoked", KeysAction::kRotate);
   AddChoice<Role, kRoles.size()>(*rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
                                  kRoles, "client, worker or admin")
       ->required();
-  const auto [revoke, revoke_options] = declare("revoke", "Admit a key no longer and end its connections", KeysAction::kRevoke);
+  const auto [revoke, revoke_options] = declare("revoke", "Revoke a key and end its connections", KeysAction::kRevoke);
   revoke->add_option("KEY", revoke_options->order.key, "The id of a key, or the public key itself, as `slabstream keys list` shows them")
       ->required();
 }
 
 void DeclareData(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand(
-      "data", "List the datasets of a running service; add, remove and reload them, as its admin where it has keys");
+      "data", "List, add, remove and reload datasets of a running service; changes need an admin's key if the service has keys");
   sub->require_subcommand(1);
   const auto declare = [&](const char* name, const char* purpose, DataAction action) {
     CLI::App* order = sub->add_subcommand(name, purpose);
@@ -269,18 +271,18 @@ void DeclareData(const CommandLine& line) {
     RunWith(*order, line.run, options, RunData);
     return std::pair(order, options);
   };
-  declare("list", "Show each dataset: how far it is loaded, its size, its samples, and what is wrong with it", DataAction::kList);
-  const auto [add, add_options] = declare(
-      "add", "Add volumes, or folders to watch, by paths of the coordinator's host, for as long as the coordinator runs", DataAction::kAdd);
-  add->add_option("DATA", add_options->order.items, "As --data of `slabstream up` takes it, NAME=FILE or a folder, with an absolute path")
+  declare("list", "Print each dataset: state, size, samples and last error", DataAction::kList);
+  const auto [add, add_options] =
+      declare("add", "Add volumes, or folders to watch, until the coordinator ends; paths are on the coordinator's host", DataAction::kAdd);
+  add->add_option("DATA", add_options->order.items, "NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
       ->required();
   const auto [remove, remove_options] =
-      declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files stay. Frames that have begun are finished",
+      declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files are not deleted, and running frames finish",
               DataAction::kRemove);
   remove->add_option("NAME", remove_options->order.items, "Names of datasets, or the absolute paths of watched folders")->required();
-  const auto [reload, reload_options] = declare(
-      "reload", "Read the files anew at the next frame, even if they look the same. Frames that have begun are finished as they began",
-      DataAction::kReload);
+  const auto [reload, reload_options] =
+      declare("reload", "Read the files again at the next frame, even if they seem unchanged. Running frames finish with the old voxels",
+              DataAction::kReload);
   reload->add_option("NAME", reload_options->order.items, "Names of datasets")->required();
 }
 
@@ -288,12 +290,12 @@ void DeclareLogs(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("logs", "Print the logs of a service that `up` started on this machine, in order of time");
   auto options = std::make_shared<LogsOptions>();
   AddService(*sub, options->service);
-  sub->add_flag("--follow", options->follow, "Go on with new lines until the service ends, or Ctrl-C");
+  sub->add_flag("--follow", options->follow, "Print new lines until the service ends, or Ctrl-C");
   constexpr Duration kLongest = std::chrono::hours(24 * 365);
   AddParsed(
       *sub, "--since", options->since,
       [kLongest](const std::string& option, const std::string& text) { return ParseDuration(option, text, kLongest); },
-      "Leave out older lines: 30s, 10m or 2h")
+      "Skip older lines: 30s, 10m or 2h")
       ->type_name("TIME")
       ->default_str("the beginning");
   RunWith(*sub, line.run, options, RunLogs);
@@ -306,15 +308,15 @@ void DeclareSlurm(const CommandLine& line) {
   AddInteger(*sub, "--workers-per-node", options->workers_per_node, 1, kMaxWorkersPerNode, "Worker processes on each node");
   AddInteger(*sub, "--threads", options->threads, 1, int(kMaxThreads),
              "Render threads of each worker, for nodes that are shared with other jobs")
-      ->default_str("nodes are the job's alone, and their cores are divided by the workers");
+      ->default_str("the job gets whole nodes, and workers divide their cores");
   AddParsed(*sub, "--time", options->time, ParseTimeLimit, "Time limit of the job, as Slurm takes it: 90 (minutes), 1:30:00, 2-12:00:00")
       ->type_name("TIME")
       ->default_str("the partition's");
   AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
   AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("NAME=FILE");
-  sub->add_option("--folder", options->folder, "The folder, shared by all nodes, in which each job makes one for its service files")
+  sub->add_option("--folder", options->folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
       ->type_name("FOLDER")
-      ->default_str("the one from which the job is submitted");
+      ->default_str("the folder from which the job is submitted");
   AddRepeated(*sub, "--sbatch", options->directives, "A further option for sbatch, without its dashes, such as partition=long")
       ->type_name("OPTION");
   RunWith(*sub, line.run, options, RunSlurm);

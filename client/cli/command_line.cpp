@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "client/cli/commands.h"
-#include "client/cli/option_description.h"
 #include "client/cli/option_groups.h"
+#include "client/request/option_description.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
 #include "common/cli/program.h"
@@ -68,7 +68,7 @@ void DeclareHelp(const CommandLine& line) {
 // `options COMMAND`, for programs.
 CLI::App* DeclareOptions(const CommandLine& line) {
   return DeclareAbout(line, "options", "Print the options of a command as JSON",
-                      [](CLI::App& found, const std::string&) { std::cout << DescribeOptions(found); });
+                      [](CLI::App& found, const std::string&) { std::cout << DescribeOptions(found).dump(1) << "\n"; });
 }
 
 // A number after --local is its value, as with --local=4; anything else is not, so that a SOURCE after a bare --local stays the source.

@@ -15,7 +15,7 @@ namespace {
 Status EndRemains(const ServiceState& remains) {
   EndProcesses(remains, Duration::zero());
   ForgetState(remains);
-  std::cout << fmt::format("the coordinator of {} had ended; its {} workers are down now; logs are in {}\n", remains.endpoint,
+  std::cout << fmt::format("the coordinator of {} had already ended; stopped its {} workers; logs are in {}\n", remains.endpoint,
                            remains.workers.size(), remains.log_directory);
   return Status::Ok();
 }

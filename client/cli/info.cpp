@@ -74,10 +74,9 @@ std::string OrientationText(const VolumeFileInfo& info) {
   const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
   std::string text = fmt::format("extent       {:.6g} x {:.6g} x {:.6g}{}\n", extent.x, extent.y, extent.z,
                                  orientation.world == World::kPatient ? " mm" : "");
-  if (orientation.world == World::kVoxels) return text + "orientation  not known: x, y and z are those of the voxels\n";
-  text +=
-      fmt::format("orientation  {}\n", orientation.world == World::kPatient ? "of a patient: x to the right, y to anterior, z to superior"
-                                                                            : "axes of the file's own");
+  if (orientation.world == World::kVoxels) return text + "orientation  unknown: x, y and z are the axes of the voxels\n";
+  text += fmt::format("orientation  {}\n", orientation.world == World::kPatient ? "patient: x to the right, y to anterior, z to superior"
+                                                                                : "scene: the file's own axes");
   text += fmt::format("origin       {:.6g} {:.6g} {:.6g}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z);
   for (std::size_t i = 0; i < 3; ++i) {
     text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, info.steps[i]));
@@ -206,7 +205,7 @@ Status RunInfo(const InfoOptions& options) {
   if (!series.ok()) return series.status();
   if (NeedsChoice(*series, options.path)) {
     std::cout << (options.json ? JsonText({{"format", "DICOM"}, {"series", SeriesJson(*series)}})
-                               : SeriesText(*series) + "several series are volumes: --series NUMBER or --series UID takes one\n");
+                               : SeriesText(*series) + "several series are volumes: choose one with --series NUMBER or --series UID\n");
     return Status::Ok();
   }
   if (!options.json) std::cout << SeriesText(*series);
@@ -214,14 +213,14 @@ Status RunInfo(const InfoOptions& options) {
   if (!loaded.ok()) return loaded.status();
   const VolumeSummary summary = Summarize(*loaded->volume);
 
-  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, summary);
+  const Result<TransferFunction> transfer = ResolveTransfer(options.request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
   const double occupancy = EstimateOccupancy(summary, *transfer);
 
   const Result<Layers> layers = ReadLayers(options.layers, loaded->info.description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
 
-  const std::string name = TransferName(options.transfer);
+  const std::string name = TransferName(options.request.transfer);
   std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series, *layers)
                              : InfoText(loaded->info, summary, name, occupancy) + LayersText(*layers));
   return Status::Ok();

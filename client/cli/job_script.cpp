@@ -27,7 +27,7 @@ is_over() {
 }
 
 # Runs the workers of this node until the service ends. A coordinator that was requeued runs elsewhere: it writes another
-# service file, and the workers start anew. After a notice the workers leave, but this waits on: Slurm does not requeue a
+# service file, and the workers restart. After a notice the workers leave, but this waits on: Slurm does not requeue a
 # preempted job that ends by itself.
 run_workers() {
   local file="" waited step
@@ -107,7 +107,7 @@ while kill -0 "$coordinator" 2> /dev/null; do # a trap ends `wait` early
   wait "$coordinator"
   status=$?
 done
-if [[ "$ended_by_slurm" == no ]]; then # nobody will start the coordinator anew
+if [[ "$ended_by_slurm" == no ]]; then # nobody will restart the coordinator
   touch "$folder/ended"
   scancel --quiet --state=PENDING "$SLURM_ARRAY_JOB_ID"
   wait
@@ -144,8 +144,7 @@ std::string TextOf(const JobScript& script) {
   for (const std::string& data : script.data) text += fmt::format("{}--data {}", text.ends_with('(') ? "" : " ", ShellWord(data));
   text += fmt::format(")\ndataset={}\nworkers={}\n", ShellWord(script.dataset), script.workers_per_node);
   text += fmt::format("threads={}\n", script.threads > 0 ? std::to_string(script.threads) : "$((SLURM_CPUS_ON_NODE / workers))");
-  text += fmt::format("drain={}s # that workers have to finish what they have, after a notice\n",
-                      script.notice_seconds - script.notice_seconds / 4);
+  text += fmt::format("drain={}s # for workers to finish their work after a notice\n", script.notice_seconds - script.notice_seconds / 4);
   text += "patience=600 # seconds without a coordinator after which workers end\n";
   return text + std::string(kBody);
 }

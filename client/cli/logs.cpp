@@ -62,7 +62,7 @@ Result<ServiceState> ServiceHere(const ServiceChoice& choice) {
   if (!state) state = FindRemains(endpoint);
   if (state) return *std::move(state);
   return Status::Unavailable(
-      fmt::format("no service{} that `slabstream up` of this user started on this host; logs lie on the host where a service was started",
+      fmt::format("`slabstream up` of this user started no service{} on this host; logs are on the host where a service was started",
                   endpoint.empty() ? "" : " at " + endpoint));
 }
 

@@ -11,6 +11,7 @@
 
 #include "client/cli/input_volume.h"
 #include "client/request/json_value.h"
+#include "common/renderers/registry.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
 
@@ -42,8 +43,8 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::opt
   text += fmt::format("low corner   {:.6g} {:.6g} {:.6g}\n", bounds.low.x, bounds.low.y, bounds.low.z);
   text += fmt::format("extent       {:.6g} x {:.6g} x {:.6g}\n", extent.x, extent.y, extent.z);
   const Index3 lattice = LatticeOf(bounds, std::int64_t(loaded.mesh.tetrahedra.size()), longest_side).size;
-  text += fmt::format("lattice      {} x {} x {} voxels (--lattice): renderer 'slice' draws the cells, others draw values on the lattice\n",
-                      lattice.x, lattice.y, lattice.z);
+  text += fmt::format("lattice      {} x {} x {} voxels (--lattice); renderers that draw the cells instead: {}\n", lattice.x, lattice.y,
+                      lattice.z, NamesOfAble(Ability::kCells));
   text += "arrays       name, of what, components, type\n";
   for (const MeshArray& array : info.arrays) {
     text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, ToString(array.type));
@@ -73,7 +74,7 @@ Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
 }  // namespace
 
 Status RunMeshInfo(const InfoOptions& options) {
-  if (options.transfer != TransferChoice{} || options.layers.any()) {
+  if (options.request.transfer != TransferChoice{} || options.layers.any()) {
     return Status::InvalidArgument(
         fmt::format("SOURCE '{}' is an unstructured grid; transfer functions and layers are for volumes", options.path));
   }

@@ -18,11 +18,12 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   app.option_defaults()->group("Service");
   const std::string every_core = std::to_string(std::min(CoreCount(), kMaxLocalWorkers));
   const auto parse = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxLocalWorkers); };
-  CLI::Option* local = AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
-                                        fmt::format("Render the file SOURCE in this process, by N workers, or by one a core ({} here) if N "
-                                                    "is left out; needs no service",
-                                                    every_core))
-                           ->type_name("[N]");
+  CLI::Option* local =
+      AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
+                       fmt::format("Render the file SOURCE in this process, with N workers, or with one per core ({} here) if N "
+                                   "is left out; needs no service",
+                                   every_core))
+          ->type_name("[N]");
   AddThreads(app, connection.local_threads, "Render threads of each worker of --local")->needs(local);
   AddService(app, connection.service);
 }
@@ -66,7 +67,7 @@ std::string WithReadOptionsOfFile(const CLI::App& app, const std::string& source
   std::string with_options = WithReadOptions(app, source);
   if (with_options != source && !is_file) {
     throw CLI::ValidationError(
-        fmt::format("'{}' is a dataset at the service; options for reading its file stand where the service names it, as in --data {}",
+        fmt::format("'{}' is a dataset at the service; give options for reading its file where the service names it, as in --data {}",
                     source, WithReadOptions(app, "NAME=FILE")));
   }
   return with_options;
@@ -113,8 +114,8 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
 void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except) {
   app.option_defaults()->group("Options");
   CLI::Option* source = app.add_option("SOURCE", options.source,
-                                       "A dataset's name at the service, or with --local a volume file; followed by :TRANSFER it says "
-                                       "what --transfer says")
+                                       "A dataset's name at the service, or with --local a volume file; append :TRANSFER to choose "
+                                       "its transfer function")
                             ->required();
   AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
@@ -122,10 +123,10 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list
   ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });
   app.option_defaults()->group(kOutputGroup);
   app.add_flag("!--no-record", options.record,
-               "Do not write into pictures how they were made: SOURCE, options and version, which `slabstream info PICTURE` shows");
-  app.add_option("--save-camera", options.camera_path, "Write the view, for --camera")->type_name("FILE");
+               "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");
+  app.add_option("--save-camera", options.camera_path, "Write the view to a file for --camera")->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
-  app.add_option("--trace", options.trace_path, "Write what each worker did and when, for Perfetto or chrome://tracing")->type_name("FILE");
+  app.add_option("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing")->type_name("FILE");
   app.add_flag("--progress", options.progress, "Show progress on stderr");
 }
 

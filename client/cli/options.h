@@ -72,13 +72,13 @@ struct SliceOptions {
 struct InfoOptions {
   std::string path;
   LayerFiles layers;
-  TransferChoice transfer;
+  FrameRequest request;  // its transfer function alone
   bool json = false;
 };
 
 struct TransferOptions {
-  TransferChoice transfer;  // a preset
-  std::string path;         // the volume that it is made for
+  FrameRequest request;  // its transfer function alone, a preset
+  std::string path;      // the volume that it is made for
 };
 
 struct ConvertOptions {

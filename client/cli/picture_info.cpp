@@ -54,9 +54,9 @@ std::string HeaderText(const PictureHeader& header) {
 }
 
 // Null: a preset.
-const TransferFunction* OwnTransfer(const TransferChoice& transfer) { return std::get_if<TransferFunction>(&transfer.choice); }
+const TransferFunction* OwnTransfer(const auto& shown) { return std::get_if<TransferFunction>(&shown.choice); }
 const TransferFunction* OverlayTransfer(const PictureRecord& record) {
-  return record.request.overlay ? OwnTransfer(record.request.overlay->transfer) : nullptr;
+  return record.request.overlay ? OwnTransfer(*record.request.overlay) : nullptr;
 }
 
 std::string RecordLines(const PictureRecord& record, const std::string& output) {
@@ -94,7 +94,7 @@ Json PictureJson(const PictureHeader& header, const std::optional<PictureRecord>
 }  // namespace
 
 Status RunPictureInfo(const InfoOptions& options) {
-  if (options.transfer != TransferChoice{}) {
+  if (options.request.transfer != TransferChoice{}) {
     return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture; transfer functions are for volumes", options.path));
   }
   if (options.layers.any()) return Status::InvalidArgument(fmt::format("SOURCE '{}' is a picture, which has no layers", options.path));

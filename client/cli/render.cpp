@@ -19,11 +19,11 @@
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "client/movie/turntable.h"
-#include "client/request/camera_json.h"
+#include "client/request/request_options.h"
 #include "common/base/files.h"
 #include "common/frame/dataset_name.h"
 #include "common/planning/frame_plan.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -91,7 +91,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);
   if (!frames.ok()) return frames;
   if (!options.camera_path.empty()) {
-    const std::string text = ViewJson(options.request.view).dump(1) + "\n";
+    const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";
     if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;
   }
   if (!options.stats_path.empty()) {
@@ -137,7 +137,7 @@ std::string FileOf(const TurntableOptions& options, int index) {
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
     return Status::InvalidArgument(
-        "--eye stands still, but a turntable turns by --azimuth, about --look-at; --turns 0 keeps the view still");
+        "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; --turns 0 fixes the view");
   }
   if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
   const std::string first_output = FileOf(options, 0);

@@ -12,9 +12,9 @@ Status RunTransfer(const TransferOptions& options) {
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
   if (!loaded.ok()) return loaded.status();
-  const Result<TransferFunction> transfer = ResolveTransfer(options.transfer, SummaryOf(*loaded->volume));
+  const Result<TransferFunction> transfer = ResolveTransfer(options.request.transfer, SummaryOf(*loaded->volume));
   if (!transfer.ok()) return transfer.status();
-  std::cout << FormatParaViewColorMap(*transfer, std::get<std::string>(options.transfer.choice));
+  std::cout << FormatParaViewColorMap(*transfer, std::get<std::string>(options.request.transfer.choice));
   return Status::Ok();
 }
 

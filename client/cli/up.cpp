@@ -98,7 +98,7 @@ class LocalService {
     while (!signals.Wait(milliseconds(200))) {
       if (const auto end = children_.front().process->Ended()) {
         if (end->exit_status == 0) return Status::Ok();  // `slabstream down`, from another terminal
-        return Status::Unavailable(fmt::format("the coordinator {}; its last words: {}", end->description, LastLogLine(LogOf(0))));
+        return Status::Unavailable(fmt::format("the coordinator {}; its last log line: {}", end->description, LastLogLine(LogOf(0))));
       }
       for (std::size_t i = 1; i < children_.size(); ++i) KeepAlive(i);
     }
@@ -268,7 +268,7 @@ void PrintReady(const UpOptions& options, const ServiceState& state) {
   std::cout << fmt::format("  slabstream render NAME -o picture.png{0}\n  slabstream status{0}\n", endpoint);
   if (!state.keys_folder.empty()) {
     std::cout << fmt::format(
-        "Service files for other hosts are in {}: client.json, worker.json, admin.json. Whoever has one has its role.\n"
+        "Service files for other hosts are in {}: client.json, worker.json, admin.json. Everybody who has one has its role.\n"
         "  slabstream render NAME -o picture.png --service client.json\n  slabstream-worker --service worker.json\n",
         state.keys_folder);
   }

@@ -85,7 +85,7 @@ Result<std::string> OwnPath() {
 // The endpoint in "slabstream is up at ENDPOINT (...)".
 Result<std::string> EndpointOfUp(Helper& up) {
   const Result<std::string> line = up.child().ReadLine(kHelperStartTimeout);
-  if (!line.ok()) return Status(line.status().code(), "the service did not start; its reason stands above");
+  if (!line.ok()) return Status(line.status().code(), "the service did not start; see its error above");
   constexpr std::string_view kBefore = " up at ";
   const std::size_t begin = line->find(kBefore);
   if (begin == std::string::npos) return Status::Internal(fmt::format("`slabstream up` said '{}' instead of its endpoint", *line));
@@ -163,7 +163,7 @@ Status RunView(const ViewOptions& options) {
   Result<Helper> gateway = Helper::Start(std::move(command));
   if (!gateway.ok()) return gateway.status();
   const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
-  if (!line.ok()) return Status(line.status().code(), "the gateway did not start; its reason stands above");
+  if (!line.ok()) return Status(line.status().code(), "the gateway did not start; see its error above");
   const std::string dataset =
       file ? DatasetName(std::filesystem::absolute(options.source.substr(0, options.source.find('?')))) : options.source;
   const std::string url = fmt::format("{}&dataset={}", line->substr(line->find(' ') + 1), dataset);

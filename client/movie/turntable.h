@@ -7,7 +7,7 @@ namespace slabstream {
 
 inline constexpr int kMaxTurntableFrames = 100000;
 inline constexpr int kMaxTurns = 1000;
-inline constexpr char kTurnsHelp[] = "How many full turns; 0: the view stands still";
+inline constexpr char kTurnsHelp[] = "Number of full turns; 0: the view is fixed";
 inline constexpr char kFramesPerSecondHelp[] = "Frames per second of a movie";
 
 // Of the frame with this index in [0, frames), in degrees. In one turn, so that a start near the limit of angles stays valid.

@@ -59,7 +59,9 @@ std::string JsonValue::Shown() const {
 void JsonValue::Fields(const std::vector<std::pair<std::string, Read>>& fields) const {
   if (!json_->is_object()) return Complain(fmt::format("{} must be an object", Shown()));
   for (const auto& [name, value] : json_->items()) {
-    const auto found = std::ranges::find(fields, name, &std::pair<std::string, Read>::first);
+    const auto same = [](char a, char b) { return a == b || (a == '-' && b == '_'); };
+    const auto found =
+        std::ranges::find_if(fields, [&, &name = name](const auto& field) { return std::ranges::equal(field.first, name, same); });
     if (found != fields.end()) {
       found->second(JsonValue(value, place_.empty() ? name : place_ + "." + name, *mistake_));
       continue;

@@ -33,11 +33,12 @@ class JsonValue {
   JsonValue(const Json& json, std::string place, std::optional<std::string>& mistake)
       : json_(&json), place_(std::move(place)), mistake_(&mistake) {}
 
+  const Json& json() const { return *json_; }
   void Complain(const std::string& what) const;
   std::string Shown() const;  // the value's text, cut off if it is long
 
   using Read = std::function<void(const JsonValue&)>;
-  // An object with no other fields than these. Calls the function of each field that is present.
+  // An object with no other fields than these; in names, '_' stands for '-', too. Calls the function of each field that is present.
   void Fields(const std::vector<std::pair<std::string, Read>>& fields) const;
   // A list of at least `least` values.
   void Each(const Read& read, std::size_t least = 1) const;

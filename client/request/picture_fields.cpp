@@ -5,26 +5,24 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/request/option_description.h"
 #include "client/request/picture_options.h"
 #include "common/base/printable.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {
 
-constexpr char kDataset[] = "dataset";
-
 bool IsFlag(const CLI::Option& option) { return option.get_expected_max() == 0; }
-bool IsRepeated(const CLI::Option& option) { return option.get_multi_option_policy() == CLI::MultiOptionPolicy::TakeAll; }
 
 // The options, and where their values go.
 struct RenderOptionsApp {
   RenderOptionsApp() {
     app.set_help_flag();
+    AddRequestOption(app, *FindRequestOption("dataset"), request.frame)->required();
     AddRenderPictureOptions(app, request.frame, request.format, nullptr);
   }
   TransferChoice& transfer() { return request.frame.transfer; }
-  std::string& dataset() { return request.frame.dataset; }
 
   CLI::App app;
   RenderRequest request;
@@ -33,10 +31,10 @@ struct RenderOptionsApp {
 struct SliceOptionsApp {
   SliceOptionsApp() {
     app.set_help_flag();
+    AddRequestOption(app, *FindRequestOption("dataset"), request.frame)->required();
     AddSlicePictureOptions(app, request, nullptr);
   }
   TransferChoice& transfer() { return request.frame.transfer; }
-  std::string& dataset() { return request.frame.dataset; }
 
   CLI::App app;
   SliceRequest request;
@@ -67,14 +65,8 @@ Status Parse(const PictureFields& fields, OptionsApp& options) {
   }
   std::vector<std::string> arguments;
   for (const PictureField& field : fields) {
-    if (field.name == kDataset) {
-      if (!options.dataset().empty()) return Status::InvalidArgument("dataset is given twice");
-      options.dataset() = field.text;
-    } else if (Status status = AddArgument(options.app, field, arguments); !status.ok()) {
-      return status;
-    }
+    if (Status status = AddArgument(options.app, field, arguments); !status.ok()) return status;
   }
-  if (options.dataset().empty()) return Status::InvalidArgument("dataset is missing: the name of a dataset of the service");
   std::ranges::reverse(arguments);  // as CLI11 wants them
   try {
     options.app.parse(std::move(arguments));
@@ -85,32 +77,6 @@ Status Parse(const PictureFields& fields, OptionsApp& options) {
   return Status::Ok();
 }
 
-// Numbers have the fewest digits that read back the same.
-std::optional<std::string> TextOf(const Json& value) {
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_boolean()) return value.get<bool>() ? "true" : "false";
-  if (value.is_number_integer()) return value.dump();
-  if (value.is_number_float()) return fmt::format("{}", value.get<double>());
-  if (value.is_object()) return value.dump(-1, ' ', true, Json::error_handler_t::replace);
-  return std::nullopt;
-}
-
-std::vector<FieldDescription> Describe(const CLI::App& app) {
-  std::vector<FieldDescription> fields;
-  fields.push_back({kDataset, "Options", "Name of the dataset", "NAME", "", false});
-  for (const CLI::Option* option : app.get_options()) {
-    if (option->get_group() == kHidden) continue;
-    const bool flag = IsFlag(*option);
-    fields.push_back({.name = option->get_lnames().front(),
-                      .group = option->get_group(),
-                      .purpose = option->get_description(),
-                      .value = flag ? "" : option->get_type_name(),
-                      .standard = option->get_default_str(),
-                      .repeated = IsRepeated(*option)});
-  }
-  return fields;
-}
-
 }  // namespace
 
 Result<PictureFields> FieldsOfJson(const Json& object) {
@@ -118,22 +84,13 @@ Result<PictureFields> FieldsOfJson(const Json& object) {
   PictureFields fields;
   for (const auto& [name, value] : object.items()) {
     if (value.is_null()) continue;
-    const bool list = value.is_array() && !value.empty() && !value.front().is_object();              // a list of objects is a colour map
-    const auto add = [&fields, &name = name, whole = value.is_array() && !list](const Json& item) {  // clang 14 does not take [&] here
-      std::optional<std::string> text = whole ? item.dump(-1, ' ', true, Json::error_handler_t::replace) : TextOf(item);
-      if (text) fields.push_back({name, *std::move(text)});
-      return text.has_value();
-    };
-    bool taken = true;
-    if (list) {
-      for (const Json& item : value) taken = taken && fields.size() <= kMaxPictureFields && add(item);
-    } else if (!value.is_array() || !value.empty()) {
-      taken = add(value);
-    }
-    if (!taken) {
+    const RequestOption* const option = FindRequestOption(name);
+    const auto texts = TextsOfJson(value, option != nullptr && option->repeatable);
+    if (!texts) {
       return Status::InvalidArgument(
           fmt::format("option '{}' is not a text, number, boolean, colour map, or a list of texts", Printable(name.substr(0, 64))));
     }
+    for (const std::string& text : *texts) fields.push_back({name, text});
   }
   return fields;
 }
@@ -155,7 +112,7 @@ Result<SliceRequest> ParseSliceFields(const PictureFields& fields) {
   return std::move(options.request);
 }
 
-std::vector<FieldDescription> RenderFields() { return Describe(RenderOptionsApp().app); }
-std::vector<FieldDescription> SliceFields() { return Describe(SliceOptionsApp().app); }
+Json RenderFields() { return DescribeOptions(RenderOptionsApp().app); }
+Json SliceFields() { return DescribeOptions(SliceOptionsApp().app); }
 
 }  // namespace slabstream

@@ -36,16 +36,8 @@ struct RenderRequest {
 Result<RenderRequest> ParseRenderFields(const PictureFields& fields);
 Result<SliceRequest> ParseSliceFields(const PictureFields& fields);
 
-// What there is, for descriptions of an interface.
-struct FieldDescription {
-  std::string name;
-  std::string group;     // heading of the help text
-  std::string purpose;   // its first line; the others explain the choices
-  std::string value;     // such as "NUMBER"; empty: a flag
-  std::string standard;  // default; empty: none
-  bool repeated = false;
-};
-std::vector<FieldDescription> RenderFields();
-std::vector<FieldDescription> SliceFields();
+// What there is, as DescribeOptions has it.
+Json RenderFields();
+Json SliceFields();
 
 }  // namespace slabstream

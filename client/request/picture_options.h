@@ -7,7 +7,9 @@
 #include <CLI/CLI.hpp>
 
 #include "client/image_io/composed_picture.h"
+#include "client/request/request_options.h"
 #include "client/request/slice_request.h"
+#include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "data/layers/layer_reader.h"
 
@@ -22,12 +24,13 @@ void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat
 // Plane, look and layers.
 void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* files);
 
-// --scalar-range.
-void AddScalarRange(CLI::App& app, TransferChoice& transfer);
-// --transfer, --scalar-range and --opacity-distance.
-void AddTransferOptions(CLI::App& app, TransferChoice& transfer, bool files = true);
+// An option for one field of the table.
+CLI::Option* AddRequestOption(CLI::App& app, const RequestOption& option, FrameRequest& request, ColorMaps maps = ColorMaps::kFilesToo);
 
 // After the parse: isosurfaces without --transfer are all that is shown.
 void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer);
+
+// A view as a file that --save-camera wrote: a JSON object of options ("azimuth": 30). InvalidArgument, one line.
+Result<ViewParameters> ParseCamera(const std::string& text);
 
 }  // namespace slabstream

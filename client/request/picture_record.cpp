@@ -7,12 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/request/camera_json.h"
-#include "client/request/layer_options.h"
+#include "client/request/request_options.h"
 #include "client/request/shell_word.h"
-#include "client/request/values.h"
 #include "common/base/version.h"
-#include "common/view/named_view.h"
 #include "common/wire/request_json.h"
 #include "data/volume_io/volume_reader.h"
 
@@ -49,9 +46,6 @@ void ReadFormat(const JsonValue& value, PictureFormat& format) {
   if (format.png_bits != 8 && format.png_bits != 16) value.Complain(fmt::format("depth {} is neither 8 nor 16", format.png_bits));
 }
 
-std::string NumberText(double number) { return fmt::format("{}", number); }
-std::string PointText(const Vec3& point) { return fmt::format("{},{},{}", point.x, point.y, point.z); }
-
 // Options of a command line, in their order.
 class OptionList {
  public:
@@ -66,10 +60,7 @@ class OptionList {
     if (value != usual) Add(option, std::string(value));
   }
   void Number(const std::string& option, double value, double usual) {
-    if (value != usual) Add(option, NumberText(value));
-  }
-  void Point(const std::string& option, const std::optional<Vec3>& point) {
-    if (point) Add(option, PointText(*point));
+    if (value != usual) Add(option, fmt::format("{}", value));
   }
   void Flag(const std::string& option, bool value) {
     if (value) Add(option);
@@ -80,87 +71,27 @@ class OptionList {
   std::vector<std::string> arguments_;
 };
 
-// The structured bindings below name every field: if there is one more, they do not compile.
-
-void AddView(OptionList& out, const ViewParameters& view) {
-  const ViewParameters usual;
-  const auto& [projection, azimuth, elevation, roll, zoom, fov, look_at, eye, up, distance, fit, of_patient] = view;
-  const bool by_name = of_patient && !eye;
-  out.Name("--projection", NameOf(projection), NameOf(usual.projection));
-  const auto named = std::ranges::find_if(kNamedViews, [&](const NamedView& v) {
-    return v.of_patient && v.azimuth_degrees == view.azimuth_degrees && v.elevation_degrees == view.elevation_degrees;
-  });
-  if (by_name && named != kNamedViews.end()) {
-    out.Add("--view", std::string(named->name));
-  } else {
-    out.Number("--azimuth", azimuth, usual.azimuth_degrees);
-    out.Number("--elevation", elevation, usual.elevation_degrees);
-  }
-  out.Point("--look-at", look_at);
-  out.Flag("--fit", fit);
-  out.Point("--eye", eye);
-  out.Point("--up", up);
-  out.Number("--distance", distance, usual.distance);
-  out.Number("--roll", roll, usual.roll_degrees);
-  out.Number("--zoom", zoom, usual.zoom);
-  out.Number("--fov", fov, usual.fov_degrees);
-}
-
-// No option sets the coefficients of a shading: they are the usual ones.
-void AddShading(OptionList& out, const Shading& shading) {
-  out.Name("--shading", NameOf(shading.model), NameOf(Shading().model));
-  for (const Vec3& light : shading.lights) out.Add("--light", PointText(light));
-}
-
-void AddTransfer(OptionList& out, const TransferChoice& transfer) {
-  const TransferChoice usual;
-  const auto& [choice, opacity_distance, scalar_range, isosurfaces, gradient_opacities] = transfer;
-  const auto* preset = std::get_if<std::string>(&choice);
-  out.Name("--transfer", preset != nullptr ? *preset : kColorMapFile,
-           isosurfaces.empty() ? std::get<std::string>(usual.choice) : std::string(kNoTransfer));
-  if (scalar_range) out.Add("--scalar-range", ScalarRangeText(*scalar_range));
-  out.Number("--opacity-distance", opacity_distance, usual.opacity_distance);
-  std::string list;
-  for (const auto& [value, color, opacity] : isosurfaces) {
-    const auto& [r, g, b] = color;
-    list += fmt::format("{}{}:{},{},{}:{}", list.empty() ? "" : ",", value, r, g, b, opacity);
-  }
-  if (!list.empty()) out.Add("--isovalue", list);
-  list.clear();
-  for (const auto& [slope, opacity] : gradient_opacities) list += fmt::format("{}{}:{}", list.empty() ? "" : ",", slope, opacity);
-  if (!list.empty()) out.Add("--gradient-opacity", list);
-}
-
-// `render` has no option for a slab: that is for slices.
-void AddClipping(OptionList& out, const Clipping& clipping) {
-  const auto& [box, slab, planes, mode] = clipping;
-  if (box) {
-    std::string text;
-    for (const Axis axis : kAxes) {
-      const auto bound = [&](double value, double none) { return value == none ? "" : NumberText(value); };
-      text += fmt::format("{}{}:{}", text.empty() ? "" : ",", bound(box->low[axis], -kMaxWorldCoordinate),
-                          bound(box->high[axis], kMaxWorldCoordinate));
+// Those of all fields that are not standard. --local would not show the layers of a file without --label-mode or --overlay-transfer.
+void AddRequest(OptionList& out, const FrameRequest& request) {
+  for (const RequestOption& option : RequestOptions()) {
+    // Without --transfer, isosurfaces stand alone.
+    const bool alone = !request.transfer.isosurfaces.empty();
+    std::vector<std::string> texts = TextsOf(option, request);
+    if (alone && option.path == "transfer.preset") {
+      if (texts.empty()) texts = {option.standard};
+      if (texts.front() == kNoTransfer) continue;
     }
-    out.Add("--clip-box", text + (box->unit == ClipUnit::kVoxels ? "v" : box->unit == ClipUnit::kPercent ? "%" : ""));
+    for (const std::string& text : texts) {
+      if (option.flag()) {
+        out.Add("--" + option.name);
+      } else {
+        out.Add("--" + option.name, text);
+      }
+    }
   }
-  for (const auto& [normal, offset] : planes) out.Add("--clip-plane", PointText(normal) + "," + NumberText(offset));
-  if (mode == ClipMode::kCutAway) out.Add("--clip-mode", "cut-away");
 }
 
-void AddPolicy(OptionList& out, const Policy& policy) {
-  const Policy usual;
-  const auto& [decomposition, load_metric, axis, groups, assignment, balance, combine, pixel_error, teams] = policy;
-  out.Name("--decomposition", decomposition, usual.decomposition);
-  out.Name("--axis", NameOf(axis), NameOf(usual.axis));
-  out.Name("--balance-by", load_metric, usual.load_metric);
-  out.Name("--assignment", assignment, usual.assignment);
-  out.Name("--balance", balance, usual.balance);
-  out.Number("--groups", groups, usual.groups);
-  out.Number("--frame-parallel", teams, usual.teams);
-  out.Name("--combine", combine, usual.combine);
-  out.Number("--pixel-error", pixel_error, usual.pixel_error);
-}
-
+// The structured bindings name every field: if there is one more, they do not compile.
 void AddFormat(OptionList& out, const PictureFormat& format) {
   const PictureFormat usual;
   const auto& [png_bits, background, annotations] = format;
@@ -241,25 +172,14 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
 }
 
 std::vector<std::string> RenderArguments(const PictureRecord& record, const std::string& output) {
-  const FrameRequest usual;
-  const auto& [dataset, renderer, parameters, size, view, clipping, transfer, labels, overlay, shading, termination, policy, previews] =
-      record.request;
   OptionList out;
   out.Add("render");
   const bool like_an_option = record.source.starts_with('-');
   if (!like_an_option) out.Add(record.source);
   out.Flag("--local", IsFile(record.source));
-  out.Name("--size", fmt::format("{}x{}", size.width, size.height), fmt::format("{}x{}", usual.size.width, usual.size.height));
-  AddView(out, view);
-  AddClipping(out, clipping);
-  out.Name("--renderer", renderer, usual.renderer);
-  for (const auto& [name, text] : parameters) out.Add("--" + name, text);
-  AddTransfer(out, transfer);
-  for (const std::string& argument : LayerArguments(record.request, record.layers)) out.Add(argument);
-  AddShading(out, shading);
-  out.Number("--termination", termination, usual.termination);
-  AddPolicy(out, policy);
-  out.Flag("--previews", previews);
+  if (!record.layers.labels.empty()) out.Add("--labels", LabelText(record.layers));
+  if (!record.layers.overlay.empty()) out.Add("--overlay", record.layers.overlay);
+  AddRequest(out, record.request);
   AddFormat(out, record.format);
   std::vector<std::string> arguments = out.Take();
   arguments.insert(arguments.end(), {"-o", output});

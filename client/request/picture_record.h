@@ -15,6 +15,7 @@
 
 #include "client/image_io/image_writer.h"
 #include "client/request/json_value.h"
+#include "client/request/request_options.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "data/layers/layer_reader.h"
@@ -38,9 +39,6 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
                        const LayerFiles& layers = {});
 // InvalidArgument, one line: what is wrong with the text.
 Result<PictureRecord> ParseRecord(std::string_view text);
-
-// The files that a command line names for transfer functions of the record, whose own files may be gone.
-inline constexpr char kColorMapFile[] = "color-map.json", kOverlayMapFile[] = "overlay-map.json";
 
 // The command line that makes the picture again as `output`: "render", SOURCE, and each option whose value is not its default. --local if
 // SOURCE is the name of a file.

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "common/planning/validate_request.h"
 #include "common/view/named_view.h"
+#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {

@@ -101,12 +101,6 @@ Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view t
   return Status::InvalidArgument(fmt::format("{} '{}' must rise", option, text));
 }
 
-std::string ScalarRangeText(const ScalarRange& range) {
-  const auto& [min, max, percentiles] = range;
-  const std::string_view unit = percentiles ? "%" : "";
-  return fmt::format("{}{}:{}{}", min, unit, max, unit);
-}
-
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
   ClipBox box;
   std::string_view bounds = text;
@@ -229,6 +223,76 @@ Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_vie
     return Status::InvalidArgument(fmt::format("{} '{}': {}", option, text, status.message()));
   }
   return points;
+}
+
+Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, std::string_view text) {
+  std::vector<LabelOpacity> opacities;
+  for (const std::string_view item : Split(text, ',')) {
+    const std::vector<std::string_view> fields = Split(item, '=');
+    if (fields.size() != 2) return Status::InvalidArgument(fmt::format("{} '{}' is not LABEL=OPACITY", option, item));
+    const Result<int> value = ParseInteger(option, fields[0], 1, int(kMaxLabelValue));
+    if (!value.ok()) return value.status();
+    const Result<double> opacity = ParseNumber(option, fields[1], {0, 1});
+    if (!opacity.ok()) return opacity.status();
+    opacities.push_back({std::uint32_t(*value), *opacity});
+  }
+  return opacities;
+}
+
+Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text) {
+  std::vector<LabelRange> ranges;
+  for (const std::string_view item : Split(text, ',')) {
+    const std::size_t hyphen = item.find('-');
+    const Result<int> first = ParseInteger(option, item.substr(0, hyphen), 1, int(kMaxLabelValue));
+    if (!first.ok()) return first.status();
+    const Result<int> last =
+        hyphen == std::string_view::npos ? first : ParseInteger(option, item.substr(hyphen + 1), *first, int(kMaxLabelValue));
+    if (!last.ok()) return last.status();
+    ranges.push_back({std::uint32_t(*first), std::uint32_t(*last)});
+  }
+  return ranges;
+}
+
+namespace {
+
+// fmt writes the fewest digits that read back the same.
+template <class Items>
+std::string Joined(const Items& items, const auto& text_of) {
+  std::string joined;
+  for (const auto& item : items) joined += (joined.empty() ? "" : ",") + text_of(item);
+  return joined;
+}
+
+}  // namespace
+
+std::string TextOf(const ImageSize& size) { return fmt::format("{}x{}", size.width, size.height); }
+std::string TextOf(const Vec3& point) { return fmt::format("{},{},{}", point.x, point.y, point.z); }
+std::string TextOf(const ScalarRange& range) {
+  const std::string_view unit = range.percentiles ? "%" : "";
+  return fmt::format("{}{}:{}{}", range.min, unit, range.max, unit);
+}
+std::string TextOf(const ClipBox& box) {
+  const auto bound = [](double value, double none) { return value == none ? "" : fmt::format("{}", value); };
+  const auto bounds = [&](Axis axis) {
+    return bound(box.low[axis], -kMaxWorldCoordinate) + ":" + bound(box.high[axis], kMaxWorldCoordinate);
+  };
+  return Joined(kAxes, bounds) + (box.unit == ClipUnit::kVoxels ? "v" : box.unit == ClipUnit::kPercent ? "%" : "");
+}
+std::string TextOf(const ClipPlane& plane) { return fmt::format("{},{}", TextOf(plane.normal), plane.offset); }
+std::string TextOf(const std::vector<Isosurface>& surfaces) {
+  return Joined(surfaces,
+                [](const Isosurface& s) { return fmt::format("{}:{},{},{}:{}", s.value, s.color.r, s.color.g, s.color.b, s.opacity); });
+}
+std::string TextOf(const std::vector<GradientOpacityPoint>& points) {
+  return Joined(points, [](const GradientOpacityPoint& point) { return fmt::format("{}:{}", point.slope, point.opacity); });
+}
+std::string TextOf(const std::vector<LabelOpacity>& opacities) {
+  return Joined(opacities, [](const LabelOpacity& label) { return fmt::format("{}={}", label.value, label.opacity); });
+}
+std::string TextOf(const std::vector<LabelRange>& ranges) {
+  return Joined(ranges, [](const LabelRange& range) {
+    return range.first == range.last ? fmt::format("{}", range.first) : fmt::format("{}-{}", range.first, range.last);
+  });
 }
 
 }  // namespace slabstream

@@ -24,8 +24,6 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
 
 // "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar]; or "LOW%:HIGH%", percentiles.
 Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
-// The other way round.
-std::string ScalarRangeText(const ScalarRange& range);
 
 // "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
@@ -43,5 +41,21 @@ Result<std::vector<Isosurface>> ParseIsosurfaces(std::string_view option, std::s
 
 // "G:O,G:O,...", with slopes G that ascend in [0, kMaxScalar] and opacities O in [0, 1].
 Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_view option, std::string_view text);
+
+// "3=0.5,7=0": labels and their opacities in [0, 1].
+Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, std::string_view text);
+// "1,5-9".
+Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text);
+
+// The other way round: the text that is parsed as the value.
+std::string TextOf(const ImageSize& size);
+std::string TextOf(const Vec3& point);
+std::string TextOf(const ScalarRange& range);
+std::string TextOf(const ClipBox& box);
+std::string TextOf(const ClipPlane& plane);
+std::string TextOf(const std::vector<Isosurface>& surfaces);
+std::string TextOf(const std::vector<GradientOpacityPoint>& points);
+std::string TextOf(const std::vector<LabelOpacity>& opacities);
+std::string TextOf(const std::vector<LabelRange>& ranges);
 
 }  // namespace slabstream

@@ -16,10 +16,10 @@ ParseText EndpointText(bool allow_wildcard) {
 
 CLI::Option* AddService(CLI::App& app, ServiceChoice& service) {
   CLI::Option* endpoint = AddParsed(app, "--endpoint", service.endpoint, EndpointText(false),
-                                    "Where the service listens; with --service, where it is reached instead, as through a tunnel")
+                                    "Endpoint of the service; with --service, another way to it, such as a tunnel")
                               ->type_name("ENDPOINT")
                               ->default_str("$SLABSTREAM_ENDPOINT, or the service that `up` started last");
-  app.add_option("--service", service.file, "The service file of a service with keys: where it listens, and the key to it")
+  app.add_option("--service", service.file, "Service file of a service with keys: its endpoint and a key")
       ->type_name("FILE")
       ->default_str("$SLABSTREAM_SERVICE, if there is no --endpoint");
   return endpoint;

@@ -90,8 +90,8 @@ class SharedArena {
 // Another process' arena, or this one's own, mapped for reading. Any thread.
 class MappedArena {
  public:
-  // NotFound: there is no such arena (any more). Unavailable: it may not be opened. InvalidArgument: there is something else, or another
-  // arena. Never opens, reads or waits for anything else, whatever the name says.
+  // NotFound: there is no such arena. Unavailable: it may not be opened. InvalidArgument: there is something else, or another
+  // arena. Never opens, reads or waits for anything else.
   static Result<std::shared_ptr<const MappedArena>> Open(const ArenaName& name);
   ~MappedArena();
   MappedArena(const MappedArena&) = delete;

@@ -47,12 +47,12 @@ inline constexpr double kResample = 4e-9;  // a voxel of a cell that is drawn, a
 inline constexpr double kSample = 6e-9;    // that is shaded
 }  // namespace shear
 
-// Intensity projections (common/renderers/mip).
+// Projections of values (common/renderers/projection_kind.h).
 //   balance_bench VOLUME --renderer mip --decomposition kd-tree --split voxels
-namespace mip {
+namespace projection {
 inline constexpr double kBox = 30e-6;
 inline constexpr double kSample = 4e-9;
-}  // namespace mip
+}  // namespace projection
 
 // Slicing of unstructured grids (common/renderers/slice). Measured with 187395 and 430000 tetrahedra at 512 x 512, at 1, 2 and 4 planes a
 // voxel length: about 200 ns a tetrahedron, and 8 ns a sample.

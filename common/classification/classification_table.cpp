@@ -32,7 +32,7 @@ ClassificationTable Classify(const TransferFunction& transfer, const VolumeDescr
   StoredRange stored = StoredFromData(description, range);
   int bins = kMaxBins;
   if (description.type == ScalarType::kUint8) {
-    // The same table for every 8-bit volume, whatever its range.
+    // The same table for every 8-bit volume of any range.
     stored = {0, 255};
     bins = 256;
   } else if (description.type == ScalarType::kUint16) {

@@ -26,7 +26,7 @@ class VisibleRanges {
   std::vector<std::int32_t> below_;  // visible bins below a bin
 };
 
-// Bits of the voxels of a lattice. Several threads may set them: in whatever order they do, the bits are the same.
+// Bits of the voxels of a lattice. Several threads may set them: the order does not change the bits.
 class VoxelBits {
  public:
   explicit VoxelBits(const Index3& size) : size_(size), cells_(OccupancyCells(size)), layers_(kOccupancyCell * CountIn(cells_)) {}

@@ -32,7 +32,7 @@ TransferFunction Opaque(const VolumeSummary& summary) {
   return {{{min, kCold}, {max, kWarm}}, {{min, 0, 0.5, 1}, {second, 1}}};
 }
 
-// ---- Whatever differs from the background
+// ---- Everything that differs from the background
 
 // One stop of a side's curves: the share of the side's voxels that lie nearer to the background.
 struct Stop {
@@ -212,7 +212,7 @@ TransferFunction Simulation(const VolumeSummary& summary) {
 
 const std::vector<TransferPreset>& TransferPresets() {
   static const std::vector<TransferPreset> presets = {
-      {"auto", "from the histogram: whatever differs from the background", Automatic},
+      {"auto", "from the histogram: all that differs from the background", Automatic},
       {"gray-ramp", "black to white and clear to opaque over the value range", GrayRamp},
       {"window", "black to white and opaque, from the background to the brightest material: slices", Window},
       {"opaque", "everything above the lowest value, solid: masks, voxelised objects", Opaque},

@@ -47,7 +47,7 @@ struct OpacityPoint {
 struct Isosurface {
   double value = 0;    // data value, in [-kMaxScalar, kMaxScalar]
   Rgb color;           // each in [0, 1]
-  double opacity = 1;  // [0, 1], of one passage, whatever the angle
+  double opacity = 1;  // [0, 1], of one passage, at any angle
   friend bool operator==(const Isosurface&, const Isosurface&) = default;
 };
 
@@ -95,7 +95,7 @@ double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
 // optional "Points" (x, opacity, midpoint, sharpness, ...); without "Points" the opacity rises linearly over the colour range.
-// Colours are interpolated in RGB, whatever the map's ColorSpace. Errors: InvalidArgument, beginning with `name`.
+// Colours are interpolated in RGB; the map's ColorSpace is ignored. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
 // The inverse, as a preset called `name`. `transfer` valid; only its curves over data values have a place there.

@@ -72,7 +72,7 @@ int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::fun
 CLI::Option* AddLogLevel(CLI::App& app, std::string& level) {
   std::vector<std::string_view> levels;
   for (const auto& [name, unused] : LogLevelNames()) levels.push_back(name);
-  return AddParsed(app, "--log-level", level, OneOf(std::move(levels)), "What is logged to stderr: debug, info, warning, error or off")
+  return AddParsed(app, "--log-level", level, OneOf(std::move(levels)), "Least level logged to stderr: debug, info, warning, error or off")
       ->type_name("NAME");
 }
 

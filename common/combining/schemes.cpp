@@ -13,9 +13,9 @@ const std::vector<CombiningEntry>& CombiningSchemes() {
   static const std::vector<CombiningEntry> entries = {
       {"fan-in", "binary tree of workers, log2(workers) rounds", "", 0, false,
        [](const Request& request, const Arguments&) { return MakeFanIn(request); }},
-      {"centralized", "every worker sends to one, which combines all", "", 0, false,
+      {"centralized", "all workers send to one, which combines all images", "", 0, false,
        [](const Request& request, const Arguments&) { return MakeCentralized(request); }},
-      {"chain", "from neighbour to neighbour, in strips (default: one a worker, at most 64)", "strips=S", 0, true,
+      {"chain", "from neighbour to neighbour, in strips (default: one per worker, at most 64)", "strips=S", 0, true,
        [](const Request& request, const Arguments& arguments) {
          return MakeChain(request, OrElse(arguments.strips, std::clamp<std::uint32_t>(request.ranks, 1, 64)));
        }},

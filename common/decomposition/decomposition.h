@@ -29,9 +29,9 @@ struct DecompositionEntry {
   std::string_view name;     // what --decomposition takes
   std::string_view purpose;  // one line for --help
   Partition (*make)(const DecompositionRequest&);
-  std::string_view load_metric;  // what its boxes have equal shares of by default: a name of LoadMetrics()
-  bool one_axis;                 // cuts one axis only, which must have enough slices
-  int shapes = 1;                // ways to cut the same work; which one renders fastest depends on the volume
+  std::string_view balance_by;  // what its boxes have equal shares of by default: a name of BalanceByChoices()
+  bool one_axis;                // cuts one axis only, which must have enough slices
+  int shapes = 1;               // ways to cut the same work; which one renders fastest depends on the volume
 };
 
 // The only list.

@@ -7,8 +7,8 @@ const std::vector<DecompositionEntry>& Decompositions() {
       {"slab", "slabs of slices along --axis", MakeSlabs, "voxels", true},
       {"beam", "boxes cut along two axes, --axis first", MakeBeams, "voxels", false},
       {"subcube", "boxes cut along all three axes", MakeSubcubes, "voxels", false},
-      {"octree", "eighths of eighths, at least as many as wanted", MakeOctree, "voxels", false},
-      {"kd-tree", "boxes that hug what is occupied, empty space cut away", MakeKdTree, "occupied", false, kKdTreeShapes},
+      {"octree", "octants of octants, at least as many as requested", MakeOctree, "voxels", false},
+      {"kd-tree", "boxes that fit tightly round occupied voxels, with empty space cut away", MakeKdTree, "occupied", false, kKdTreeShapes},
   };
   return entries;
 }

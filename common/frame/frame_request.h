@@ -35,7 +35,7 @@ constexpr std::string_view NameOf(AxisChoice axis) { return kAxisChoiceNames.at(
 
 struct Policy {
   std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
-  std::string load_metric = "auto";    // of LoadMetrics(): what boxes have equal shares of
+  std::string balance_by = "auto";     // of BalanceByChoices(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
   std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
@@ -55,22 +55,23 @@ struct TransferChoice {
   // Data values onto which the curves are stretched, so that their first point is at `min` and their last one at `max`: in
   // [-kMaxScalar, kMaxScalar], min < max. None: they stay.
   std::optional<ScalarRange> scalar_range = {};
-  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (RendererKind::isosurfaces)
-  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (RendererKind::gradient_opacity)
+  std::vector<Isosurface> isosurfaces = {};                   // of renderers that draw them (Ability::kIsosurfaces)
+  std::vector<GradientOpacityPoint> gradient_opacities = {};  // of renderers that use them (Ability::kGradientOpacity)
   friend bool operator==(const TransferChoice&, const TransferChoice&) = default;
 };
 
-// How the overlay of a dataset is shown.
+// How the overlay of a dataset is shown: as a TransferChoice without isosurfaces and opacity by gradient, which are of the volume alone.
 struct OverlayChoice {
-  TransferChoice transfer;  // of its values
-  double weight = 1;        // [0, 1]: factor of its density in the mix
+  std::variant<std::string, TransferFunction> choice = std::string("auto");
+  std::optional<ScalarRange> scalar_range = {};
+  double weight = 1;  // [0, 1]: factor of its density in the mix
   friend bool operator==(const OverlayChoice&, const OverlayChoice&) = default;
 };
 
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
-inline constexpr std::string_view kDefaultRenderer = "splat";
+inline constexpr std::string_view kDefaultRenderer = SLABSTREAM_DEFAULT_RENDERER;  // common/renderers/CMakeLists.txt
 
 struct FrameRequest {
   std::string dataset;                     // a name of the catalogue, 1 ... kMaxNameBytes

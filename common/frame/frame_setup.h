@@ -71,7 +71,7 @@ inline FrameArea Intersection(const FrameArea& a, const FrameArea& b) {
 // behind the box along the slices' two axes.
 FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t before, std::int32_t behind);
 
-// Pixels of the frame that samples of `box` can lie in, whatever its voxels.
+// Pixels of the frame that samples of `box` can lie in, for any voxels.
 PixelBounds ReachOf(const Box& box, const FrameSetup& setup);
 
 // Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.

@@ -50,7 +50,7 @@ struct LabelLook {
   std::vector<Entry> entries;  // of label number i: entries[i - 1]
   friend bool operator==(const LabelLook&, const LabelLook&) = default;
 
-  // The label is material, whatever the transfer function says.
+  // The label is material under any transfer function.
   bool IsMatter(std::size_t number) const {
     return mode == LabelMode::kSurface && number != 0 && entries[number - 1].shown && entries[number - 1].opacity > 0;
   }

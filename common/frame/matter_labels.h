@@ -1,4 +1,4 @@
-// MatterLabels: which labels are material, whatever the transfer function says.
+// MatterLabels: which labels are material under any transfer function.
 #pragma once
 
 #include <cstdint>

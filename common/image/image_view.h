@@ -18,7 +18,7 @@ struct ImageView {
   const float* depth = nullptr;          // if the format has depths
   const std::uint32_t* voxel = nullptr;  // if the format has voxels
   std::size_t stride = 0;                // pixels from row to row, at least the bounds' width
-  // One span for each row of the bounds, within the width. Pixels outside it are empty, whatever is stored.
+  // One span for each row of the bounds, within the width. Pixels outside it are empty; their stored values do not matter.
   std::vector<ColumnSpan> rows;
 
   std::size_t pixel_bytes() const;  // of the spans' colours

@@ -27,8 +27,8 @@ struct LocalImage {
   PooledVector<float> rgba;           // 4 * pixel_count
   PooledVector<float> depth;          // pixel_count if the format has depths; else empty
   PooledVector<std::uint32_t> voxel;  // pixel_count if the format has voxels; else empty
-  // Used while images are combined: pixels outside the span of their row are empty, whatever is stored. No spans: all pixels are stored, as
-  // in images from renderers and in images that become pictures.
+  // Used while images are combined: pixels outside the span of their row are empty; their stored values do not matter. No spans: all pixels
+  // are stored, as in images from renderers and in images that become pictures.
   std::vector<ColumnSpan> rows;
 };
 

@@ -2,7 +2,7 @@
 //
 // A cell is split by pulling its point of the lowest number (De Loera, Rambau, Santos 2010, "Triangulations", section 4.3.2): each face of
 // the cell that does not have this point is cut into triangles, and each triangle makes a tetrahedron with the point. A face with four
-// points is cut from its own lowest one. So two cells cut the face that they share alike, whatever their kinds are, and the tetrahedra of a
+// points is cut from its own lowest one. So two cells of any kinds split their common face in the same way, and the tetrahedra of a
 // grid fit together without gaps.
 #pragma once
 

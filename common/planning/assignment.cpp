@@ -49,9 +49,9 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
 
 const std::vector<AssignmentEntry>& Assignments() {
   static const std::vector<AssignmentEntry> entries = {
-      {"cyclic", "box after box to worker after worker", AssignCyclic},
-      {"contiguous", "neighbouring boxes to one worker", AssignContiguous},
-      {"greedy", "the costliest box left to the worker with least to do", AssignGreedy, true},
+      {"cyclic", "boxes to workers in turn", AssignCyclic},
+      {"contiguous", "neighbouring boxes to the same worker", AssignContiguous},
+      {"greedy", "the costliest remaining box to the worker with the least work", AssignGreedy, true},
   };
   return entries;
 }

@@ -98,7 +98,7 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
   weigh(std::move(reassigned), FrameSeconds(now, request.slots, seconds), after_reassigning);
 
   ResolvedPolicy by_cost = *request.policy;
-  by_cost.load_metric = LoadMetric::kCost;
+  by_cost.balance_by = BalanceBy::kCost;
   LayoutRequest other_boxes = request;
   other_boxes.policy = &by_cost;
   const auto predicted = [&](const Layout& layout) {

@@ -7,7 +7,8 @@ namespace slabstream {
 OccupancyGrid CountDrawn(const Volume& volume, const VolumeSummary& summary, const RendererKind& renderer,
                          const TransferFunction& transfer) {
   const ClassificationTable drawn = renderer.DrawnTable(transfer, summary);
-  return renderer.draws_cells() ? CountOccupiedByCells(*volume.cells, volume.description, drawn) : CountOccupied(volume.block, drawn);
+  return renderer.Can(Ability::kCells) ? CountOccupiedByCells(*volume.cells, volume.description, drawn)
+                                       : CountOccupied(volume.block, drawn);
 }
 
 }  // namespace slabstream

@@ -90,7 +90,7 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
 // InvalidArgument: the renderer draws cells, and the dataset has none.
 Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary);
 
-// How a request shows a dataset, whatever its view.
+// How a request shows a dataset, in any view.
 struct VolumeLook {
   TransferFunction transfer;
   ClipRegion clip;

@@ -1,4 +1,4 @@
-// LayerBricks: which bricks of a volume layers may show, whatever its transfer function says. Labels that tint or hide material show
+// LayerBricks: which bricks of a volume layers may show under any transfer function. Labels that tint or hide material show
 // nothing by themselves.
 #pragma once
 

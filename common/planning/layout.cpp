@@ -46,9 +46,9 @@ class WorkFields {
         clip_(request.clip != nullptr ? *request.clip : ClipRegion{}),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
-  const WorkField& Of(LoadMetric metric) {
-    if (metric == LoadMetric::kVoxels) return voxels_;
-    if (metric == LoadMetric::kCost && request_.known.cost != nullptr) return *request_.known.cost;
+  const WorkField& Of(BalanceBy metric) {
+    if (metric == BalanceBy::kVoxels) return voxels_;
+    if (metric == BalanceBy::kCost && request_.known.cost != nullptr) return *request_.known.cost;
     if (!occupied_) occupied_.emplace(Grid());
     return *occupied_;
   }
@@ -67,7 +67,7 @@ class WorkFields {
     if (!clip_.MayKeep(box)) return false;
     const Box with_halo = Grown(box, request_.renderer->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
-    return !Of(LoadMetric::kOccupied).Hull(with_halo).empty();
+    return !Of(BalanceBy::kOccupied).Hull(with_halo).empty();
   }
 
  private:
@@ -209,16 +209,16 @@ LayoutMaker::LayoutMaker(LayoutMaker&&) noexcept = default;
 int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
   if (policy.groups > 0) return policy.groups;
   const int most = MostGroups(state_->request, policy);
-  const WorkField& work = state_->fields.Of(policy.load_metric);
+  const WorkField& work = state_->fields.Of(policy.balance_by);
   int groups = 1;
   while (groups < most && !state_->SlabsFit(state_->MakePartition(policy, groups, work))) ++groups;
   return groups;
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
-  const LoadMetric metric = policy.load_metric;
+  const BalanceBy metric = policy.balance_by;
   const int groups = FewestGroups(policy);
-  if (metric == LoadMetric::kOccupied || (metric == LoadMetric::kCost && state_->request.known.cost == nullptr)) {
+  if (metric == BalanceBy::kOccupied || (metric == BalanceBy::kCost && state_->request.known.cost == nullptr)) {
     return state_->MakeByPredictedCost(policy, groups);
   }
   return state_->Assign(state_->MakePartition(policy, groups, state_->fields.Of(metric), state_->request.resized), policy);

@@ -52,7 +52,7 @@ struct LayoutRequest {
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their
 // assignment. If boxes are split by what is occupied, they are cut repeatedly by their analytic costs (AnalyticCost), as they would be by
 // measured costs (MeasuredCost). The result is the layout with the quickest frame, on average over views along x and along y and with the
-// renderer's default parameters: a layout stays whatever the view.
+// renderer's default parameters: a layout stays for all views.
 Layout MakeLayout(const LayoutRequest& request);
 
 // Makes layouts by several policies; computes what they share once.

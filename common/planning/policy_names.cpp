@@ -4,29 +4,29 @@
 
 namespace slabstream {
 
-const std::vector<NamedChoice>& LoadMetrics() {
+const std::vector<NamedChoice>& BalanceByChoices() {
   static const std::vector<NamedChoice> choices = {
-      {kAutomatic, "what suits the decomposition"},
+      {kAutomatic, "chosen to suit the decomposition"},
       {"voxels", "equal voxels"},
-      {"occupied", "equal work, by what is visible under the transfer function"},
-      {"cost", "equal render time, as earlier frames took it; until there are any, occupied"},
+      {"occupied", "equal work, by visibility under the transfer function"},
+      {"cost", "equal render time, as measured in earlier frames; occupied until then"},
   };
   return choices;
 }
 
-std::optional<LoadMetric> FindLoadMetric(std::string_view name) {
-  const std::vector<NamedChoice>& choices = LoadMetrics();
+std::optional<BalanceBy> FindBalanceBy(std::string_view name) {
+  const std::vector<NamedChoice>& choices = BalanceByChoices();
   const auto found = std::ranges::find(choices.begin() + 1, choices.end(), name, &NamedChoice::name);
   if (found == choices.end()) return std::nullopt;
-  return LoadMetric(found - choices.begin() - 1);
+  return BalanceBy(found - choices.begin() - 1);
 }
 
-std::string_view NameOf(LoadMetric metric) { return LoadMetrics()[std::size_t(metric) + 1].name; }
+std::string_view NameOf(BalanceBy metric) { return BalanceByChoices()[std::size_t(metric) + 1].name; }
 
 const std::vector<NamedChoice>& BalanceModes() {
   static const std::vector<NamedChoice> choices = {
-      {kStaticBalance, "boxes stay as they were made"},
-      {kDynamicBalance, "boxes are resized between frames where what is won pays for the voxels that move"},
+      {kStaticBalance, "boxes do not change"},
+      {kDynamicBalance, "box boundaries move between frames if that saves more time than moving the voxels costs"},
   };
   return choices;
 }

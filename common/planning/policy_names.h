@@ -25,10 +25,10 @@ struct NamedChoice {
 };
 
 // --balance-by: what boxes have equal shares of.
-enum class LoadMetric { kVoxels, kOccupied, kCost };
-const std::vector<NamedChoice>& LoadMetrics();                    // kAutomatic first, then by LoadMetric
-std::optional<LoadMetric> FindLoadMetric(std::string_view name);  // none: kAutomatic, or no such name
-std::string_view NameOf(LoadMetric metric);
+enum class BalanceBy { kVoxels, kOccupied, kCost };
+const std::vector<NamedChoice>& BalanceByChoices();             // kAutomatic first, then by BalanceBy
+std::optional<BalanceBy> FindBalanceBy(std::string_view name);  // none: kAutomatic, or no such name
+std::string_view NameOf(BalanceBy metric);
 
 // --balance: whether boxes change between frames.
 const std::vector<NamedChoice>& BalanceModes();  // "static", "dynamic"

@@ -55,7 +55,8 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
   }
   if (request.overlay) {
     if (summary.overlay == nullptr) return Missing(request, "overlay", "--overlay-transfer, --overlay-range or --overlay-weight");
-    Result<TransferFunction> transfer = ResolveTransfer(request.overlay->transfer, *summary.overlay);
+    Result<TransferFunction> transfer =
+        ResolveTransfer({.choice = request.overlay->choice, .scalar_range = request.overlay->scalar_range}, *summary.overlay);
     if (!transfer.ok()) return transfer.status();
     if (request.overlay->weight > 0) {
       looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
@@ -67,7 +68,7 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
 }  // namespace
 
 Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary) {
-  if (!renderer.draws_cells() || !summary.cells.empty()) return Status::Ok();
+  if (!renderer.Can(Ability::kCells) || !summary.cells.empty()) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume", renderer.name(), dataset));
 }

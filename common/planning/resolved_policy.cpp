@@ -22,7 +22,7 @@ Status CheckName(std::string_view field, std::string_view name, const std::vecto
 
 Status CheckNames(const Policy& policy) {
   if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions(), true); !s.ok()) return s;
-  if (Status s = CheckName("policy.load_metric", policy.load_metric, LoadMetrics()); !s.ok()) return s;
+  if (Status s = CheckName("policy.balance_by", policy.balance_by, BalanceByChoices()); !s.ok()) return s;
   if (Status s = CheckName("policy.assignment", policy.assignment, Assignments(), true); !s.ok()) return s;
   if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
   if (policy.combine == kAutomatic) return Status::Ok();
@@ -46,7 +46,7 @@ Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGe
   }
   const DecompositionEntry* const decomposition = FindNamed(Decompositions(), policy.decomposition);
   return ResolvedPolicy{.decomposition = decomposition,
-                        .load_metric = FindLoadMetric(LoadMetricOf(policy)).value(),
+                        .balance_by = FindBalanceBy(BalanceByOf(policy)).value(),
                         .axis = SlabAxis(policy.axis, *decomposition, geometry.size),
                         .groups = policy.groups,
                         .assignment = FindNamed(Assignments(), policy.assignment),
@@ -58,7 +58,7 @@ Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGe
 
 Policy AskFor(const ResolvedPolicy& policy) {
   return {.decomposition = std::string(policy.decomposition->name),
-          .load_metric = std::string(NameOf(policy.load_metric)),
+          .balance_by = std::string(NameOf(policy.balance_by)),
           .axis = AxisChoice(policy.axis),
           .groups = policy.groups,
           .assignment = std::string(policy.assignment->name),
@@ -80,19 +80,19 @@ Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const 
   return longest;
 }
 
-std::string_view LoadMetricOf(const Policy& policy) {
-  if (policy.load_metric != kAutomatic || policy.decomposition == kAutomatic) return policy.load_metric;
-  return FindNamed(Decompositions(), policy.decomposition)->load_metric;
+std::string_view BalanceByOf(const Policy& policy) {
+  if (policy.balance_by != kAutomatic || policy.decomposition == kAutomatic) return policy.balance_by;
+  return FindNamed(Decompositions(), policy.decomposition)->balance_by;
 }
 
 bool NeedsOccupancy(const Policy& policy) {
   if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
-  return FindLoadMetric(LoadMetricOf(policy)) != LoadMetric::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
+  return FindBalanceBy(BalanceByOf(policy)) != BalanceBy::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
          policy.balance == kDynamicBalance;
 }
 
 bool NeedsOccupancy(const ResolvedPolicy& policy) {
-  return policy.load_metric != LoadMetric::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
+  return policy.balance_by != BalanceBy::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
 }
 
 }  // namespace slabstream

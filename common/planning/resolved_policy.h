@@ -16,7 +16,7 @@ namespace slabstream {
 
 struct ResolvedPolicy {
   const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
-  LoadMetric load_metric = LoadMetric::kVoxels;
+  BalanceBy balance_by = BalanceBy::kVoxels;
   Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
   const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
@@ -45,7 +45,7 @@ Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const 
 
 // The policy's load metric. "auto" becomes what suits the decomposition, and stays "auto" while that is open. The policy's names must be
 // known.
-std::string_view LoadMetricOf(const Policy& policy);
+std::string_view BalanceByOf(const Policy& policy);
 
 // Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);

@@ -49,6 +49,14 @@ std::vector<std::string_view> RendererNames() {
   return names;
 }
 
+std::string NamesOfAble(Ability ability) {
+  std::vector<std::string_view> names;
+  for (const RendererKind* kind : Renderers()) {
+    if (kind->Can(ability)) names.push_back(kind->name());
+  }
+  return fmt::format("{}", fmt::join(names, ", "));
+}
+
 const RendererKind* FindRenderer(std::string_view name) {
   const auto found = std::ranges::find(Renderers(), name, &RendererKind::name);
   return found == Renderers().end() ? nullptr : *found;

@@ -17,6 +17,8 @@ namespace slabstream {
 std::span<const RendererKind* const> Renderers();
 
 std::vector<std::string_view> RendererNames();
+// "splat, mip": those that have the ability.
+std::string NamesOfAble(Ability ability);
 
 // Null: no renderer has this name.
 const RendererKind* FindRenderer(std::string_view name);

@@ -45,6 +45,12 @@ LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
 
 CostView CostViewOf(const FrameSetup& setup) { return {.along = setup.camera.traversal_axis, .pixels_per_voxel = PixelsPerVoxel(setup)}; }
 
+std::vector<std::string_view> RendererKind::AbilityNames() const {
+  std::vector<std::string_view> names;
+  for (const Ability ability : facts_.abilities) names.push_back(NameOf(ability));
+  return names;
+}
+
 Status RendererKind::SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const {
   setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
   return Status::Ok();

@@ -5,6 +5,7 @@
 // Every kind is a constant object (Renderers()) that any thread may use.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -15,6 +16,7 @@
 #include "common/base/status.h"
 #include "common/classification/classification_table.h"
 #include "common/frame/frame_setup.h"
+#include "common/renderers/ability.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
 #include "common/volume/summary.h"
@@ -77,14 +79,9 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels outside a box that its samples depend on, [0, kHalo]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
-    bool perspective = true;                  // draws perspective views, too
-    bool shows_labels = false;
-    bool shows_overlays = false;
-    bool isosurfaces = false;       // draws TransferFunction::isosurfaces
-    bool gradient_opacity = false;  // multiplies opacities by TransferFunction::gradient_opacities
-    bool draws_cells = false;       // the cells of unstructured grids; other datasets are refused
-    double footprint = 1;           // pixels that a voxel fills, for each pixel of its cross-section
-    std::vector<Stage> stages;      // stages that the pixel half charges time to, in order
+    std::vector<Ability> abilities;           // in order
+    double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
+    std::vector<Stage> stages;                // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
 
@@ -99,17 +96,14 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   bool along_slices() const { return facts_.along_slices; }
-  bool perspective() const { return facts_.perspective; }
+  const std::vector<Ability>& abilities() const { return facts_.abilities; }
+  std::vector<std::string_view> AbilityNames() const;
+  bool Can(Ability ability) const { return std::ranges::find(facts_.abilities, ability) != facts_.abilities.end(); }
   // Those that it draws.
   std::span<const Projection> projections() const {
     static constexpr Projection kProjections[] = {Projection::kOrthographic, Projection::kPerspective};
-    return std::span(kProjections).first(facts_.perspective ? 2 : 1);
+    return std::span(kProjections).first(Can(Ability::kPerspective) ? 2 : 1);
   }
-  bool shows_labels() const { return facts_.shows_labels; }
-  bool shows_overlays() const { return facts_.shows_overlays; }
-  bool isosurfaces() const { return facts_.isosurfaces; }
-  bool gradient_opacity() const { return facts_.gradient_opacity; }
-  bool draws_cells() const { return facts_.draws_cells; }
   double footprint() const { return facts_.footprint; }
   const std::vector<Stage>& stages() const { return facts_.stages; }
   const std::vector<RendererParameter>& parameters() const { return facts_.parameters; }

@@ -61,7 +61,7 @@ Status KeyFolder::Read() {
       admitted_.push_back(std::move(key));
     }
   } catch (const Json::exception&) {
-    return Status::InvalidArgument(fmt::format("'{}' is damaged; without it the service makes new keys", path));
+    return Status::InvalidArgument(fmt::format("'{}' is damaged; delete it to make new keys", path));
   }
   return Status::Ok();
 }
@@ -127,7 +127,7 @@ Result<std::string> KeyFolder::Revoke(const std::string& key) {
   const auto is_it = [&](const AdmittedKey& admitted) { return admitted.public_key == key || IdOfKey(admitted.public_key) == key; };
   const auto found = std::ranges::find_if(admitted_, is_it);
   if (found == admitted_.end())
-    return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` names those that are", key));
+    return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` prints the admitted keys", key));
   std::string public_key = found->public_key;
   if (std::ranges::count_if(admitted_, is_it) > 1)
     return Status::InvalidArgument(fmt::format("'{}' is the id of several keys: name one of them in full", key));

@@ -34,7 +34,7 @@ Result<std::string> LocalHostTowards(const Endpoint& endpoint);
 // This machine's end of a connected tcp socket, as the host of an endpoint; empty: it is not connected.
 std::string LocalHostOf(int descriptor);
 
-// Removes the socket files whose paths begin like this ipc endpoint's, if nobody listens there any more: processes that were killed leave
+// Removes the socket files whose paths begin like this ipc endpoint's, if nobody listens there now: processes that were killed leave
 // theirs. Does nothing for other endpoints.
 void RemoveDeadSockets(const Endpoint& prefix);
 

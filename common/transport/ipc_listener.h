@@ -1,6 +1,6 @@
 // IpcListener: a listening Unix socket and its file, made here and handed to ZeroMQ as a descriptor.
 //
-// ZeroMQ could bind the path itself, but it first removes whatever lies there, even a living service's socket or a user's file, and removes
+// ZeroMQ could bind the path itself, but it first removes what is there, even a living service's socket or a user's file, and removes
 // its own file some time after closing. Here a path is taken over only from a socket that nobody listens on, and the file is gone when
 // Remove returns.
 #pragma once

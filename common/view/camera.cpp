@@ -88,16 +88,6 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   return look;
 }
 
-Status CheckPoint(const std::string& field, const std::optional<Vec3>& point) {
-  for (const Axis axis : kAxes) {
-    if (!point) continue;
-    if (Status s = InRange(fmt::format("{}.{}", field, Letter(axis)), (*point)[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) {
-      return s;
-    }
-  }
-  return Status::Ok();
-}
-
 // The data axis nearest to `direction`. The tolerance keeps rounding noise from choosing between axes that tie (azimuth 45).
 Axis NearestAxis(const Vec3& direction) {
   constexpr double kTie = 1e-9;
@@ -123,30 +113,6 @@ Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]};
 double ScaleOf(const Camera& camera) { return Dot(Linear(camera.x_row) / camera.spacing, camera.right); }
 
 }  // namespace
-
-Status Validate(const ViewParameters& view) {
-  if (view.projection != Projection::kOrthographic && view.projection != Projection::kPerspective) {
-    return Status::InvalidArgument(
-        fmt::format("view.projection is {}, but must be 1 (orthographic) or 2 (perspective)", int(view.projection)));
-  }
-  if (Status s = InRange("view.azimuth", view.azimuth_degrees, -kMaxAngleDegrees, kMaxAngleDegrees); !s.ok()) return s;
-  if (Status s = InRange("view.elevation", view.elevation_degrees, -kMaxAngleDegrees, kMaxAngleDegrees); !s.ok()) return s;
-  if (Status s = InRange("view.roll", view.roll_degrees, -kMaxAngleDegrees, kMaxAngleDegrees); !s.ok()) return s;
-  if (Status s = InRange("view.zoom", view.zoom, kMinZoom, kMaxZoom); !s.ok()) return s;
-  if (Status s = InRange("view.fov", view.fov_degrees, kMinFovDegrees, kMaxFovDegrees); !s.ok()) return s;
-  if (Status s = CheckPoint("view.look_at", view.look_at); !s.ok()) return s;
-  if (Status s = CheckPoint("view.eye", view.eye); !s.ok()) return s;
-  if (Status s = CheckPoint("view.up", view.up); !s.ok()) return s;
-  if (Status s = InRange("view.distance", view.distance, 0, kMaxWorldCoordinate); !s.ok()) return s;
-  if (view.fit && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
-  if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll turns the picture");
-  if (view.up && !(Length(*view.up) > 0)) return Status::InvalidArgument("view.up is 0,0,0, but must be a direction");
-  if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
-  if (view.distance > 0 && view.projection != Projection::kPerspective) {
-    return Status::InvalidArgument("view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
-  }
-  return Status::Ok();
-}
 
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
   ViewParameters fitted = view;
@@ -185,14 +151,8 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
   if (look.distance >= least) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("view.{} is {:.6g} from the point that it looks at, but must be at least {:.6g} in this direction, so that "
-                  "the whole volume lies before it; view.zoom magnifies the picture",
+                  "the whole volume is in front of it; view.zoom magnifies the picture",
                   view.eye ? "eye" : "distance: the eye", look.distance, least));
-}
-
-Status Validate(const ImageSize& size) {
-  if (Status s = InRange("size.width", size.width, 1, kMaxImageSide); !s.ok()) return s;
-  if (Status s = InRange("size.height", size.height, 1, kMaxImageSide); !s.ok()) return s;
-  return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
 }
 
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {

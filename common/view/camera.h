@@ -60,11 +60,8 @@ struct ViewParameters {
   friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
 };
 
-// InvalidArgument naming field, value and limits; NaN is never valid.
-Status Validate(const ViewParameters& view);
 // InvalidArgument naming field, value and limits: a valid view that cannot be had of this volume.
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry);
-Status Validate(const ImageSize& size);
 
 // Everything about one view of one volume, in double precision. p is a data-space point.
 //   w = Dot(w_row, (p, 1)); x = Dot(x_row, (p, 1)) / w; y = Dot(y_row, (p, 1)) / w; depth = Dot(depth_row, (p, 1))
@@ -102,7 +99,7 @@ struct Camera {
 };
 
 // The view in the same direction whose target is `centre` (data space), and in which a ball of `radius` > 0 (physical) round it touches the
-// shorter side of the picture at zoom 1. The eye's distance stays. Not `fit` any more.
+// shorter side of the picture at zoom 1. The eye's distance stays. `fit` is off afterwards.
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius);
 
 // `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.

@@ -80,63 +80,7 @@ void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<H
   for (const double sign : {1.0, -1.0}) sides.push_back(FromWorld({sign * normal, half - sign * Dot(normal, through)}, geometry));
 }
 
-Status CheckNormal(const std::string& field, const Vec3& normal) {
-  for (const Axis axis : kAxes) {
-    const std::string component = fmt::format("{}.{}", field, Letter(axis));
-    if (Status s = InRange(component, normal[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
-  }
-  constexpr double kLeastLength = 1e-9;
-  if (Length(normal) >= kLeastLength) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is ({}, {}, {}), but must not be zero", field, normal.x, normal.y, normal.z));
-}
-
 }  // namespace
-
-Status Validate(const Clipping& clipping) {
-  if (clipping.mode != ClipMode::kKeep && clipping.mode != ClipMode::kCutAway) {
-    return Status::InvalidArgument(fmt::format("clip.mode is {}, but must be 1 (keep) or 2 (cut-away)", int(clipping.mode)));
-  }
-  if (clipping.box) {
-    const ClipBox& box = *clipping.box;
-    if (box.unit < ClipUnit::kWorld || box.unit > ClipUnit::kPercent) {
-      return Status::InvalidArgument(fmt::format("clip.box.unit is {}, but must be 1 (world), 2 (voxels) or 3 (percent)", int(box.unit)));
-    }
-    for (const Axis axis : kAxes) {
-      const double low = box.low[axis], high = box.high[axis];
-      for (const double bound : {low, high}) {
-        const std::string field = fmt::format("clip.box.{}", Letter(axis));
-        if (Status s = InRange(field, bound, -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
-      }
-      if (!(low < high)) {
-        return Status::InvalidArgument(fmt::format("clip.box.{} is {}:{}, but must rise", Letter(axis), low, high));
-      }
-    }
-  }
-  if (clipping.slab) {
-    if (Status s = CheckNormal("clip.slab.normal", clipping.slab->normal); !s.ok()) return s;
-    if (Status s = InRange("clip.slab.thickness", clipping.slab->thickness, 0, kMaxWorldCoordinate); !s.ok()) return s;
-    if (clipping.slab->through && clipping.slab->index) {
-      return Status::InvalidArgument("clip.slab has both a point and an index, but one is enough");
-    }
-    if (Status s = InRange("clip.slab.index", clipping.slab->index.value_or(0), 0, kMaxVolumeSide - 1); !s.ok()) return s;
-    for (const Axis axis : kAxes) {
-      if (!clipping.slab->through) break;
-      const std::string field = fmt::format("clip.slab.through.{}", Letter(axis));
-      if (Status s = InRange(field, (*clipping.slab->through)[axis], -kMaxWorldCoordinate, kMaxWorldCoordinate); !s.ok()) return s;
-    }
-  }
-  if (clipping.planes.size() > kMaxClipPlanes) {
-    return Status::InvalidArgument(fmt::format("clip.planes: {} are too many; the limit is {}", clipping.planes.size(), kMaxClipPlanes));
-  }
-  for (std::size_t i = 0; i < clipping.planes.size(); ++i) {
-    const ClipPlane& plane = clipping.planes[i];
-    const std::string field = fmt::format("clip.planes[{}]", i);
-    if (Status s = CheckNormal(field + ".normal", plane.normal); !s.ok()) return s;
-    const double most = kMaxWorldCoordinate * kMaxWorldCoordinate;
-    if (Status s = InRange(field + ".offset", plane.offset, -most, most); !s.ok()) return s;
-  }
-  return Status::Ok();
-}
 
 bool ClipRegion::Keeps(const Vec3& p) const {
   if (empty()) return true;

@@ -64,9 +64,6 @@ struct Clipping {
   friend bool operator==(const Clipping&, const Clipping&) = default;
 };
 
-// InvalidArgument naming field, value and limits.
-Status Validate(const Clipping& clipping);
-
 // The points p of data space with Distance(p) >= 0. Distance is in the unit of the spacing: |normal / spacing| is 1.
 struct HalfSpace {
   Vec3 normal;
@@ -83,7 +80,7 @@ inline constexpr std::size_t kMaxClipSides = kMaxClipPlanes + 6 + 2;  // planes,
 inline constexpr double kFaceDepth = 2.5;
 
 struct ClipRegion {
-  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, whatever the mode
+  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, in either mode
   ClipMode mode = ClipMode::kKeep;
 
   bool empty() const { return sides.empty(); }

@@ -32,6 +32,4 @@ struct Shading {
   friend bool operator==(const Shading&, const Shading&) = default;
 };
 
-Status Validate(const Shading& shading);
-
 }  // namespace slabstream

@@ -1,7 +1,7 @@
 // Where a volume lies in world space: world = origin + sum over axes of axes[i] * spacing[i] * voxel[i].
 //
 // Readers turn what they read to the nearest axes of its world (data/volume_io/world_placement.h). So x, y and z of voxels always run
-// roughly along x, y and z of the world, in whatever order and direction a file stores them.
+// roughly along x, y and z of the world, in any order and direction of storage in a file.
 #pragma once
 
 #include <array>

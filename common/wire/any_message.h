@@ -1,14 +1,16 @@
-// The only list of messages. Services visit the variant without a default branch, so that the compiler asks for a handler of each new one.
-// The codec tests run over every member.
+// Messages to bytes and back. The header of each plane lists its messages, a variant for each direction. Whoever receives one of these
+// visits it without a default branch, so that the compiler asks for a handler of each new message. The codec tests run over every message.
 //
 // On the wire a message is one ZeroMQ frame with a Protobuf Envelope {version, one of the messages below} and, where the message has a
 // payload, one more frame of raw bytes. docs/wire.md describes it byte by byte.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -17,46 +19,76 @@
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
 #include "common/wire/slab_messages.h"
-#include "common/wire/volume_messages.h"
 
 namespace slabstream {
 
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-// In the order of planes: control, slabs, images, client.
-using AnyMessage =
-    std::variant<Register, Welcome, Heartbeat, Ping, GroupAssignment, GroupDone, FrameImage, WorkerTrouble, Leave, Retire, Stop,
-                 ChunkRequest, Chunk, ChunkRefused, PartialImage, ImageRefused, ImageReceived, SubmitFrame, FrameProgress, FrameReply,
-                 FrameFailed, CancelFrame, ClientPing, ClientPong, StatusQuery, StatusReply, ShutDown, ShutDownReply, KeysOrder, KeysReply,
-                 OrderRefused, DataOrder, DataReply, SummaryQuery, SummaryReply, SampleQuery, SampleReply, PickQuery, PickReply, AddVolume,
-                 VolumeCredit, VolumePart, DropVolume>;
+template <class... Variants>
+struct Merge;
+template <class Variant>
+struct Merge<Variant> {
+  using Type = Variant;
+};
+template <class... A, class... B, class... Variants>
+struct Merge<std::variant<A...>, std::variant<B...>, Variants...> : Merge<std::variant<A..., B...>, Variants...> {};
+// One variant of all that these variants may hold.
+template <class... Variants>
+using Merged = typename Merge<Variants...>::Type;
 
-// The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator. Each message
-// belongs to one: to that of the header that declares it.
+// The same message in a variant of more.
+template <class Wider>
+Wider Widen(auto variant) {
+  return std::visit([](auto& message) { return Wider(std::move(message)); }, variant);
+}
+
+using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToSlabs, SlabsToWorker, WorkerToWorker, ClientToCoordinator,
+                          CoordinatorToClient>;
+
+// A message where it is: itself, or in a variant of messages.
+class MessageView {
+  template <class... Messages>
+  static std::variant<const Messages*...> PointersTo(std::variant<Messages...>);
+
+ public:
+  using Held = decltype(PointersTo(std::declval<AnyMessage>()));
+
+  template <class Message>
+  requires std::constructible_from<Held, std::in_place_type_t<const Message*>> MessageView(const Message& message)
+      : held(std::in_place_type<const Message*>, &message) {}
+  template <class... Messages>
+  MessageView(const std::variant<Messages...>& messages)
+      : held(std::visit([](const auto& message) { return MessageView(message).held; }, messages)) {}
+
+  const Held held;
+};
+
+// The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator.
 enum class Plane { kControl, kSlabs, kImages, kClient };
-Plane PlaneOf(const AnyMessage& message);
 std::string_view NameOf(Plane plane);  // "control": for logs
 
-std::vector<std::byte> Encode(const AnyMessage& message);
+std::vector<std::byte> Encode(MessageView message);
 
-// InvalidArgument naming the message, the field, the value and the limit: wrong version, unknown enum value, NaN, a size out of bounds,
-// undecodable bytes. The result keeps everything that the structs' comments promise; nobody checks again.
-Result<AnyMessage> Decode(std::span<const std::byte> header);
+// Of one of `Messages`: AnyMessage, or one of the variants in it. InvalidArgument naming the message, the field, the value and the
+// limit: another message, wrong version, unknown enum value, NaN, a size out of bounds, undecodable bytes. The result keeps everything that
+// the structs' comments promise; nobody checks again.
+template <class Messages = AnyMessage>
+Result<Messages> Decode(std::span<const std::byte> header);
 
-// Decode for a socket that carries one plane. InvalidArgument also for a message of another plane, and for a payload frame that is not as
-// long as the header says.
-Result<AnyMessage> DecodeOn(Plane plane, std::span<const std::byte> header, std::size_t payload_bytes);
+// InvalidArgument also for a payload frame that is not as long as the header says.
+template <class Messages>
+Result<Messages> Decode(std::span<const std::byte> header, std::size_t payload_bytes);
 
 // The answer to a SubmitFrame or a question (SummaryQuery, SampleQuery, PickQuery) or part of a volume (AddVolume,
 // VolumePart) that Decode has refused, so that its client hears why:
 // FrameFailed or OrderRefused. nullopt for every other header.
-std::optional<AnyMessage> RefusalOf(std::span<const std::byte> header, const Status& why);
+std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, const Status& why);
 
 // "GroupAssignment": for logs and messages.
-std::string_view NameOf(const AnyMessage& message);
+std::string_view NameOf(MessageView message);
 
 // Length that the payload frame of this message must have; 0: the message has none.
-std::size_t ExpectedPayloadBytes(const AnyMessage& message);
+std::size_t ExpectedPayloadBytes(MessageView message);
 
 }  // namespace slabstream

@@ -11,6 +11,7 @@ static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
 static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMillimetre));
 static_assert(v1::DataAction_MAX == static_cast<int>(DataAction::kReload));
 
+v1::SubmitFrame ProtoOf(const SubmitFrame&);
 void Fields(auto& io, Is<SubmitFrame> auto& m) {
   using P = v1::SubmitFrame;
   io.Any(m.request, &P::request, &P::set_request);
@@ -18,6 +19,7 @@ void Fields(auto& io, Is<SubmitFrame> auto& m) {
   io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
 }
 
+v1::FrameProgress ProtoOf(const FrameProgress&);
 void Fields(auto& io, Is<FrameProgress> auto& m) {
   using P = v1::FrameProgress;
   io.Any(m.request, &P::request, &P::set_request);
@@ -47,7 +49,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 0, kMaxNameBytes);
   io.Text("axis", m.axis, &P::axis, &P::mutable_axis, 0, kMaxNameBytes);
   io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 0, kMaxNameBytes);
-  io.Text("load_metric", m.load_metric, &P::load_metric, &P::mutable_load_metric, 0, kMaxNameBytes);
+  io.Text("balance_by", m.balance_by, &P::balance_by, &P::mutable_balance_by, 0, kMaxNameBytes);
   io.Text("assignment", m.assignment, &P::assignment, &P::mutable_assignment, 0, kMaxNameBytes);
   io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 0, kMaxNameBytes);
   io.Any(m.queued_ns, &P::queued_ns, &P::set_queued_ns);
@@ -77,6 +79,7 @@ void Fields(auto& io, Is<PictureGeometry> auto& m) {
   });
 }
 
+v1::FrameReply ProtoOf(const FrameReply&);
 void Fields(auto& io, Is<FrameReply> auto& m) {
   using P = v1::FrameReply;
   io.Any(m.request, &P::request, &P::set_request);
@@ -92,14 +95,17 @@ void Fields(auto& io, Is<FrameReply> auto& m) {
   });
 }
 
+v1::FrameFailed ProtoOf(const FrameFailed&);
 void Fields(auto& io, Is<FrameFailed> auto& m) {
   using P = v1::FrameFailed;
   io.Any(m.request, &P::request, &P::set_request);
   io.Message("status", m.status, &P::status, &P::mutable_status);
 }
 
+v1::CancelFrame ProtoOf(const CancelFrame&);
 void Fields(auto& io, Is<CancelFrame> auto& m) { io.Any(m.request, &v1::CancelFrame::request, &v1::CancelFrame::set_request); }
 
+v1::ClientPing ProtoOf(const ClientPing&);
 void Fields(auto& io, Is<ClientPing> auto& m) {
   using P = v1::ClientPing;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -107,6 +113,7 @@ void Fields(auto& io, Is<ClientPing> auto& m) {
   io.Any(m.received_bytes, &P::received_bytes, &P::set_received_bytes);
 }
 
+v1::ClientPong ProtoOf(const ClientPong&);
 void Fields(auto& io, Is<ClientPong> auto& m) {
   using P = v1::ClientPong;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -114,6 +121,7 @@ void Fields(auto& io, Is<ClientPong> auto& m) {
   io.Numbers("known", m.known, &P::known, &P::mutable_known, kMaxOpenRequests);
 }
 
+v1::StatusQuery ProtoOf(const StatusQuery&);
 void Fields(auto& io, Is<StatusQuery> auto& m) { io.Any(m.nonce, &v1::StatusQuery::nonce, &v1::StatusQuery::set_nonce); }
 
 void Fields(auto& io, Is<WorkerStatus> auto& m) {
@@ -155,6 +163,7 @@ void Fields(auto& io, Is<RefusedRequests> auto& m) {
   io.Any(m.over_quota, &P::over_quota, &P::set_over_quota);
 }
 
+v1::StatusReply ProtoOf(const StatusReply&);
 void Fields(auto& io, Is<StatusReply> auto& m) {
   using P = v1::StatusReply;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -173,10 +182,13 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
   io.Message("refused", m.refused, &P::refused, &P::mutable_refused);
 }
 
+v1::ShutDown ProtoOf(const ShutDown&);
 void Fields(auto& io, Is<ShutDown> auto& m) { io.Any(m.nonce, &v1::ShutDown::nonce, &v1::ShutDown::set_nonce); }
 
+v1::ShutDownReply ProtoOf(const ShutDownReply&);
 void Fields(auto& io, Is<ShutDownReply> auto& m) { io.Any(m.nonce, &v1::ShutDownReply::nonce, &v1::ShutDownReply::set_nonce); }
 
+v1::KeysOrder ProtoOf(const KeysOrder&);
 void Fields(auto& io, Is<KeysOrder> auto& m) {
   using P = v1::KeysOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -192,18 +204,21 @@ void Fields(auto& io, Is<AdmittedKey> auto& m) {
   io.Text("made", m.made, &P::made, &P::mutable_made, 0, kMaxKeyBytes);
 }
 
+v1::KeysReply ProtoOf(const KeysReply&);
 void Fields(auto& io, Is<KeysReply> auto& m) {
   using P = v1::KeysReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Messages("keys", m.keys, &P::keys, &P::mutable_keys, kMaxListed);
 }
 
+v1::OrderRefused ProtoOf(const OrderRefused&);
 void Fields(auto& io, Is<OrderRefused> auto& m) {
   using P = v1::OrderRefused;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Message("status", m.status, &P::status, &P::mutable_status);
 }
 
+v1::DataOrder ProtoOf(const DataOrder&);
 void Fields(auto& io, Is<DataOrder> auto& m) {
   using P = v1::DataOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -211,12 +226,14 @@ void Fields(auto& io, Is<DataOrder> auto& m) {
   io.ByteStrings("items", m.items, &P::items, &P::mutable_items, kMaxDataItems, kMaxDataItemBytes);
 }
 
+v1::DataReply ProtoOf(const DataReply&);
 void Fields(auto& io, Is<DataReply> auto& m) {
   using P = v1::DataReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
 }
 
+v1::SummaryQuery ProtoOf(const SummaryQuery&);
 void Fields(auto& io, Is<SummaryQuery> auto& m) {
   using P = v1::SummaryQuery;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -226,6 +243,8 @@ void Fields(auto& io, Is<SummaryQuery> auto& m) {
     if (check.ok()) check.Adopt(Validate(m.transfer));
   });
 }
+
+inline void Read(const v1::SummaryQuery& in, SummaryQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
 
 void Fields(auto& io, Is<Percentile> auto& m) {
   using P = v1::Percentile;
@@ -246,6 +265,7 @@ void Fields(auto& io, Is<Label> auto& m) {
   });
 }
 
+v1::SummaryReply ProtoOf(const SummaryReply&);
 void Fields(auto& io, Is<SummaryReply> auto& m) {
   using P = v1::SummaryReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -263,6 +283,7 @@ void Fields(auto& io, Is<SummaryReply> auto& m) {
   });
 }
 
+v1::SampleQuery ProtoOf(const SampleQuery&);
 void Fields(auto& io, Is<SampleQuery> auto& m) {
   using P = v1::SampleQuery;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -296,12 +317,14 @@ inline void Read(const v1::VolumeSample& in, VolumeSample& out, Checker& check) 
   if (in.has_overlay()) out.overlay = check.Finite("overlay", in.overlay());
 }
 
+v1::SampleReply ProtoOf(const SampleReply&);
 void Fields(auto& io, Is<SampleReply> auto& m) {
   using P = v1::SampleReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Messages("samples", m.samples, &P::samples, &P::mutable_samples, kMaxSamplePoints);
 }
 
+v1::PickQuery ProtoOf(const PickQuery&);
 void Fields(auto& io, Is<PickQuery> auto& m) {
   using P = v1::PickQuery;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -310,6 +333,7 @@ void Fields(auto& io, Is<PickQuery> auto& m) {
   io.Between("y", m.y, &P::y, &P::set_y, 0, m.frame.size.height);
 }
 
+v1::PickReply ProtoOf(const PickReply&);
 void Fields(auto& io, Is<PickReply> auto& m) {
   using P = v1::PickReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);

@@ -32,6 +32,7 @@
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
+#include "common/wire/volume_messages.h"
 #include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
@@ -61,13 +62,13 @@ struct FrameProgress {
 // What the frame's plan was and what it cost; reports of all groups.
 struct FrameStatistics {
   std::uint32_t workers = 0, groups = 0, attempts = 0;
-  std::string decomposition, load_metric, axis, assignment, balance, combine;  // axis: "x", "y" or "z"
-  std::int64_t queued_ns = 0;                                                  // arrival to plan
-  std::int64_t begin_ns = 0, end_ns = 0;                                       // plan to last byte at the coordinator, MonotonicNow() clock
-  std::vector<RankReport> reports;                                             // at most kMaxReports
-  std::uint32_t display = 0;                                                   // worker
-  PixelBounds grid;                                                            // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                                    // if the policy left a choice
+  std::string decomposition, balance_by, axis, assignment, balance, combine;  // axis: "x", "y" or "z"
+  std::int64_t queued_ns = 0;                                                 // arrival to plan
+  std::int64_t begin_ns = 0, end_ns = 0;                                      // plan to last byte at the coordinator, MonotonicNow() clock
+  std::vector<RankReport> reports;                                            // at most kMaxReports
+  std::uint32_t display = 0;                                                  // worker
+  PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
+  std::optional<FramePrediction> predicted;                                   // if the policy left a choice
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
@@ -274,6 +275,11 @@ struct PickReply {
   double depth = 0;                    // of it, as depths of the picture's pixels
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
+
+using ClientToCoordinator = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown, KeysOrder, DataOrder, SummaryQuery,
+                                         SampleQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using CoordinatorToClient = std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply,
+                                         DataReply, OrderRefused, SummaryReply, SampleReply, PickReply, VolumeCredit>;
 
 using Question = std::variant<SummaryQuery, SampleQuery, PickQuery>;
 using QuestionReply = std::variant<SummaryReply, SampleReply, PickReply>;

@@ -18,6 +18,7 @@ void PlaceFields(auto& io, Is<SlotPlace> auto& m) {
   io.Any(m.slots, &P::slots, &P::set_slots);
 }
 
+v1::Register ProtoOf(const Register&);
 void Fields(auto& io, Is<Register> auto& m) {
   using P = v1::Register;
   io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
@@ -32,6 +33,7 @@ void Fields(auto& io, Is<Register> auto& m) {
   PlaceFields<P>(io, m.place);
 }
 
+v1::Welcome ProtoOf(const Welcome&);
 void Fields(auto& io, Is<Welcome> auto& m) {
   using P = v1::Welcome;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -42,6 +44,7 @@ void Fields(auto& io, Is<Welcome> auto& m) {
   io.Range("timeout_ms", m.timeout_ms, &P::timeout_ms, &P::set_timeout_ms, 100, 600000);
 }
 
+v1::Heartbeat ProtoOf(const Heartbeat&);
 void Fields(auto& io, Is<Heartbeat> auto& m) {
   using P = v1::Heartbeat;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -53,6 +56,7 @@ void Fields(auto& io, Is<Heartbeat> auto& m) {
   io.Any(m.leaving, &P::leaving, &P::set_leaving);
 }
 
+v1::Ping ProtoOf(const Ping&);
 void Fields(auto& io, Is<Ping> auto& m) {
   using P = v1::Ping;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -105,6 +109,7 @@ inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker&
   if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
 }
 
+v1::GroupAssignment ProtoOf(const GroupAssignment&);
 void Fields(auto& io, Is<GroupAssignment> auto& m) {
   using P = v1::GroupAssignment;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -127,6 +132,7 @@ void Fields(auto& io, Is<GroupAssignment> auto& m) {
   });
 }
 
+v1::GroupDone ProtoOf(const GroupDone&);
 void Fields(auto& io, Is<GroupDone> auto& m) {
   using P = v1::GroupDone;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -136,6 +142,7 @@ void Fields(auto& io, Is<GroupDone> auto& m) {
   io.Message("hidden", m.hidden, &P::hidden, &P::mutable_hidden);
 }
 
+v1::FrameImage ProtoOf(const FrameImage&);
 void Fields(auto& io, Is<FrameImage> auto& m) {
   using P = v1::FrameImage;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -148,6 +155,7 @@ void Fields(auto& io, Is<FrameImage> auto& m) {
   io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
 }
 
+v1::WorkerTrouble ProtoOf(const WorkerTrouble&);
 void Fields(auto& io, Is<WorkerTrouble> auto& m) {
   using P = v1::WorkerTrouble;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -158,14 +166,17 @@ void Fields(auto& io, Is<WorkerTrouble> auto& m) {
   io.Any(m.elsewhere, &P::elsewhere, &P::set_elsewhere);
 }
 
+v1::Leave ProtoOf(const Leave&);
 void Fields(auto& io, Is<Leave> auto& m) {
   using P = v1::Leave;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.worker, &P::worker, &P::set_worker);
 }
 
+v1::Retire ProtoOf(const Retire&);
 void Fields(auto& io, Is<Retire> auto& m) { io.Any(m.epoch, &v1::Retire::epoch, &v1::Retire::set_epoch); }
 
+v1::Stop ProtoOf(const Stop&);
 void Fields(auto& io, Is<Stop> auto& m) { io.Any(m.epoch, &v1::Stop::epoch, &v1::Stop::set_epoch); }
 
 }  // namespace slabstream

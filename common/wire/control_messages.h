@@ -16,6 +16,7 @@
 
 #include <cstdint>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "common/base/status.h"
@@ -167,5 +168,8 @@ struct Stop {
 };
 
 inline constexpr std::size_t kMaxReports = 65536;
+
+using WorkerToCoordinator = std::variant<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave>;
+using CoordinatorToWorker = std::variant<Welcome, Ping, GroupAssignment, Retire, Stop>;
 
 }  // namespace slabstream

@@ -25,8 +25,10 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 #include <vector>
 
+#include "common/frame/frame_request.h"
 #include "common/wire/checker.h"
 #include "common/wire/wire_text.h"
 
@@ -55,6 +57,10 @@ class Writer {
   template <class T>
   void Any(T value, T (P::*)() const, void (P::*set)(T)) {
     (out_.*set)(value);
+  }
+  template <class T>
+  void Any(std::string_view, T value, T (P::*get)() const, void (P::*set)(T)) {
+    Any(value, get, set);
   }
   template <class T, class Wire>
   void Range(std::string_view, T value, Wire (P::*)() const, void (P::*set)(Wire), std::uint64_t, std::uint64_t) {
@@ -104,6 +110,26 @@ class Writer {
     (out_.*edit)()->Reserve(static_cast<int>(items.size()));
     for (const Struct& item : items) Write(item, *(out_.*edit)()->Add());
   }
+  // Texts by names.
+  template <class Inner>
+  void TextMap(std::string_view, const auto& texts, const RepeatedMessage<Inner>& (P::*)() const, RepeatedMessage<Inner>* (P::*edit)(),
+               std::size_t) {
+    for (const auto& [name, text] : texts) {
+      Inner& item = *(out_.*edit)()->Add();
+      item.set_name(WireText(name, kMaxNameBytes));
+      item.set_text(WireText(text, kMaxNameBytes));
+    }
+  }
+  // A oneof of a text and a struct.
+  template <class Struct, class Inner>
+  void Either(std::string_view, const std::variant<std::string, Struct>& value, const std::string& (P::*)() const,
+              std::string* (P::*edit_text)(), std::string_view, bool (P::*)() const, const Inner& (P::*)() const, Inner* (P::*edit)()) {
+    if (const auto* text = std::get_if<std::string>(&value)) {
+      *(out_.*edit_text)() = WireText(*text, kMaxNameBytes);
+    } else {
+      Write(std::get<Struct>(value), *(out_.*edit)());
+    }
+  }
   void Check(const auto&) {}
 
  private:
@@ -119,6 +145,10 @@ class Reader {
   template <class T>
   void Any(T& value, T (P::*get)() const, void (P::*)(T)) {
     value = (in_.*get)();
+  }
+  template <class T>
+  void Any(std::string_view, T& value, T (P::*get)() const, void (P::*set)(T)) {
+    Any(value, get, set);
   }
   // In [min, max].
   template <class T, class Wire>
@@ -196,6 +226,26 @@ class Reader {
     for (std::size_t i = 0; i < items.size(); ++i) {
       const auto scope = check_.In(field, i);
       Read(in[static_cast<int>(i)], items[i], check_);
+    }
+  }
+  template <class Inner>
+  void TextMap(std::string_view field, auto& texts, const RepeatedMessage<Inner>& (P::*get)() const, RepeatedMessage<Inner>* (P::*)(),
+               std::size_t max) {
+    const RepeatedMessage<Inner>& in = (in_.*get)();
+    const int count = check_.Count(field, in.size(), max);
+    for (int i = 0; i < count; ++i) {
+      const auto scope = check_.In(field, std::size_t(i));
+      const std::string name = check_.Text("name", in[i].name(), 1, kMaxNameBytes);
+      check_.That(texts.emplace(name, check_.Text("text", in[i].text(), 1, kMaxNameBytes)).second, "name", "given twice");
+    }
+  }
+  template <class Struct, class Inner>
+  void Either(std::string_view text_field, std::variant<std::string, Struct>& value, const std::string& (P::*get_text)() const,
+              std::string* (P::*)(), std::string_view field, bool (P::*has)() const, const Inner& (P::*get)() const, Inner* (P::*edit)()) {
+    if ((in_.*has)()) {
+      Message(field, value.template emplace<Struct>(), get, edit);
+    } else {
+      value = check_.Text(text_field, (in_.*get_text)(), 1, kMaxNameBytes);
     }
   }
   // What holds between members.

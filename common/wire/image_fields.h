@@ -56,6 +56,7 @@ inline void CheckPayload(const PartialImage& m, Checker& check) {
   }
 }
 
+v1::PartialImage ProtoOf(const PartialImage&);
 void Fields(auto& io, Is<PartialImage> auto& m) {
   using P = v1::PartialImage;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -73,6 +74,7 @@ void Fields(auto& io, Is<PartialImage> auto& m) {
   io.Check([&](Checker& check) { CheckPayload(m, check); });
 }
 
+v1::ImageReceived ProtoOf(const ImageReceived&);
 void Fields(auto& io, Is<ImageReceived> auto& m) {
   using P = v1::ImageReceived;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -80,6 +82,7 @@ void Fields(auto& io, Is<ImageReceived> auto& m) {
   io.Range("number", m.number, &P::number, &P::set_number, 1, kMaxUint64);
 }
 
+v1::ImageRefused ProtoOf(const ImageRefused&);
 void Fields(auto& io, Is<ImageRefused> auto& m) {
   using P = v1::ImageRefused;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <variant>
 #include <vector>
 
 #include "common/base/rare.h"
@@ -68,5 +69,7 @@ struct ImageRefused {
   PixelRange pixels;
   friend bool operator==(const ImageRefused&, const ImageRefused&) = default;
 };
+
+using WorkerToWorker = std::variant<PartialImage, ImageRefused, ImageReceived>;
 
 }  // namespace slabstream

@@ -188,9 +188,10 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   }
   if (out.looks.labels) check.That(out.layers.labels.has_value(), "labels", "of a dataset without labels");
   if (out.looks.overlay) check.That(out.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
-  if (check.ok() && out.renderer->draws_cells()) check.That(out.layers.cells, "renderer", "one of cells, which the dataset does not have");
-  if (check.ok() && out.looks.labels) check.That(out.renderer->shows_labels(), "renderer", "one that shows no labels");
-  if (check.ok() && out.looks.overlay) check.That(out.renderer->shows_overlays(), "renderer", "one that shows no overlays");
+  if (check.ok() && out.renderer->Can(Ability::kCells))
+    check.That(out.layers.cells, "renderer", "one of cells, which the dataset does not have");
+  if (check.ok() && out.looks.labels) check.That(out.renderer->Can(Ability::kLabels), "renderer", "one that shows no labels");
+  if (check.ok() && out.looks.overlay) check.That(out.renderer->Can(Ability::kOverlay), "renderer", "one that shows no overlays");
   if (check.ok() && out.looks.overlay) {
     const TransferFunction& transfer = out.looks.overlay->transfer;
     check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty(), "overlay.transfer", "not of curves over values alone");

@@ -1,11 +1,10 @@
 // What a client asks for.
 #pragma once
 
-#include <algorithm>
 #include <string>
-#include <variant>
 
-#include "common/planning/validate_request.h"
+#include "common/wire/about.h"
+#include "common/wire/validate_request.h"
 #include "common/wire/value_fields.h"
 #include "slabstream/v1/frame.pb.h"
 
@@ -17,8 +16,8 @@ static_assert(v1::ClipMode_MAX == static_cast<int>(ClipMode::kCutAway));
 static_assert(v1::LabelMode_MAX == static_cast<int>(LabelMode::kSurface));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
-// Validate checks most ranges of these values, once for the whole FrameRequest. Checked here: what a struct cannot hold, what must be known
-// before, and what is not a number, so that the message names the field as the schema does.
+// The order is that of help texts. Limits stand in the schema; Validate checks them, once for the whole FrameRequest. Checked here: what a
+// struct cannot hold, what must be known before, and what is not a number.
 
 void Fields(auto& io, Is<ImageSize> auto& m) {
   using P = v1::ImageSize;
@@ -31,15 +30,15 @@ void Fields(auto& io, Is<ViewParameters> auto& m) {
   io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
   io.Finite("azimuth_degrees", m.azimuth_degrees, &P::azimuth_degrees, &P::set_azimuth_degrees);
   io.Finite("elevation_degrees", m.elevation_degrees, &P::elevation_degrees, &P::set_elevation_degrees);
-  io.Finite("roll_degrees", m.roll_degrees, &P::roll_degrees, &P::set_roll_degrees);
-  io.Finite("zoom", m.zoom, &P::zoom, &P::set_zoom);
-  io.Finite("fov_degrees", m.fov_degrees, &P::fov_degrees, &P::set_fov_degrees);
+  io.Any("of_patient", m.of_patient, &P::of_patient, &P::set_of_patient);
   io.Optional("look_at", m.look_at, &P::has_look_at, &P::look_at, &P::mutable_look_at);
+  io.Any("fit", m.fit, &P::fit, &P::set_fit);
   io.Optional("eye", m.eye, &P::has_eye, &P::eye, &P::mutable_eye);
   io.Optional("up", m.up, &P::has_up, &P::up, &P::mutable_up);
   io.Finite("distance", m.distance, &P::distance, &P::set_distance);
-  io.Any(m.fit, &P::fit, &P::set_fit);
-  io.Any(m.of_patient, &P::of_patient, &P::set_of_patient);
+  io.Finite("roll_degrees", m.roll_degrees, &P::roll_degrees, &P::set_roll_degrees);
+  io.Finite("zoom", m.zoom, &P::zoom, &P::set_zoom);
+  io.Finite("fov_degrees", m.fov_degrees, &P::fov_degrees, &P::set_fov_degrees);
 }
 
 void Fields(auto& io, Is<ClipBox> auto& m) {
@@ -111,69 +110,40 @@ void Fields(auto& io, Is<GradientOpacityPoint> auto& m) {
   io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
 }
 
-// The fields that a TransferFunction and a TransferChoice share.
-template <class P>
-void IsosurfaceFields(auto& io, auto& m) {
-  io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
-  io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
-}
-
 void Fields(auto& io, Is<TransferFunction> auto& m) {
   using P = v1::TransferFunction;
   io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
   io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxTransferPoints);
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
-  IsosurfaceFields<P>(io, m);
+  io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
+  io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
 }
 
 void Fields(auto& io, Is<ScalarRange> auto& m) {
   using P = v1::ScalarRange;
   io.Finite("min", m.min, &P::min, &P::set_min);
   io.Finite("max", m.max, &P::max, &P::set_max);
-  io.Any(m.percentiles, &P::percentiles, &P::set_percentiles);
+  io.Any("percentiles", m.percentiles, &P::percentiles, &P::set_percentiles);
 }
 
-void Fields(auto& io, Is<TransferChoice> auto& m) {  // all but choice and scalar_range
+void Fields(auto& io, Is<TransferChoice> auto& m) {
   using P = v1::TransferChoice;
+  io.Either("preset", m.choice, &P::preset, &P::mutable_preset, "function", &P::has_function, &P::function, &P::mutable_function);
+  io.Optional("scalar_range", m.scalar_range, &P::has_scalar_range, &P::scalar_range, &P::mutable_scalar_range);
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
-  IsosurfaceFields<P>(io, m);
-}
-
-inline void Write(const TransferChoice& in, v1::TransferChoice& out) {
-  WriteFields(in, out);
-  if (const auto* preset = std::get_if<std::string>(&in.choice)) {
-    out.set_preset(WireText(*preset, kMaxNameBytes));
-  } else {
-    Write(std::get<TransferFunction>(in.choice), *out.mutable_function());
-  }
-  if (in.scalar_range) Write(*in.scalar_range, *out.mutable_scalar_range());
-}
-inline void Read(const v1::TransferChoice& in, TransferChoice& out, Checker& check) {
-  switch (in.choice_case()) {
-    case v1::TransferChoice::kPreset: out.choice = check.Text("preset", in.preset(), 1, kMaxNameBytes); break;
-    case v1::TransferChoice::kFunction: {
-      const auto scope = check.In("function");
-      Read(in.function(), out.choice.emplace<TransferFunction>(), check);
-      break;
-    }
-    case v1::TransferChoice::CHOICE_NOT_SET: check.Fail("choice", "not set, expected preset or function"); break;
-  }
-  ReadFields(in, out, check);
-  if (in.has_scalar_range()) {
-    const auto scope = check.In("scalar_range");
-    Read(in.scalar_range(), out.scalar_range.emplace(), check);
-  }
+  io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
+  io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
 }
 
 void Fields(auto& io, Is<LabelRange> auto& m) {
   using P = v1::LabelRange;
-  io.Any(m.first, &P::first, &P::set_first);
-  io.Any(m.last, &P::last, &P::set_last);
+  io.Any("first", m.first, &P::first, &P::set_first);
+  io.Any("last", m.last, &P::last, &P::set_last);
 }
 
 void Fields(auto& io, Is<LabelOpacity> auto& m) {
   using P = v1::LabelOpacity;
-  io.Any(m.value, &P::value, &P::set_value);
+  io.Any("value", m.value, &P::value, &P::set_value);
   io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
 }
 
@@ -187,7 +157,8 @@ void Fields(auto& io, Is<LabelChoice> auto& m) {
 
 void Fields(auto& io, Is<OverlayChoice> auto& m) {
   using P = v1::OverlayChoice;
-  io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
+  io.Either("preset", m.choice, &P::preset, &P::mutable_preset, "function", &P::has_function, &P::function, &P::mutable_function);
+  io.Optional("scalar_range", m.scalar_range, &P::has_scalar_range, &P::scalar_range, &P::mutable_scalar_range);
   io.Finite("weight", m.weight, &P::weight, &P::set_weight);
 }
 
@@ -205,53 +176,35 @@ void Fields(auto& io, Is<Policy> auto& m) {
   using P = v1::Policy;
   io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 1, kMaxNameBytes);
   io.OneOf("axis", m.axis, &P::axis, &P::set_axis, AxisChoice::kX, AxisChoice::kView);
-  io.Range("groups", m.groups, &P::groups, &P::set_groups, 0, kMaxGroups);
-  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 1, kMaxNameBytes);
-  io.Text("load_metric", m.load_metric, &P::load_metric, &P::mutable_load_metric, 1, kMaxNameBytes);
+  io.Text("balance_by", m.balance_by, &P::balance_by, &P::mutable_balance_by, 1, kMaxNameBytes);
   io.Text("assignment", m.assignment, &P::assignment, &P::mutable_assignment, 1, kMaxNameBytes);
   io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 1, kMaxNameBytes);
-  io.Between("pixel_error", m.pixel_error, &P::pixel_error, &P::set_pixel_error, 0, kMaxPixelError);
-  io.Range("teams", m.teams, &P::teams, &P::set_teams, 0, kMaxTeams);
+  io.Range("groups", m.groups, &P::groups, &P::set_groups, 0, kMaxGroups);
+  io.Range("teams", m.teams, &P::teams, &P::set_teams, 1, kMaxTeams);
+  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 1, kMaxNameBytes);
+  io.Finite("pixel_error", m.pixel_error, &P::pixel_error, &P::set_pixel_error);
 }
 
-void Fields(auto& io, Is<FrameRequest> auto& m) {  // all but clipping and parameters
+void Fields(auto& io, Is<FrameRequest> auto& m) {
   using P = v1::FrameRequest;
   io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
-  io.Text("renderer", m.renderer, &P::renderer, &P::mutable_renderer, 0, kMaxNameBytes);
   io.Message("size", m.size, &P::size, &P::mutable_size);
   io.Message("view", m.view, &P::view, &P::mutable_view);
+  io.Message("clipping", m.clipping, &P::clipping, &P::mutable_clipping);
+  io.Text("renderer", m.renderer, &P::renderer, &P::mutable_renderer, 1, kMaxNameBytes);
+  io.TextMap("parameters", m.parameters, &P::parameters, &P::mutable_parameters, kMaxParameters);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
-  io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
-  io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Finite("termination", m.termination, &P::termination, &P::set_termination);
+  io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
+  io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);
-  io.Any(m.previews, &P::previews, &P::set_previews);
+  io.Any("previews", m.previews, &P::previews, &P::set_previews);
 }
 
-inline void Write(const FrameRequest& in, v1::FrameRequest& out) {
-  WriteFields(in, out);
-  if (!in.clipping.empty()) Write(in.clipping, *out.mutable_clipping());
-  for (const auto& [name, text] : in.parameters) {
-    v1::Parameter& parameter = *out.add_parameters();
-    parameter.set_name(WireText(name, kMaxNameBytes));
-    parameter.set_text(WireText(text, kMaxNameBytes));
-  }
-}
+// What a client left out has its standard value.
 inline void Read(const v1::FrameRequest& in, FrameRequest& out, Checker& check) {
-  ReadFields(in, out, check);
-  if (out.renderer.empty()) out.renderer = kDefaultRenderer;
-  out.policy.teams = std::max(out.policy.teams, 1);  // 0: left out
-  if (in.has_clipping()) {
-    const auto scope = check.In("clipping");
-    Read(in.clipping(), out.clipping, check);
-  }
-  const int parameters = check.Count("parameters", in.parameters_size(), kMaxParameters);
-  for (int i = 0; i < parameters; ++i) {
-    const auto scope = check.In("parameters", std::size_t(i));
-    const std::string name = check.Text("name", in.parameters(i).name(), 1, kMaxNameBytes);
-    check.That(out.parameters.emplace(name, check.Text("text", in.parameters(i).text(), 1, kMaxNameBytes)).second, "name", "given twice");
-  }
+  ReadFields(WithStandards(in), out, check);
   if (check.ok()) check.Adopt(Validate(out));
 }
 

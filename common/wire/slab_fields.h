@@ -22,6 +22,7 @@ void CheckChunkNumber(auto& io, const Box& box, std::uint32_t chunk) {
   });
 }
 
+v1::ChunkRequest ProtoOf(const ChunkRequest&);
 void Fields(auto& io, Is<ChunkRequest> auto& m) {
   using P = v1::ChunkRequest;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -32,6 +33,7 @@ void Fields(auto& io, Is<ChunkRequest> auto& m) {
   CheckChunkNumber(io, m.box, m.chunk);
 }
 
+v1::Chunk ProtoOf(const Chunk&);
 void Fields(auto& io, Is<Chunk> auto& m) {
   using P = v1::Chunk;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -57,6 +59,7 @@ void Fields(auto& io, Is<Chunk> auto& m) {
   });
 }
 
+v1::ChunkRefused ProtoOf(const ChunkRefused&);
 void Fields(auto& io, Is<ChunkRefused> auto& m) {
   using P = v1::ChunkRefused;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <variant>
 
 #include "common/base/check.h"
 #include "common/base/status.h"
@@ -97,5 +98,8 @@ struct ChunkRefused {
   Status status;  // not ok: no such dataset, box outside the volume
   friend bool operator==(const ChunkRefused&, const ChunkRefused&) = default;
 };
+
+using WorkerToSlabs = std::variant<ChunkRequest>;
+using SlabsToWorker = std::variant<Chunk, ChunkRefused>;
 
 }  // namespace slabstream

@@ -24,6 +24,7 @@ inline void Read(const v1::NewLabel& in, NewLabel& out, Checker& check) {
   if (in.colored()) out.color = color;
 }
 
+v1::AddVolume ProtoOf(const AddVolume&);
 void Fields(auto& io, Is<AddVolume> auto& m) {
   using P = v1::AddVolume;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -39,6 +40,7 @@ void Fields(auto& io, Is<AddVolume> auto& m) {
   });
 }
 
+v1::VolumeCredit ProtoOf(const VolumeCredit&);
 void Fields(auto& io, Is<VolumeCredit> auto& m) {
   using P = v1::VolumeCredit;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -46,6 +48,7 @@ void Fields(auto& io, Is<VolumeCredit> auto& m) {
   io.Range("allowed", m.allowed, &P::allowed, &P::set_allowed, m.received, kMaxUint64);
 }
 
+v1::VolumePart ProtoOf(const VolumePart&);
 void Fields(auto& io, Is<VolumePart> auto& m) {
   using P = v1::VolumePart;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
@@ -53,6 +56,7 @@ void Fields(auto& io, Is<VolumePart> auto& m) {
   io.Range("bytes", m.bytes, &P::bytes, &P::set_bytes, 1, kMaxVolumePartBytes);
 }
 
+v1::DropVolume ProtoOf(const DropVolume&);
 void Fields(auto& io, Is<DropVolume> auto& m) { io.Any(m.nonce, &v1::DropVolume::nonce, &v1::DropVolume::set_nonce); }
 
 }  // namespace slabstream

@@ -117,7 +117,7 @@ class Matter {
       : setup_(setup), volume_(volume), table_(setup.renderer->Table(setup.transfer, setup.description, setup.range)) {
     const Vec3& spacing = setup.description.geometry.spacing;
     for (int i = 0; i < 3; ++i) per_world_[i] = 1 / spacing[i];
-    if (!setup.renderer->isosurfaces()) return;
+    if (!setup.renderer->Can(Ability::kIsosurfaces)) return;
     for (const Isosurface& surface : setup.transfer.isosurfaces) {
       surfaces_.push_back({double(StoredIsovalue(surface.value, setup.description.mapping)), surface.opacity});
     }
@@ -147,7 +147,7 @@ class Matter {
     }
     if (!std::isfinite(stored)) return 0;
     double opacity = factor * double(table_.opacity[std::size_t(table_.BinOf(stored))]);
-    if (opacity > 0 && setup_.renderer->gradient_opacity() && !setup_.transfer.gradient_opacities.empty()) {
+    if (opacity > 0 && !setup_.transfer.gradient_opacities.empty() && setup_.renderer->Can(Ability::kGradientOpacity)) {
       opacity *= GradientOpacity(setup_.transfer.gradient_opacities, Slope(p));
     }
     return -std::log1p(-opacity) / table_.opacity_distance;

@@ -90,14 +90,14 @@ class Search {
 
   void ChoosePartition() {
     for (const DecompositionEntry& entry : Decompositions()) {
-      for (const LoadMetric metric : {LoadMetric::kVoxels, LoadMetric::kOccupied, LoadMetric::kCost}) {
-        const bool wanted = asked_.load_metric == kAutomatic || asked_.load_metric == NameOf(metric);
+      for (const BalanceBy metric : {BalanceBy::kVoxels, BalanceBy::kOccupied, BalanceBy::kCost}) {
+        const bool wanted = asked_.balance_by == kAutomatic || asked_.balance_by == NameOf(metric);
         // Until costs are known, balancing by cost is balancing by occupied voxels.
-        const bool same = asked_.load_metric == kAutomatic && metric == LoadMetric::kCost && question_.known.cost == nullptr;
+        const bool same = asked_.balance_by == kAutomatic && metric == BalanceBy::kCost && question_.known.cost == nullptr;
         if (!wanted || same) continue;
         ResolvedPolicy policy = best_;
         policy.decomposition = &entry;
-        policy.load_metric = metric;
+        policy.balance_by = metric;
         policy.axis = SlabAxis(asked_.axis, entry, question_.summary->description.geometry.size);
         const int fewest = FewestGroupsOf(policy);
         for (const int factor : kPartitionGroupFactors) {
@@ -195,7 +195,7 @@ Policy FixedPolicy(Policy policy) {
   if (policy.decomposition == kAutomatic) policy.decomposition = defaults.decomposition;
   if (policy.assignment == kAutomatic) policy.assignment = defaults.assignment;
   if (policy.combine == kAutomatic) policy.combine = defaults.combine;
-  policy.load_metric = LoadMetricOf(policy);
+  policy.balance_by = BalanceByOf(policy);
   return policy;
 }
 

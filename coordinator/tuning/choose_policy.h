@@ -1,10 +1,10 @@
 // ChoosePolicy: fills in what a policy leaves open ("auto"), by predicted frame times. Pure and deterministic.
 //
-// Candidates come from the lists (Decompositions, LoadMetrics, Assignments, CombiningSchemes), so a new entry takes part by itself. Each is
-// judged by a simulated frame (frame_predictor.h). Choices are made one after the other, the most important first: the partition and what
-// its boxes have equal shares of, each with one or two groups and under a few schemes, because the best partition depends on both; the
-// number of groups and the assignment; the scheme and its arguments. A candidate must be predicted to gain more than kLeastGain over the
-// ones before it; the first is the policy that holds without choosing (FixedPolicy).
+// Candidates come from the lists (Decompositions, BalanceByChoices, Assignments, CombiningSchemes), so a new entry takes part by itself.
+// Each is judged by a simulated frame (frame_predictor.h). Choices are made one after the other, the most important first: the partition
+// and what its boxes have equal shares of, each with one or two groups and under a few schemes, because the best partition depends on both;
+// the number of groups and the assignment; the scheme and its arguments. A candidate must be predicted to gain more than kLeastGain over
+// the ones before it; the first is the policy that holds without choosing (FixedPolicy).
 //
 // The measure is the latency of a frame that nobody asked for ahead: somebody who turns a volume waits for it. Frames that are asked for
 // ahead gain, too: the partition that ends first has the least work for the busiest worker.

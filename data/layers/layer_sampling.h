@@ -1,4 +1,4 @@
-// Layers on the grid of their volume: a volume that lies elsewhere in the same world, on whatever grid, is sampled at the voxels of
+// Layers on the grid of their volume: a volume elsewhere in the same world, on any grid, is sampled at the voxels of
 // another.
 //
 //   position   of a voxel of the grid in the data space of the layer, through world space (common/volume/orientation.h). Less than 1e-6

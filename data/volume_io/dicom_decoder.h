@@ -2,7 +2,7 @@
 //
 // GDCM is not made for damaged or hostile bytes: as Debian compiles it, it ends the process where an assertion fails, it writes to stderr,
 // and it may write beyond its buffers. So it runs in a child of this process, which has no open files but its pipe, a limit of memory and a
-// time for each frame. Whatever happens there, the caller gets pixels or a Status.
+// time for each frame. The caller always gets pixels or a Status.
 #pragma once
 
 #include <sys/types.h>

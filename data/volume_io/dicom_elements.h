@@ -61,7 +61,7 @@ struct DicomPixelData {
   std::int64_t offset = 0;    // of the first byte behind the element's header; 0: the file has no pixels
   std::int64_t bytes = 0;     // as many as the element claims, or as the file has, if these are fewer
   bool encapsulated = false;  // in fragments, which are items
-  bool words = false;         // of 16 bits, whose bytes big endian swaps, whatever the bits of a pixel
+  bool words = false;         // of 16 bits, whose bytes big endian swaps, for any bits of a pixel
 };
 
 struct DicomFile {

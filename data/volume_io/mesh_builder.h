@@ -1,4 +1,4 @@
-// Makes a mesh of what a file of an unstructured grid holds, whatever its format, and says what is wrong with it. The calls come in the
+// Makes a mesh of the contents of an unstructured grid's file of any format, and says what is wrong with it. The calls come in the
 // order of their declarations; after an error there are no more. Errors name the path.
 #pragma once
 

@@ -130,11 +130,11 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
 
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
-      {"time", "T", "Which of the volumes in a file of several, such as a time series; counted from 0", SetTime,
+      {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime,
        [](const ReadOptions& given) { return given.time.has_value(); }},
-      {"channel", "N|luminance", "Which of a voxel's components, counted from 0; or the luminance of red, green and blue", SetChannel,
+      {"channel", "N|luminance", "Which component of a voxel, counted from 0; or the luminance of red, green and blue", SetChannel,
        [](const ReadOptions& given) { return given.channel.has_value(); }},
-      {"spacing", "X,Y,Z", "Distances of voxels, for files that state none: raw, NumPy, pictures", SetSpacing,
+      {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing,
        [](const ReadOptions& given) { return given.spacing.has_value(); }},
       {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims,
        [](const ReadOptions& given) { return given.dims.has_value(); }},
@@ -144,11 +144,11 @@ const std::vector<ReadOption>& ReadOptionList() {
        [](const ReadOptions& given) { return given.big_endian.has_value(); }},
       {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset,
        [](const ReadOptions& given) { return given.offset.has_value(); }},
-      {"series", "NUMBER|UID", "Which of the series of a DICOM folder; `slabstream info` lists them", SetSeries,
+      {"series", "NUMBER|UID", "Which series of a DICOM folder; `slabstream info` lists them", SetSeries,
        [](const ReadOptions& given) { return !given.series.empty(); }},
       {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray,
        [](const ReadOptions& given) { return !given.array.empty(); }},
-      {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is laid", SetLattice,
+      {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        [](const ReadOptions& given) { return given.lattice.has_value(); }},
   };
   return options;

@@ -46,7 +46,7 @@ struct ReadOptions {
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
   // What users cannot say.
-  bool headers_only = false;  // check whatever can be checked without the samples, and take no memory for them
+  bool headers_only = false;  // check everything that can be checked without the samples, and take no memory for them
 };
 
 struct ReadOption {
@@ -70,7 +70,7 @@ Result<VolumeSource> ParseVolumeSource(const std::string& text);
 
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
-// The source at one time, whatever times it names. `source` is right (ParseVolumeSource).
+// The source at one time; times that it names are replaced. `source` is right (ParseVolumeSource).
 std::string AtTime(const std::string& source, int time);
 
 }  // namespace slabstream

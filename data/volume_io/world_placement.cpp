@@ -60,7 +60,7 @@ AxisTurn NearestTurn(const Steps& steps) {
       const Steps axes = Turned(unit, turn);
       if (SpannedVolume(axes) < 0) continue;
       const double score = axes[0].x + axes[1].y + axes[2].z;
-      // Of turns that are as near, the one with the greatest axes, whatever the order of storage.
+      // Of equally near turns, the one with the greatest axes, for any order of storage.
       if (score < best_score - kTie || (score < best_score + kTie && axes <= best_axes)) continue;
       best = turn;
       best_score = score;

@@ -16,7 +16,7 @@ using Json = nlohmann::ordered_json;
 // The file that other programs read the cells from, and the array as the user named it ("": the file's own choice). Null: no grid is drawn.
 Result<Json> GridJson(const BenchCase& c, const Volume& volume) {
   const auto* text = std::get_if<std::string>(&c.volume);
-  if (text == nullptr || volume.cells == nullptr || !c.renderer->draws_cells()) return Json();
+  if (text == nullptr || volume.cells == nullptr || !c.renderer->Can(Ability::kCells)) return Json();
   const Result<VolumeSource> source = ParseVolumeSource(*text);
   if (!source.ok()) return source.status();
   std::error_code error;

@@ -28,10 +28,9 @@ void DeclareBench(const CommandLine& line) {
   auto options = std::make_shared<BenchOptions>();
   options->command = line.typed;
   options->connection.local_workers = 1;
-  sub->add_option(
-      "CASE", options->cases,
-      "Standard cases (--list shows them; all if none is named), or volume files, as FILE or FILE:TRANSFER; each is rendered on "
-      "turntables of both projections");
+  sub->add_option("CASE", options->cases,
+                  "Standard cases (see --list; default: all), or volume files, as FILE or FILE:TRANSFER; each is rendered on "
+                  "turntables of both projections");
   sub->add_flag("--list", options->list, "List the standard cases");
   AddInteger(*sub, "--size", options->size, 1, kMaxBenchSize, "Pixels a side");
   AddInteger(*sub, "--frames", options->frames, 1, kMaxTurntableFrames, "Views in a turn of each projection");
@@ -39,7 +38,8 @@ void DeclareBench(const CommandLine& line) {
   CLI::Option* workers = AddInteger(*sub, "--workers", options->connection.local_workers, 1, kMaxLocalWorkers, "Workers in this process");
   AddThreads(*sub, options->connection.local_threads, "Render threads of each worker");
   CLI::Option* endpoint = AddService(*sub, options->connection.service)->excludes(workers);
-  endpoint->description("Measure the service there instead of one in this process; CASE is then a dataset, as NAME or NAME:TRANSFER");
+  endpoint->description(
+      "Measure the service at this endpoint instead of one in this process; CASE is then a dataset, as NAME or NAME:TRANSFER");
   endpoint->default_str("");
   AddParsed(
       *sub, "--renderer", options->renderer,
@@ -48,7 +48,7 @@ void DeclareBench(const CommandLine& line) {
         if (!index.ok()) return index.status();
         return std::optional(Renderers()[*index]);
       },
-      "Render every case by this renderer instead of its own")
+      "Render every case with this renderer instead of its own")
       ->type_name("NAME");
   const RendererParameter rate = SamplingRate();
   NoteRange(sub->add_option_function<std::string>(
@@ -59,7 +59,7 @@ void DeclareBench(const CommandLine& line) {
       ->type_name("NUMBER")
       ->default_str(fmt::format("{:g}", rate.standard));
   sub->add_option("--json", options->json_path, "Write all figures and the machine as JSON")->type_name("FILE");
-  sub->add_option("--pictures", options->pictures_directory, "Write the first view of each projection there, after the measuring")
+  sub->add_option("--pictures", options->pictures_directory, "Write the first view of each projection to DIR, after measuring")
       ->type_name("DIR");
   sub->add_option("--export", options->export_directory, "Measure nothing; write volumes, transfer functions and views for other renderers")
       ->type_name("DIR")
@@ -73,9 +73,9 @@ void DeclareBench(const CommandLine& line) {
 void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
   CLI::App* sub = experiment.add_subcommand("replay", "Simulate recorded frames again, under another policy or on another machine");
   auto options = std::make_shared<ReplayOptions>();
-  sub->add_option("FILE", options->trace_path, "What --trace of render or turntable has written")->required();
+  sub->add_option("FILE", options->trace_path, "A trace that --trace of render or turntable has written")->required();
   sub->add_option("--with", options->changes,
-                  "What is different: combine=SCHEME (as --combine takes it), link=NAME or link=NAME:MICROSECONDS,GBIT, workers=N; may be "
+                  "What to change: combine=SCHEME (as --combine takes it), link=NAME or link=NAME:MICROSECONDS,GBIT, workers=N; may be "
                   "repeated. Links" +
                       Explained(LinkPresets()))
       ->type_name("KEY=VALUE")
@@ -89,7 +89,8 @@ void AddCommonOptions(CLI::App& app, ExperimentOptions& options) {
   app.add_option("-o,--output", options.folder, "Folder for the results and all measurements; made if it does not exist")->type_name("DIR");
   app.add_flag("--quick", options.quick, "Take a tenth of the time: fewer sizes, workers and repeats");
   AddNumber(app, "--scale", options.scale, {kMinScale, 1}, "Scale the sides of spheres and pictures, to try things out");
-  AddInteger(app, "--repeats", options.repeats, 1, kMaxRepeats, "How often everything is measured")->default_str("the experiment's own");
+  AddInteger(app, "--repeats", options.repeats, 1, kMaxRepeats, "Number of times that everything is measured")
+      ->default_str("the experiment's own");
   AddParsed(
       app, "--seed", options.seed,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, std::numeric_limits<int>::max()); },
@@ -99,9 +100,9 @@ void AddCommonOptions(CLI::App& app, ExperimentOptions& options) {
   AddRepeated(app, "--volume", options.volumes, "A sparse volume of your own beside the spheres, as FILE or FILE:TRANSFER")
       ->type_name("VOLUME");
   CLI::Option* resume = app.add_flag_callback(
-      "--resume", [&options] { options.resume = Resume::kAnyBuild; }, "Continue what DIR holds even if another build or machine began it");
+      "--resume", [&options] { options.resume = Resume::kAnyBuild; }, "Continue the run in DIR even if another build or machine began it");
   app.add_flag_callback(
-         "--fresh", [&options] { options.resume = Resume::kNever; }, "Begin again: delete what DIR holds")
+         "--fresh", [&options] { options.resume = Resume::kNever; }, "Start over: delete the contents of DIR")
       ->excludes(resume);
 }
 

@@ -11,7 +11,7 @@
 #include "common/planning/balance.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 #include "coordinator/tuning/box_estimator.h"
 #include "laboratory/experiments/attachments.h"
 #include "laboratory/experiments/balanced_case.h"
@@ -112,13 +112,13 @@ Balance BalanceOf(const ExperimentContext& context) {
 // Boxes by occupied voxels are cut for their owners, so that the assignment has little left to do.
 std::vector<NamedPolicy> PartitionsByVoxels() {
   std::vector<NamedPolicy> policies = AllPartitions();
-  std::erase_if(policies, [](const NamedPolicy& named) { return named.policy.load_metric != "voxels"; });
+  std::erase_if(policies, [](const NamedPolicy& named) { return named.policy.balance_by != "voxels"; });
   return policies;
 }
 
 Policy Automatic() {
   Policy policy;
-  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
+  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = kAutomatic;
   return policy;
 }
 

@@ -17,7 +17,7 @@ Json BalancedKey(ExperimentContext& context, const FrameCase& frame);
 
 // One for each repeat, because layouts differ. The frame has dynamic balance; the trial, and FinishTrial, must have been run.
 std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame);
-// The same of any frame, whatever its balance, by its CostTrial.
+// The same for a frame of any balance, by its CostTrial.
 std::vector<MeasuredFrame> RecallCosts(ExperimentContext& context, const FrameCase& frame);
 
 }  // namespace slabstream

@@ -4,7 +4,7 @@ namespace slabstream {
 
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
-      {"paper", "every table and figure of Yagel and Machiraju, theirs beside ours", RunPaper, DeclarePaper},
+      {"paper", "every table and figure of Yagel and Machiraju, the paper's beside ours", RunPaper, DeclarePaper},
       {"balance", "load balance of sparse volumes: partitions, views that move, a slow worker, and how good `auto` is", RunBalance,
        DeclareBalance, CheckBalance},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},

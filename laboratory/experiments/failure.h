@@ -1,4 +1,4 @@
-// Failure: how the functions of experiments fail. An experiment is a script, and whatever goes wrong ends it; so they return values and
+// Failure: how the functions of experiments fail. An experiment is a script, and every failure ends it; so they return values and
 // throw the Status, which RunExperiment catches. Everywhere else a function returns Result<T>: OrThrow takes what is in it.
 #pragma once
 

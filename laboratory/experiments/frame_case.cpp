@@ -12,8 +12,8 @@
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/team.h"
-#include "common/planning/validate_request.h"
 #include "common/renderers/registry.h"
+#include "common/wire/validate_request.h"
 #include "coordinator/tuning/choose_policy.h"
 #include "coordinator/tuning/service_machine.h"
 #include "laboratory/experiments/client_frames.h"
@@ -68,11 +68,14 @@ const RendererKind* Splatting() { return FindRenderer("splat"); }
 const RendererKind* ZBuffer() { return FindRenderer("zbuffer"); }
 
 FrameRequest RequestOf(const FrameCase& frame) {
-  FrameRequest request = BenchRequest(frame.volume, frame.view, frame.size);
+  const FrameRequest usual = BenchRequest(frame.volume, frame.view, frame.size);
+  FrameRequest request = frame.look;
+  request.dataset = usual.dataset;
+  request.renderer = usual.renderer;
+  request.transfer = usual.transfer;
+  request.view = usual.view;
+  request.size = usual.size;
   request.policy = frame.policy;
-  request.parameters = frame.look.parameters;
-  request.shading = frame.look.shading;
-  request.termination = frame.look.termination;
   return request;
 }
 
@@ -94,7 +97,7 @@ std::string AnglesOf(const ViewParameters& view) {
 }  // namespace
 
 Json ColumnsOf(const FrameCase& frame) {
-  const auto& [decomposition, load_metric, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
+  const auto& [decomposition, balance_by, axis, groups, assignment, balance, combine, pixel_error, teams] = frame.policy;
   Json columns = ColumnsOf(frame.volume);
   columns.update(Json{{"workers", frame.workers},
                       {"view", AnglesOf(frame.view)},
@@ -102,7 +105,7 @@ Json ColumnsOf(const FrameCase& frame) {
                       {"renderer", frame.volume.renderer->name()},
                       {"decomposition", decomposition},
                       {"axis", NameOf(axis)},
-                      {"split", LoadMetricOf(frame.policy)},
+                      {"split", BalanceByOf(frame.policy)},
                       {"assignment", assignment},
                       {"balance", balance},
                       {"combine", combine},

@@ -20,20 +20,13 @@
 
 namespace slabstream {
 
-// What a request says about the look beside renderer and transfer function.
-struct Look {
-  ParameterTexts parameters;  // of the renderer
-  Shading shading;
-  double termination = kDefaultTermination;
-};
-
 struct FrameCase {
   BenchCase volume;  // with the renderer and the transfer function
   ImageSize size;
   ViewParameters view;
   Policy policy;
   int workers = 1;
-  Look look = {};
+  FrameRequest look = {};  // what the request says beside all that: parameters of the renderer, shading, ...
 };
 
 // The renderers of the paper.

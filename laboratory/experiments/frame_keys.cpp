@@ -53,13 +53,13 @@ KeyedFrame WithoutCombining(ExperimentContext& context, std::string_view what, c
 
 KeyedFrame ForBoxCosts(ExperimentContext& context, const FrameCase& frame) {
   FrameCase settled = frame;
-  settled.policy.load_metric = LoadMetricOf(frame.policy);
+  settled.policy.balance_by = BalanceByOf(frame.policy);
   KeyedFrame keyed = WithoutCombining(context, "box costs", settled);
   // With an open number of groups, boxes also depend on what is known about the volume, and with it on assignment and balance.
   if (frame.policy.groups == 0) return keyed;
   LeaveOut(keyed, "balance", &Policy::balance);
   // Other boxes than those of equal volume are cut for the quickest frame (MakeLayout), which depends on who owns which.
-  if (settled.policy.load_metric == NameOf(LoadMetric::kVoxels)) LeaveOut(keyed, "assignment", &Policy::assignment);
+  if (settled.policy.balance_by == NameOf(BalanceBy::kVoxels)) LeaveOut(keyed, "assignment", &Policy::assignment);
   return keyed;
 }
 

@@ -12,7 +12,7 @@ std::vector<NamedPolicy> AllPartitions() {
   for (const DecompositionEntry& entry : Decompositions()) {
     for (const std::string split : {"voxels", "occupied"}) {
       policies.push_back(
-          {fmt::format("{} by {}", entry.name, split), {.decomposition = std::string(entry.name), .load_metric = split, .groups = 1}});
+          {fmt::format("{} by {}", entry.name, split), {.decomposition = std::string(entry.name), .balance_by = split, .groups = 1}});
     }
   }
   return policies;
@@ -22,13 +22,13 @@ NamedPolicy EqualSlabs() { return AllPartitions().front(); }
 
 NamedPolicy BalancedSlabs() { return AllPartitions().at(1); }
 
-NamedPolicy BalancedTree() { return {"kd-tree by occupied", {.decomposition = "kd-tree", .load_metric = "occupied", .groups = 1}}; }
+NamedPolicy BalancedTree() { return {"kd-tree by occupied", {.decomposition = "kd-tree", .balance_by = "occupied", .groups = 1}}; }
 
 std::vector<NamedPolicy> PartitionsAlongTheView() {
   std::vector<NamedPolicy> policies;
   for (const std::string decomposition : {"slab", "kd-tree"}) {
     policies.push_back({fmt::format("{} along the view", decomposition),
-                        {.decomposition = decomposition, .load_metric = "occupied", .axis = AxisChoice::kView, .groups = 1}});
+                        {.decomposition = decomposition, .balance_by = "occupied", .axis = AxisChoice::kView, .groups = 1}});
   }
   return policies;
 }

@@ -1,5 +1,5 @@
-// A FrameRequest as JSON, whole: two requests that differ in any field differ in their JSON. Keys of trials are made from it. Names and
-// units of fields are those of a sweep file where it has them. A new field of these types does not compile until it is written here.
+// A FrameRequest as JSON, whole: two requests that differ in any field differ in their JSON. Keys of trials are made from it. It is that of
+// picture records (common/wire/request_json.h), with the dataset, and with digests for the points of transfer functions.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,7 +13,7 @@ namespace slabstream {
 using Json = nlohmann::ordered_json;
 
 Json RequestJson(const FrameRequest& request);
-// {"preset": "auto", "opacity_distance": 1}, or "function" with the digest of its points, of which there may be thousands.
+// Its field "transfer".
 Json TransferJson(const TransferChoice& transfer);
 
 // XXH3-64 in hexadecimal digits.

@@ -61,7 +61,7 @@ std::vector<Series> StrongSeries(const ExperimentContext& context, const Rendere
   return all;
 }
 
-// Equally many voxels for each worker, whatever their number.
+// Equally many voxels for each worker, for any number of workers.
 std::vector<Series> WeakSeries(const ExperimentContext& context) {
   const std::vector<int> workers = context.quick() ? std::vector{1, 8} : std::vector{1, 2, 4, 8, 16, 32, 64};
   const int one = context.Scaled(context.quick() ? 48 : 96), pixels = context.Scaled(512);

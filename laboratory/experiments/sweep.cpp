@@ -77,8 +77,8 @@ SweepPlace PlaceOf(const ExperimentOptions& options) { return options.own.at_ser
 
 void DeclareSweep(CLI::App& app, OwnOptions& options) {
   AddService(app, options.service)
-      ->description("Measure the frames of the service there, with its workers and datasets, and simulate nothing")
-      ->default_str("none: the workers are simulated from what is measured on this machine");
+      ->description("Measure the frames of a service at this endpoint, with its workers and datasets; simulate nothing")
+      ->default_str("none: workers are simulated from measurements on this machine");
 }
 
 void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(options.sweep_file, PlaceOf(options))); }

@@ -12,41 +12,22 @@
 #include <set>
 #include <utility>
 
-#include "client/request/camera_json.h"
 #include "client/request/json_value.h"
-#include "client/request/values.h"
+#include "client/request/request_options.h"
 #include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/base/printable.h"
 #include "common/cli/parse.h"
-#include "common/combining/schemes.h"
-#include "common/decomposition/decomposition.h"
-#include "common/planning/assignment.h"
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
+#include "common/wire/validate_request.h"
 #include "laboratory/experiments/request_json.h"
 
 namespace slabstream {
 namespace {
 
 constexpr int kMaxSphere = 1024, kMaxHostCores = 1024;
-
-template <class Entries>
-std::vector<std::string_view> NamesIn(const Entries& entries) {
-  std::vector<std::string_view> names;
-  names.reserve(entries.size());
-  for (const auto& entry : entries) names.push_back(entry.name);
-  return names;
-}
-
-// Includes the choice to leave it open.
-template <class Entries>
-std::string ReadName(const JsonValue& value, const Entries& entries) {
-  std::vector<std::string_view> names = NamesIn(entries);
-  if (std::ranges::find(names, kAutomatic) == names.end()) names.push_back(kAutomatic);
-  return std::string(names[value.OneOf(names)]);
-}
 
 BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
   // What names a volume that is no sphere.
@@ -110,16 +91,6 @@ BenchCase ReadVolume(const JsonValue& value, SweepPlace place) {
   return volume;
 }
 
-// A direction as --light takes it.
-Vec3 ReadLight(const JsonValue& value) {
-  std::vector<std::string> coordinates;
-  value.Each([&](const JsonValue& v) { coordinates.push_back(v.Shown()); });
-  const Result<Vec3> light = ParseDirection("light", fmt::format("{}", fmt::join(coordinates, ",")));
-  if (light.ok()) return *light;
-  value.Complain(light.status().message());
-  return {};
-}
-
 // The name of a renderer, or an object with the parameters of that renderer and what else decides the look.
 SweepRenderer ReadRenderer(const JsonValue& value) {
   const auto kind_of = [](const JsonValue& v) { return Renderers()[v.OneOf(RendererNames())]; };
@@ -129,64 +100,37 @@ SweepRenderer ReadRenderer(const JsonValue& value) {
     read.name = read.kind->name();
     return read;
   }
-  if (value.Has("renderer")) read.kind = kind_of(value.At("renderer"));
-  Look& look = read.look;
-  std::vector<std::pair<std::string, JsonValue::Read>> fields = {
-      {"name", [&](const JsonValue& v) { read.name = v.Text(); }},
-      {"renderer", [](const JsonValue&) {}},
-      {"shading", [&](const JsonValue& v) { look.shading.model = ShadingModel(v.OneOf(kShadingModelNames)); }},
-      {"lights",
-       [&](const JsonValue& v) {
-         v.Each([&](const JsonValue& light) { look.shading.lights.push_back(ReadLight(light)); }, 0);
-         if (look.shading.lights.size() > kMaxLights)
-           v.Complain(fmt::format("{} lights are too many: at most {}", look.shading.lights.size(), kMaxLights));
-       }},
-      {"termination", [&](const JsonValue& v) {
-         look.termination = v.Number({0, kMaxTermination});
-       }}};
-  for (const RendererParameter& parameter : read.kind->parameters()) {
-    fields.emplace_back(parameter.name, [&](const JsonValue& v) {
-      look.parameters[std::string(parameter.name)] = parameter.choices.empty()
-                                                         ? fmt::format("{}", v.Number({parameter.least, parameter.most}))
-                                                         : std::string(parameter.choices[v.OneOf(parameter.choices)]);
-    });
-  }
+  auto fields = OptionFields(read.look, {"parameters.", "shading.", "termination"});
+  fields.emplace_back("name", [&](const JsonValue& v) { read.name = v.Text(); });
+  fields.emplace_back("renderer", [&](const JsonValue& v) { read.kind = kind_of(v); });
   value.Fields(fields);
+  if (const auto parameters = ParseParameters(*read.kind, read.look.parameters); !parameters.ok()) {
+    value.Complain(parameters.status().message());
+  }
   if (read.name.empty()) read.name = read.kind->name();
   return read;
 }
 
 SweepView ReadView(const JsonValue& value, std::size_t index) {
   SweepView read{fmt::format("view {}", index + 1), {}};
-  auto fields = ViewFields(read.view);
-  fields.insert(fields.begin(), {"name", [&](const JsonValue& v) { read.name = v.Text(); }});
+  FrameRequest request;
+  auto fields = OptionFields(request, {"view."});
+  fields.emplace_back("name", [&](const JsonValue& v) { read.name = v.Text(); });
   value.Fields(fields);
-  if (const Status status = Validate(read.view); !status.ok()) value.Complain(status.message());
+  if (const Status status = Validate(request.view); !status.ok()) value.Complain(status.message());
+  read.view = request.view;
   return read;
 }
 
 SweepPolicy ReadPolicy(const JsonValue& value) {
   SweepPolicy read;
-  Policy& policy = read.policy;
-  policy.groups = 1;
-  value.Fields({{"name", [&](const JsonValue& v) { read.name = v.Text(); }},
-                {"decomposition", [&](const JsonValue& v) { policy.decomposition = ReadName(v, Decompositions()); }},
-                {"split", [&](const JsonValue& v) { policy.load_metric = ReadName(v, LoadMetrics()); }},
-                {"assignment", [&](const JsonValue& v) { policy.assignment = ReadName(v, Assignments()); }},
-                {"axis", [&](const JsonValue& v) { policy.axis = AxisChoice(v.OneOf(kAxisChoiceNames)); }},
-                {"balance", [&](const JsonValue& v) { policy.balance = NamesIn(BalanceModes())[v.OneOf(NamesIn(BalanceModes()))]; }},
-                {"pixel_error",
-                 [&](const JsonValue& v) {
-                   policy.pixel_error = v.Number({0, kMaxPixelError});
-                 }},
-                {"groups", [&](const JsonValue& v) { policy.groups = v.Is(kAutomatic) ? 0 : v.Integer(0, kMaxGroups); }},
-                {"teams", [&](const JsonValue& v) { policy.teams = v.Integer(1, kMaxTeams); }},
-                {"combine", [&](const JsonValue& v) {
-                   policy.combine = v.Text();
-                   if (policy.combine == kAutomatic) return;
-                   if (const auto parsed = ParseCombining(policy.combine); !parsed.ok()) v.Complain(parsed.status().message());
-                 }}});
-  if (read.name.empty()) read.name = Describe(policy);
+  FrameRequest request;
+  request.policy.groups = 1;
+  auto fields = OptionFields(request, {"policy."});
+  fields.emplace_back("name", [&](const JsonValue& v) { read.name = v.Text(); });
+  value.Fields(fields);
+  read.policy = request.policy;
+  if (read.name.empty()) read.name = Describe(read.policy);
   return read;
 }
 
@@ -225,7 +169,7 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 }  // namespace
 
 std::string Describe(const Policy& policy) {
-  std::string text = fmt::format("{} by {}, {}, {}, {} groups, {}", policy.decomposition, LoadMetricOf(policy), policy.assignment,
+  std::string text = fmt::format("{} by {}, {}, {}, {} groups, {}", policy.decomposition, BalanceByOf(policy), policy.assignment,
                                  policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups), policy.combine);
   if (policy.axis != AxisChoice::kAuto) text += fmt::format(", axis {}", NameOf(policy.axis));
   if (policy.teams > 1) text += fmt::format(", {} teams", policy.teams);

@@ -24,7 +24,7 @@ inline constexpr std::size_t kMaxSweepCases = 10000;
 struct SweepRenderer {
   std::string name;
   const RendererKind* kind = FindRenderer(kDefaultRenderer);
-  Look look = {};
+  FrameRequest look = {};  // as FrameCase has it
 };
 struct SweepPolicy {
   std::string name;

@@ -33,8 +33,7 @@ std::string WhyNot(const Json& held, const Json& wanted, Resume resume) {
   if (resume == Resume::kAnyBuild) return "";
   for (const char* who : {"commit", "machine"}) {
     const std::string before = held.value(who, "");
-    if (before != wanted[who])
-      return fmt::format("a run of {} '{}', not '{}' (--resume continues it all the same)", who, before, wanted[who]);
+    if (before != wanted[who]) return fmt::format("a run of {} '{}', not '{}' (--resume continues it anyway)", who, before, wanted[who]);
   }
   return "";
 }
@@ -52,7 +51,7 @@ Result<TrialLog> TrialLog::Open(const std::string& folder, const RunIdentity& id
     const Result<std::string> text = ReadTextFile(IdentityPath(folder), kMaxIdentityBytes);
     if (!text.ok()) return text.status();
     if (const std::string why = WhyNot(Json::parse(*text, nullptr, false), wanted, resume); !why.empty()) {
-      return Status::InvalidArgument(fmt::format("--output '{}' holds {}; --fresh forgets it", folder, why));
+      return Status::InvalidArgument(fmt::format("--output '{}' holds {}; --fresh deletes it", folder, why));
     }
     if (Status status = log.Load(LogPath(folder)); !status.ok()) return status;
   } else {
@@ -78,7 +77,7 @@ Status TrialLog::Load(const std::string& path) {
     Json trial = Json::parse(line, nullptr, false);
     if (!trial.is_object() || !trial.contains("key") || !trial.contains("repeat") || !trial["repeat"].is_number_integer() ||
         !trial.contains("numbers")) {
-      return Status::InvalidArgument(fmt::format("'{}' line {} is not a trial; --fresh begins anew", path, number));
+      return Status::InvalidArgument(fmt::format("'{}' line {} is not a trial; --fresh starts over", path, number));
     }
     if (const Json load = trial.value("other_load", Json()); load.is_number()) other_loads_.push_back(load.get<double>());
     trials_[{trial["key"].dump(), trial["repeat"].get<int>()}] = std::move(trial["numbers"]);

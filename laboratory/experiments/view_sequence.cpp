@@ -18,7 +18,7 @@ constexpr std::uint32_t kSlowWorker = 1;
 
 ViewParameters Turntable(double part) { return {.azimuth_degrees = 180 * part, .elevation_degrees = kBenchElevationDegrees}; }
 
-bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame) || LoadMetricOf(frame.policy) == NameOf(LoadMetric::kCost); }
+bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame) || BalanceByOf(frame.policy) == NameOf(BalanceBy::kCost); }
 
 KeyedFrame ForSequence(ExperimentContext& context, const ViewSequence& sequence) {
   Json views = Json::array();
@@ -86,7 +86,7 @@ const std::vector<ViewMotion>& ViewMotions() {
        }},
       {"turn-over", "half a turn about the x axis, over the top, orthographic",
        [](double part) { return ViewParameters{.elevation_degrees = 180 * part}; }},
-      {"fly-through", "a quarter of a turn ever nearer to the volume, perspective",
+      {"fly-through", "a quarter of a turn while approaching the volume, perspective",
        [](double part) {
          return ViewParameters{.projection = Projection::kPerspective,
                                .azimuth_degrees = 90 * part,

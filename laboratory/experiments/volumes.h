@@ -29,8 +29,8 @@ class VolumeCache {
   // Makes or reads the volume if it is not held. Cases of one sphere or one file share their volume. InvalidArgument: the file was read
   // before and has changed since; errors of LoadBenchVolume.
   VolumeInUse Get(const BenchCase& volume);
-  // What the volume holds, whatever its name. A sphere: class, size and occupancy. A file: its path, its description and a digest of its
-  // voxels, as they were when it was first read; so a header stands for its detached data, too. Errors of Get.
+  // What the volume holds, independent of its name. A sphere: class, size and occupancy. A file: its path, its description and a digest of
+  // its voxels, as they were when it was first read; so a header stands for its detached data, too. Errors of Get.
   Json Identity(const BenchCase& volume);
   // The voxels that its renderer draws under its transfer function.
   std::shared_ptr<const OccupancyGrid> Occupied(const BenchCase& volume);

@@ -173,7 +173,7 @@ Result<ReplayChange> ParseReplayChange(std::span<const std::string> texts) {
     if (again) return Status::InvalidArgument(fmt::format("--with {}: {} is given twice", text, key));
     if (key == "combine") {
       if (value == kAutomatic) {
-        return Status::InvalidArgument(fmt::format("--with {}: a replay asks what one scheme would have done, so it must be named", text));
+        return Status::InvalidArgument(fmt::format("--with {}: a replay needs the name of one scheme", text));
       }
       if (const auto scheme = ParseCombining(value); !scheme.ok()) {
         return Status::InvalidArgument(fmt::format("--with {}: {}", text, scheme.status().message()));
@@ -253,7 +253,7 @@ Status RunReplay(const ReplayOptions& options, std::ostream& out) {
   out << RowText("measured", report->measured, false);
   out << RowText("simulated as it was", report->as_it_was, true);
   if (!options.changes.empty()) out << RowText("simulated with changes", report->changed, true);
-  out << fmt::format("The simulation is off by {:+.1f} % for the frames as they were.\n",
+  out << fmt::format("The simulation of the unchanged frames is off by {:+.1f} %.\n",
                      100 * (report->as_it_was.latency / report->measured.latency - 1));
   return Status::Ok();
 }

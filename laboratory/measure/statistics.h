@@ -6,7 +6,7 @@
 namespace slabstream {
 
 // The interval is that of order statistics: the k-th smallest and k-th largest value with the largest k whose interval covers the median of
-// the distribution with at least the wanted confidence, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
+// the distribution with at least the wanted confidence, for any distribution (David and Nagaraja, Order Statistics, 2003,
 // section 7.1):
 //   coverage(k) = 1 - 2 P(Binomial(count, 1/2) < k)
 // Fewer than six values cannot reach 95 %: the interval then spans all of them and `coverage` gives its confidence. For one value, or equal

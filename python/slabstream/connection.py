@@ -58,7 +58,7 @@ def _milliseconds_until(due: float) -> int | None:
 
 
 class _Loop:
-    """What the thread has. It does not refer to the Connection, so that one which nobody uses any more is closed."""
+    """What the thread has. It does not refer to the Connection, so that an unused one is closed."""
 
     def __init__(self, address: Address):
         self.endpoint = address.endpoint

@@ -1,4 +1,4 @@
-"""Requests made from options: a table that says what each option changes, and the requests of `slabstream render` and `slice`."""
+"""Requests made from options: those of `slabstream render` and `slice`."""
 from __future__ import annotations
 
 import dataclasses
@@ -8,6 +8,8 @@ import json
 import os
 import pathlib
 from typing import Any, Callable, Iterable, Mapping
+
+from google.protobuf.descriptor import FieldDescriptor
 
 from . import schema, transfer, values
 from .errors import InvalidArgument, NotFound, UnknownOption
@@ -35,87 +37,126 @@ class Draft:
 Put = Callable[[Draft, Option, Any], None]
 
 
-# Ways to put a value into a field of the frame, named by its path such as "view.zoom".
-
-
-def _holder(draft: Draft, path: str) -> tuple[Any, str]:
-    *outer, field = path.split(".")
-    return functools.reduce(getattr, outer, draft.frame), field
-
-
-def _number(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        setattr(holder, field, values.number(option.name, value, option.least, option.most, option.above))
-
-    return put
-
-
-def _integer(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        setattr(holder, field, values.integer(option.name, value, int(option.least), int(option.most)))
-
-    return put
-
-
-def _flag(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        setattr(holder, field, values.flag(option.name, value))
-
-    return put
-
-
-def _enum(path: str) -> Put:
-    """The schema's enums list the choices in the command line's order, after the one that is never sent."""
-
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        setattr(holder, field, 1 + values.choice(option.name, value, option.choices))
-
-    return put
-
-
-def _text(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        if option.choices:
-            values.choice(option.name, value, option.choices)
-        if not isinstance(value, str) or not 1 <= len(value.encode()) <= _MOST_NAME_BYTES:
-            raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {_MOST_NAME_BYTES} bytes")
-        setattr(holder, field, value)
-
-    return put
+# ---- fields of the request: how a value is put into one follows from the field's type in the schema
 
 
 def _set_vector(message: Any, vector: values.Vector) -> None:
     message.x, message.y, message.z = vector
 
 
-def _point(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        _set_vector(getattr(holder, field), values.point(option.name, value))
-
-    return put
+_CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
 
 
-def _transfer(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        transfer.choose(option.name, value, getattr(holder, field))
+def _several(value: Any, count: int) -> list[Any]:
+    """Values of an option that may be repeated: one of `count` numbers or a text, or a list of such."""
+    if isinstance(value, str) or not isinstance(value, Iterable):
+        return [value]
+    listed = list(value)
+    return [listed] if len(listed) == count and not any(isinstance(item, (str, Iterable)) for item in listed) else listed
 
-    return put
+
+def _size(size: Any, name: str, value: Any) -> None:
+    size.width, size.height = values.size(name, value)
 
 
-def _scalar_range(path: str) -> Put:
-    def put(draft: Draft, option: Option, value: Any) -> None:
-        holder, field = _holder(draft, path)
-        low, high, percentiles = values.scalar_range(option.name, value)
-        getattr(holder, field).CopyFrom(schema.ScalarRange(min=low, max=high, percentiles=percentiles))
+def _scalar_range(scalar_range: Any, name: str, value: Any) -> None:
+    scalar_range.min, scalar_range.max, scalar_range.percentiles = values.scalar_range(name, value)
 
-    return put
+
+def _clip_box(box: Any, name: str, value: Any) -> None:
+    low, high, unit = values.clip_box(name, value)
+    _set_vector(box.low, low)
+    _set_vector(box.high, high)
+    box.unit = _CLIP_UNITS[unit]
+
+
+def _clip_planes(planes: Any, name: str, value: Any) -> None:
+    for item in _several(value, 4):
+        normal, offset = values.clip_plane(name, item)
+        _set_vector(planes.add(offset=offset).normal, normal)
+
+
+def _lights(lights: Any, name: str, value: Any) -> None:
+    for item in _several(value, 3):
+        _set_vector(lights.add(), values.direction(name, item))
+
+
+def _isosurfaces(surfaces: Any, name: str, value: Any) -> None:
+    for surface, (red, green, blue), opacity in values.isosurfaces(name, value):
+        surfaces.add(value=surface, r=red, g=green, b=blue, opacity=opacity)
+
+
+def _gradient_opacities(points: Any, name: str, value: Any) -> None:
+    for slope, opacity in values.gradient_opacities(name, value):
+        points.add(slope=slope, opacity=opacity)
+
+
+def _label_opacities(opacities: Any, name: str, value: Any) -> None:
+    for label, opacity in values.label_opacities(name, value):
+        opacities.add(value=label, opacity=opacity)
+
+
+def _label_ranges(ranges: Any, name: str, value: Any) -> None:
+    for first, last in values.label_ranges(name, value):
+        ranges.add(first=first, last=last)
+
+
+#: By the type of the field's messages.
+_MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
+    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": _clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
+    "GradientOpacityPoint": _gradient_opacities, "LabelOpacity": _label_opacities, "LabelRange": _label_ranges,
+}
+
+
+def _text(option: Option, value: Any) -> str:
+    if option.choices:
+        values.choice(option.name, value, option.choices)
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _MOST_NAME_BYTES:
+        raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {_MOST_NAME_BYTES} bytes")
+    return value
+
+
+def _scalar(field: FieldDescriptor, option: Option, value: Any) -> Any:
+    if field.cpp_type == FieldDescriptor.CPPTYPE_ENUM:  # lists the choices in their order, after the one that is never sent
+        return 1 + values.choice(option.name, value, option.choices)
+    if field.cpp_type == FieldDescriptor.CPPTYPE_BOOL:
+        return values.flag(option.name, value)
+    if field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
+        return _text(option, value)
+    if field.cpp_type in (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT):
+        return values.number(option.name, value, option.least, option.most, option.above)
+    if value == option.default == "auto":
+        return 0
+    return values.integer(option.name, value, int(option.least), int(option.most))
+
+
+def _field(draft: Draft, option: Option, value: Any) -> None:
+    *outer, name = option.path.split(".")
+    if outer == ["parameters"]:
+        return _parameter(draft, option, value)
+    holder = functools.reduce(getattr, outer, draft.frame)
+    field = holder.DESCRIPTOR.fields_by_name[name]
+    if name == "preset":
+        transfer.choose(option.name, value, holder)
+    elif field.message_type is None:
+        setattr(holder, name, _scalar(field, option, value))
+    elif field.message_type.name == "Vec3" and field.label != FieldDescriptor.LABEL_REPEATED:
+        _set_vector(getattr(holder, name), values.point(option.name, value))
+    else:
+        put = _lights if field.message_type.name == "Vec3" else _MESSAGES[field.message_type.name]
+        put(getattr(holder, name), option.name, value)
+
+
+def _parameter(draft: Draft, option: Option, value: Any) -> None:
+    if option.choices:
+        values.choice(option.name, value, option.choices)
+        draft.frame.parameters.add(name=option.text_name, text=str(value))
+    else:
+        number = values.number(option.name, value, option.least, option.most, option.above)
+        draft.frame.parameters.add(name=option.text_name, text=values.text_of(number))
+
+
+# ---- options that are no field, or several
 
 
 def _slice_field(parse: Callable[[Option, Any], Any]) -> Put:
@@ -123,13 +164,6 @@ def _slice_field(parse: Callable[[Option, Any], Any]) -> Put:
         setattr(draft, option.name, parse(option, value))
 
     return put
-
-
-# Options of a form of their own.
-
-
-def _size(draft: Draft, option: Option, value: Any) -> None:
-    draft.frame.size.width, draft.frame.size.height = values.size(option.name, value)
 
 
 # Azimuth and elevation in degrees, and whether only patients have such a side (common/view/named_view.h).
@@ -164,82 +198,17 @@ def _camera(draft: Draft, option: Option, value: Any) -> None:
     if not isinstance(fields, Mapping):
         raise InvalidArgument(f"{option.name} {value!r} is no camera: it is not one JSON object")
     for field, inner in fields.items():
-        if field == "of_patient":
-            draft.frame.view.of_patient = values.flag(f"{option.name} {field}", inner)
-        elif field in option.excludes and field != "view":
-            _PUT[field](draft, COMMANDS["render"][field], inner)
+        if field.replace("-", "_") in option.excludes and field != "view":
+            _put(draft, COMMANDS["render"][field.replace("-", "_")], inner)
         else:
             raise InvalidArgument(f"{option.name} has the field {field!r}, which cameras do not have")
-
-
-_CLIP_UNITS = {"": schema.CLIP_UNIT_WORLD, "v": schema.CLIP_UNIT_VOXELS, "%": schema.CLIP_UNIT_PERCENT}
-
-
-def _clip_box(draft: Draft, option: Option, value: Any) -> None:
-    low, high, unit = values.clip_box(option.name, value)
-    box = draft.frame.clipping.box
-    _set_vector(box.low, low)
-    _set_vector(box.high, high)
-    box.unit = _CLIP_UNITS[unit]
-
-
-def _several(value: Any, count: int) -> list[Any]:
-    """Values of an option that may be repeated: one of `count` numbers or a text, or a list of such."""
-    if isinstance(value, str) or not isinstance(value, Iterable):
-        return [value]
-    listed = list(value)
-    return [listed] if len(listed) == count and not any(isinstance(item, (str, Iterable)) for item in listed) else listed
-
-
-def _clip_planes(draft: Draft, option: Option, value: Any) -> None:
-    for item in _several(value, 4):
-        normal, offset = values.clip_plane(option.name, item)
-        plane = draft.frame.clipping.clip_planes.add(offset=offset)
-        _set_vector(plane.normal, normal)
-
-
-def _lights(draft: Draft, option: Option, value: Any) -> None:
-    for item in _several(value, 3):
-        _set_vector(draft.frame.shading.lights.add(), values.direction(option.name, item))
-
-
-def _isovalue(draft: Draft, option: Option, value: Any) -> None:
-    for surface, (red, green, blue), opacity in values.isosurfaces(option.name, value):
-        draft.frame.transfer.isosurfaces.add(value=surface, r=red, g=green, b=blue, opacity=opacity)
-
-
-def _gradient_opacity(draft: Draft, option: Option, value: Any) -> None:
-    for slope, opacity in values.gradient_opacities(option.name, value):
-        draft.frame.transfer.gradient_opacities.add(slope=slope, opacity=opacity)
-
-
-def _parameter(draft: Draft, option: Option, value: Any) -> None:
-    if option.choices:
-        values.choice(option.name, value, option.choices)
-        draft.frame.parameters.add(name=option.text_name, text=str(value))
-    else:
-        number = values.number(option.name, value, option.least, option.most, option.above)
-        draft.frame.parameters.add(name=option.text_name, text=values.text_of(number))
-
-
-def _groups(draft: Draft, option: Option, value: Any) -> None:
-    draft.frame.policy.groups = 0 if value == "auto" else values.integer(option.name, value, 0, 1024)
-
-
-def _label_opacity(draft: Draft, option: Option, value: Any) -> None:
-    for label, opacity in values.label_opacities(option.name, value):
-        draft.frame.labels.opacities.add(value=label, opacity=opacity)
-
-
-def _labels_shown(draft: Draft, option: Option, value: Any) -> None:
-    for first, last in values.label_ranges(option.name, value):
-        draft.frame.labels.shown.add(first=first, last=last)
 
 
 def _layer(draft: Draft, option: Option, value: Any) -> None:
     """labels=True, overlay=True: shown as usual. Files belong to the dataset."""
     if value is not True:
         raise InvalidArgument(f"{option.name} {value!r} must be True: at a service, layers belong to the dataset (add_data, render of a file)")
+    getattr(draft.frame, option.name).SetInParent()
 
 
 def _background(draft: Draft, option: Option, value: Any) -> None:
@@ -250,65 +219,14 @@ def _depth(draft: Draft, option: Option, value: Any) -> None:
     draft.format = dataclasses.replace(draft.format, png_bits=(8, 16)[values.choice(option.name, value, option.choices)])
 
 
-#: Every option of options.json is here.
+#: Every option of options.json is here, or has a path.
 _PUT: dict[str, Put] = {
-    # View
-    "size": _size,
-    "projection": _enum("view.projection"),
     "view": _view,
-    "azimuth": _number("view.azimuth_degrees"),
-    "elevation": _number("view.elevation_degrees"),
-    "look_at": _point("view.look_at"),
-    "fit": _flag("view.fit"),
-    "eye": _point("view.eye"),
-    "up": _point("view.up"),
-    "distance": _number("view.distance"),
-    "roll": _number("view.roll_degrees"),
-    "zoom": _number("view.zoom"),
-    "fov": _number("view.fov_degrees"),
     "camera": _camera,
-    # Clipping
-    "clip_box": _clip_box,
-    "clip_plane": _clip_planes,
-    "clip_mode": _enum("clipping.mode"),
-    # Look
-    "renderer": _text("renderer"),
-    "interpolation": _parameter,
-    "kernel": _parameter,
-    "projection_mode": _parameter,
-    "sampling_rate": _parameter,
-    "supersampling": _parameter,
-    "transfer": _transfer("transfer"),
-    "scalar_range": _scalar_range("transfer.scalar_range"),
-    "opacity_distance": _number("transfer.opacity_distance"),
-    "isovalue": _isovalue,
-    "gradient_opacity": _gradient_opacity,
-    "shading": _enum("shading.model"),
-    "light": _lights,
-    "termination": _number("termination"),
     "background": _background,
     "depth": _depth,
-    # Layers
     "labels": _layer,
     "overlay": _layer,
-    "label_mode": _enum("labels.mode"),
-    "label_tint": _number("labels.tint"),
-    "label_opacity": _label_opacity,
-    "labels_shown": _labels_shown,
-    "overlay_transfer": _transfer("overlay.transfer"),
-    "overlay_range": _scalar_range("overlay.transfer.scalar_range"),
-    "overlay_weight": _number("overlay.weight"),
-    # Distribution
-    "decomposition": _text("policy.decomposition"),
-    "axis": _enum("policy.axis"),
-    "balance_by": _text("policy.load_metric"),
-    "assignment": _text("policy.assignment"),
-    "balance": _text("policy.balance"),
-    "groups": _groups,
-    "frame_parallel": _integer("policy.teams"),
-    "combine": _text("policy.combine"),
-    "pixel_error": _number("policy.pixel_error"),
-    # Plane, of slices
     "plane": _slice_field(lambda option, value: option.choices[values.choice(option.name, value, option.choices)]),
     "at": _slice_field(lambda option, value: values.point(option.name, value)),
     "index": _slice_field(lambda option, value: values.integer(option.name, value, 0, 65534)),
@@ -317,11 +235,9 @@ _PUT: dict[str, Put] = {
     "level": _slice_field(lambda option, value: values.number(option.name, value, -1e30, 1e30)),
 }
 
-_PARAMETERS = {name for name, put in _PUT.items() if put is _parameter}
-_LABELS = {"labels", "label_mode", "label_tint", "label_opacity", "labels_shown"}
-_OVERLAY = {"overlay", "overlay_transfer", "overlay_range", "overlay_weight"}
-# Their defaults are told in words.
-_WORDED = {"level"}
+
+def _put(draft: Draft, option: Option, value: Any) -> None:
+    (_field if option.path else _PUT[option.name])(draft, option, value)
 
 
 def _check(command: str, given: Mapping[str, Any]) -> None:
@@ -340,16 +256,9 @@ def _check(command: str, given: Mapping[str, Any]) -> None:
 
 
 def _put_all(draft: Draft, command: str, given: Mapping[str, Any]) -> None:
-    """The command's defaults, then what is given."""
-    labels, overlay = bool(_LABELS & set(given)), bool(_OVERLAY & set(given))
-    for name, option in COMMANDS[command].items():
-        shown = name not in _PARAMETERS and (labels or name not in _LABELS) and (overlay or name not in _OVERLAY)
-        if shown and option.default is not None and name not in _WORDED:
-            _PUT[name](draft, option, option.default)
-    if overlay:
-        draft.frame.overlay.transfer.opacity_distance = 1
+    """What is left out has its default at the service."""
     for name, value in given.items():
-        _PUT[name](draft, COMMANDS[command][name], value)
+        _put(draft, COMMANDS[command][name], value)
 
 
 def _given(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -366,13 +275,11 @@ def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     if not isinstance(dataset, str) or not 1 <= len(dataset.encode()) <= _MOST_NAME_BYTES:
         raise InvalidArgument(f"dataset {dataset!r} must be a name of 1 to {_MOST_NAME_BYTES} bytes")
     frame.dataset = dataset
-    # No options, but always sent: common/view/shading.h.
-    frame.shading.ambient, frame.shading.diffuse, frame.shading.specular, frame.shading.shininess = 0.2, 0.8, 0.2, 20
     _put_all(draft, "render", given)
     if "isovalue" in given and "transfer" not in given:
         frame.transfer.preset = "none"  # they stand alone
-    if not (frame.clipping.HasField("box") or frame.clipping.clip_planes):
-        frame.ClearField("clipping")
+    if not frame.HasField("size"):
+        _put(draft, COMMANDS["render"]["size"], COMMANDS["render"]["size"].default)  # replies are compared with it
     return draft
 
 
@@ -392,7 +299,8 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     """The requests of `slabstream slice` with these options, one a plane, from left to right."""
     given = _given(options)
     _check("slice", given)
-    planes = Draft()
+    planes = Draft(plane=COMMANDS["slice"]["plane"].default or "")
+    planes.frame.transfer.preset = COMMANDS["slice"]["transfer"].default or ""
     _put_all(planes, "slice", given)
     layers = planes.frame.HasField("labels") or planes.frame.HasField("overlay")
     if layers and planes.thickness > 0:
@@ -409,7 +317,6 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         draft = draft_of(dataset, {})
         draft.format = planes.format
         frame = draft.frame
-        frame.transfer.Clear()
         frame.MergeFrom(planes.frame)
         frame.renderer = "raycast" if layers else "mip"
         if layers:
@@ -417,7 +324,6 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         _look_from(frame.view, side, of_patient)
         frame.view.fit = True
         slab = frame.clipping.slab
-        frame.clipping.mode = schema.CLIP_MODE_KEEP
         _set_vector(slab.normal, normal)
         slab.thickness = planes.thickness
         if planes.at is not None:

@@ -132,7 +132,7 @@ class Frame:
         return self._waiting.progress
 
     def previews(self) -> Iterator[Image]:
-        """Previews while they come, then the picture: whatever is newest, each once. Needs submit(previews=True)."""
+        """Previews while they come, then the picture: always the newest, each once. Needs submit(previews=True)."""
         seen: Image | None = None
         while True:
             with self._waiting.changed:

@@ -52,7 +52,7 @@ class Statistics:
     decomposition: str
     axis: str
     combine: str
-    load_metric: str
+    balance_by: str
     assignment: str
     balance: str
     queued_seconds: float        # from the request's arrival to the plan
@@ -91,7 +91,7 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
         decomposition=message.decomposition,
         axis=message.axis,
         combine=message.combine,
-        load_metric=message.load_metric,
+        balance_by=message.balance_by,
         assignment=message.assignment,
         balance=message.balance,
         queued_seconds=message.queued_ns * 1e-9,

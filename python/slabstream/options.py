@@ -1,7 +1,7 @@
 """The options of pictures: those of `slabstream render` and `slice`, by the same names with underscores.
 
 options.json is what `slabstream options COMMAND` prints (python/update-options writes it, a test compares). Names, defaults, limits, choices,
-help texts and signatures are made from it. drafts.py says what an option changes in a request.
+help texts, signatures and what an option changes in a request are made from it.
 """
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ class Option:
     group: str
     help: str
     type: str | None        # None: a flag
+    path: str               # of the field in a FrameRequest, "view.zoom", or of a parameter, "parameters.kernel"; empty: it is no field
     default: str | None
     choices: tuple[str, ...]
     least: float
@@ -31,6 +32,7 @@ class Option:
     above: bool             # values must exceed `least`
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
+    same_picture: bool      # it never changes the finished picture
 
 
 def _keyword(name: str) -> str:
@@ -44,6 +46,7 @@ def _option(entry: dict[str, Any]) -> Option:
         group=entry["group"],
         help=entry["help"],
         type=entry.get("type"),
+        path=entry.get("path", ""),
         default=entry.get("default"),
         choices=tuple(entry.get("choices", ())),
         least=entry.get("above", entry.get("min", -math.inf)),
@@ -51,6 +54,7 @@ def _option(entry: dict[str, Any]) -> Option:
         above="above" in entry,
         excludes=tuple(map(_keyword, entry.get("excludes", ()))),
         needs=tuple(map(_keyword, entry.get("needs", ()))),
+        same_picture=entry.get("same_picture", False),
     )
 
 

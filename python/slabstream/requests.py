@@ -68,7 +68,7 @@ class Requests:
         self._received_bytes = self._told_bytes = 0
         self._next_ping = 0.0
         self._unanswered_since: float | None = None  # time of the first ping since the last message
-        self._gone: str = ""  # why nothing will be answered any more
+        self._gone: str = ""  # why nothing more will be answered
 
     def submit(self, frame: Any, deadline_seconds: float, observer: Observer, now: float) -> int:
         """Opens a request and returns its number. The deadline counts from its arrival at the service."""
@@ -104,7 +104,7 @@ class Requests:
         return self._last_nonce
 
     def forget(self, nonce: int) -> None:
-        """Nobody waits for that answer any more."""
+        """Nobody waits for that answer now."""
         self._questions.pop(nonce, None)
 
     def begin_upload(self, order: Any, answer: concurrent.futures.Future[Any], credited: Callable[[int], None], now: float) -> int:
@@ -176,7 +176,7 @@ class Requests:
         return min(self._next_ping, self._unanswered_since + SILENCE_SECONDS)
 
     def fail_all(self, why: str, for_good: bool = False) -> None:
-        """Ends everything that is open, and if `for_good` whatever comes later."""
+        """Ends everything that is open, and if `for_good` everything that comes later."""
         if for_good:
             self._gone = why
             for answer in self._questions.values():
@@ -249,7 +249,7 @@ class Requests:
         if pong.nonce not in self._pinged:
             return
         asked = self._pinged[pong.nonce]
-        self._fail_uploads(f"the service at {self._endpoint} was started anew, and what was sent of the volume is lost", pong.epoch)
+        self._fail_uploads(f"the service at {self._endpoint} was restarted, and the part of the volume that was sent is lost", pong.epoch)
         self._pinged = {nonce: requests for nonce, requests in self._pinged.items() if nonce > pong.nonce}
         known = set(pong.known)
         for request in asked:
@@ -262,7 +262,7 @@ class Requests:
                 self._submit_again(state, now)
 
     def _submit_again(self, lost: _Open, now: float) -> None:
-        """The service has lost the request: it was started anew. The deadline is still that of the first time."""
+        """The service was restarted and lost the request. The deadline is still that of the first time."""
         request = lost.message.request
         left_ms = int((lost.deadline - now) * 1000)
         if lost.cancelled:

@@ -84,7 +84,7 @@ class Service:
         draft = draft_of(dataset, options)
         if draft.frame.view.HasField("eye") and turns > 0:
             raise InvalidArgument(
-                "eye stands still, but a turntable turns by azimuth, about look_at; turns=0 keeps the view still"
+                "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
             )
         return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
 
@@ -103,7 +103,7 @@ class Service:
 
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
-        """Planes through a volume, or slabs of it; several are put side by side."""
+        """Planes or thick slabs of a volume; several are put side by side."""
         return side_by_side(list(self._pipelined(iter(slice_drafts_of(dataset, options)), 3, deadline)))
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
@@ -164,7 +164,7 @@ class Service:
         return self._order(schema.DATA_ACTION_REMOVE, names, timeout)
 
     def reload_data(self, *names: str, timeout: float = _ORDER_SECONDS) -> list[Dataset]:
-        """Has the next frame read the files anew, even if they look the same."""
+        """Makes the next frame read the files again, even if they seem unchanged."""
         return self._order(schema.DATA_ACTION_RELOAD, names, timeout)
 
     def close(self) -> None:

@@ -166,7 +166,7 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
     for one in slices:
         try:
             pixels = numpy.asarray(one.pixel_array)
-        except Exception as error:  # of whatever decodes it
+        except Exception as error:  # of any decoder
             raise InvalidArgument(f"pydicom cannot decode a dataset: {str(error).splitlines()[0]}; give the path of its file instead") from None
         if pixels.ndim != 2:
             raise InvalidArgument("a DICOM dataset has several frames or colours; give the path of its file instead")
@@ -184,7 +184,7 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
 
 
 def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None) -> Volume:
-    """Whatever is given says more than what the object states. InvalidArgument names what is wrong with it."""
+    """Given arguments take precedence over what the object states. InvalidArgument names what is wrong with it."""
     if _is_xarray(volume):
         found = _from_xarray(volume)
     elif _is_nibabel(volume):

@@ -15,7 +15,7 @@ def main(arguments: list[str] | None = None) -> int:
         prog="slabstream-lab",
         description="Draw the page of an experiment: FOLDER/report.html and FOLDER/plots, from its results.",
     )
-    parser.add_argument("folders", metavar="FOLDER", nargs="+", type=pathlib.Path, help="what -o of `slabstream experiment` has named")
+    parser.add_argument("folders", metavar="FOLDER", nargs="+", type=pathlib.Path, help="the folder that -o of `slabstream experiment` named")
     options = parser.parse_args(arguments)
     for folder in options.folders:
         try:

@@ -34,7 +34,7 @@ const std::vector<LinkPreset>& LinkPresets() {
        {Contention::kFatTree, 20e-6, 10 * kBytesAGigabit, 16, 4}},
       {"bus", "10 Gbit/s, one message at a time", {Contention::kSharedBus, 20e-6, 10 * kBytesAGigabit}},
       {"pvs",
-       "a bus that is to today's processors what the paper's was to its own",
+       "a bus as slow for today's processors as the paper's bus was for its own",
        {Contention::kSharedBus, 1e-6, kPvsImageBytes / (kPvsImageShare * kPvsFrameSeconds)}},
   };
   return presets;

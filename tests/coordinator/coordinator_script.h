@@ -160,10 +160,10 @@ class CoordinatorScript {
     plans.erase(plans.begin());
     return Step(Planned{request.plan, planner.Plan(request)});
   }
-  Actions Worker(const FakeWorker& from, AnyMessage message, Bytes payload = {}) {
+  Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {
     return Step(FromWorker{from.token, std::move(message), std::move(payload)});
   }
-  Actions Client(PeerToken from, AnyMessage message) { return Step(FromClient{from, std::move(message)}); }
+  Actions Client(PeerToken from, ClientToCoordinator message) { return Step(FromClient{from, std::move(message)}); }
 
   static Register RegisterOf(const FakeWorker& worker) {
     return {.incarnation = worker.incarnation,

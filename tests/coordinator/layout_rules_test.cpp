@@ -178,7 +178,7 @@ TEST(CoordinatorLayouts, SplitByCostIsMadeAnewOnceCostsAreKnown) {
   BalanceScript script;
   const auto frame = [](RequestId request) {
     SubmitFrame submit = Frame(request);
-    submit.frame.policy.load_metric = "cost";
+    submit.frame.policy.balance_by = "cost";
     return submit;
   };
   const std::vector<Box> first = script.Play(frame(1), 10), second = script.Play(frame(2), 10);
@@ -190,7 +190,7 @@ TEST(CoordinatorLayouts, SplitByCostIsMadeAnewOnceCostsAreKnown) {
 SubmitFrame OpenFrame(RequestId request) {
   SubmitFrame submit = Frame(request, 0);
   Policy& policy = submit.frame.policy;
-  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = "auto";
+  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = "auto";
   submit.frame.view.azimuth_degrees = double(request) * 30;
   return submit;
 }
@@ -217,7 +217,7 @@ class ChoiceScript : public BalanceScript {
 TEST(CoordinatorPolicies, AnOpenPolicyIsFilledInAndPredicted) {
   ChoiceScript script;
   const FrameStatistics statistics = script.StatisticsOf(OpenFrame(1), 1);
-  for (const std::string& name : {statistics.decomposition, statistics.load_metric, statistics.assignment, statistics.combine}) {
+  for (const std::string& name : {statistics.decomposition, statistics.balance_by, statistics.assignment, statistics.combine}) {
     EXPECT_NE(name, "auto");
     EXPECT_NE(name, "");
   }

@@ -131,7 +131,7 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--projection", "fisheye"}, "orthographic, perspective"},
       {{"--renderer", "ray"}, "splat, zbuffer"},
       {{"--shading", "toon"}, "phong, none, depth-gradient"},
-      {{"--shading", "depth-gradient"}, "needs a renderer with depths"},
+      {{"--shading", "depth-gradient"}, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"},
       {{"--transfer", "no-such-preset"}, "no-such-preset"},
       {{"--transfer", "missing.json"}, "missing.json"},
       {{"--transfer", "empty.json"}, "empty.json"},

@@ -225,7 +225,7 @@ TEST_F(MovieTest, WhatAMovieCannotBeIsRefusedBeforeTheWorkBegins) {
       {{"-o", "m_%d.mp4"}, "-o 'm_%d.mp4' has a place for a number, but a movie is one file"},
       {{"-o", "m.avi"}, "-o 'm.avi' has no place for the frame's number; it needs one number such as %04d, or the ending of a movie: .mp4"},
       {{"-o", "no/m.mp4"}, "--output 'no/m.mp4': the directory 'no' does not exist"},
-      {{"-o", "m.mp4", "--eye", "1,2,3"}, "--eye stands still"},
+      {{"-o", "m.mp4", "--eye", "1,2,3"}, "--eye fixes the viewpoint"},
       {{"-o", "m.mp4", "--stats", "no/s.json"}, "--stats 'no/s.json'"},
   };
   ExpectEachRefused({"turntable", ball_, "--local=1", "--frames", "2"}, cases);

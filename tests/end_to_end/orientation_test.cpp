@@ -174,7 +174,7 @@ TEST_F(OrientationTest, ACameraIsSavedAndReadBack) {
   EXPECT_THAT(inside.err, HasSubstr("view.eye"));
   const ProgramResult turning = Slabstream({"turntable", volume, "--local", "-o", Path("p%d.png"), "--frames", "2", "--eye", "240,16,25"});
   EXPECT_EQ(turning.exit_status, 2);
-  EXPECT_THAT(turning.err, HasSubstr("--eye stands still"));
+  EXPECT_THAT(turning.err, HasSubstr("--eye fixes the viewpoint"));
 }
 
 // A small object in a corner of a large volume.

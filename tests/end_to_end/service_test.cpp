@@ -103,7 +103,7 @@ TEST_F(ServiceTest, DownEndsTheWorkersOfACoordinatorThatWasKilledAndKeepsTheLogs
   ::unsetenv("SLABSTREAM_ENDPOINT");
   for (std::size_t i = 1; i < pids.size(); ++i) EXPECT_TRUE(Runs(pids[i]));
   const std::string down = MustRun({"down"}).out;
-  EXPECT_THAT(down, AllOf(HasSubstr("had ended; its 2 workers are down now"), HasSubstr("logs are in ")));
+  EXPECT_THAT(down, AllOf(HasSubstr("had already ended; stopped its 2 workers"), HasSubstr("logs are in ")));
   for (const pid_t pid : pids) EXPECT_FALSE(Runs(pid));
   const std::size_t begin = down.find("logs are in ") + 12;
   EXPECT_TRUE(std::filesystem::exists(down.substr(begin, down.find('\n') - begin) + "/coordinator.log"));
@@ -347,7 +347,7 @@ TEST_F(ServiceTest, LogsTellWhatHappenedInOrder) {
   const ProgramResult none = Slabstream({"logs"});
   EXPECT_EQ(none.exit_status, 1);
   EXPECT_THAT(none.err_lines(),
-              testing::ElementsAre(HasSubstr("slabstream logs: no service that `slabstream up` of this user started on this host")));
+              testing::ElementsAre(HasSubstr("slabstream logs: `slabstream up` of this user started no service on this host")));
 }
 
 TEST_F(ServiceTest, TheLogLevelIsThatOfAllProcesses) {

@@ -3,9 +3,9 @@
 // input: u8 axis, u16 groups, u16 teams, then lines: renderer, parameter, its value, decomposition, load metric, assignment, balance,
 // combine
 #include "common/planning/resolved_policy.h"
-#include "common/planning/validate_request.h"
 #include "common/renderers/registry.h"
 #include "common/wire/any_message.h"
+#include "common/wire/validate_request.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/support/random_combining.h"
 
@@ -21,7 +21,7 @@ bool DecodePolicy(std::span<const std::byte> bytes) {
   request.renderer = input.TakeLine();
   const std::string parameter = input.TakeLine(), value = input.TakeLine();
   if (!parameter.empty()) request.parameters[parameter] = value;
-  for (std::string* name : {&request.policy.decomposition, &request.policy.load_metric, &request.policy.assignment, &request.policy.balance,
+  for (std::string* name : {&request.policy.decomposition, &request.policy.balance_by, &request.policy.assignment, &request.policy.balance,
                             &request.policy.combine})
     *name = input.TakeLine();
   const VolumeGeometry geometry{.size = {64, 32, 40}};
@@ -60,7 +60,7 @@ std::vector<FuzzBytes> PolicySeeds() {
       seed.Put(std::uint8_t(random.Integer(0, 4))).Put(std::uint16_t(random.Integer(0, 9))).Put(std::uint16_t(random.Integer(1, 3)));
       seed.Put(std::string(renderer->name()) + "\n" + parameter);
       const bool open = i == 0;
-      seed.Put((open ? std::string(kAutomatic) : one_of(Decompositions())) + "\n" + one_of(LoadMetrics()) + "\n");
+      seed.Put((open ? std::string(kAutomatic) : one_of(Decompositions())) + "\n" + one_of(BalanceByChoices()) + "\n");
       seed.Put((open ? std::string(kAutomatic) : one_of(Assignments())) + "\n" + one_of(BalanceModes()) + "\n");
       seeds.push_back(seed.Put(open ? std::string(kAutomatic) : RandomCombining(random)).bytes());
     }

@@ -2,7 +2,7 @@
 #include <set>
 
 #include "common/planning/resolved_policy.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "tests/fuzz/decoders.h"
 

@@ -21,7 +21,7 @@ class RecordedPeer {
     CHECK(socket_.Connect(endpoint).ok());
   }
 
-  void Send(const AnyMessage& message) {
+  void Send(MessageView message) {
     headers_.push_back(Encode(message));
     CHECK(socket_.Send({}, headers_.back()).ok());
   }

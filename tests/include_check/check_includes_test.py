@@ -71,6 +71,16 @@ class CheckIncludes(unittest.TestCase):
         self.write("top/top.cpp", '#include "base/inner/only.h"\n')
         self.assertEqual(self.check(("x_base", "base", [], [], []), ("x_top", "top", ["top.cpp"], [], []))[0], 1)
 
+    def test_renderers_do_not_link_each_other(self):
+        self.write("worker/renderers/fog/fog.cpp")
+        for kind, links in (("common/renderers/fog", ["x::shared"]), ("common/renderers/rain", []), ("worker/renderers/snow", [])):
+            half = (f"x_{kind.replace('/', '_')}", kind, [], [], [])
+            fog = ("x_fog", "worker/renderers/fog", ["fog.cpp"], links, [half[0].replace("x_", "x::", 1)])
+            status, text = self.check(half, fog, ("x_shared", "worker/rays", [], [], []))
+            other = not kind.endswith("fog")
+            self.assertEqual(status, int(other), text)
+            self.assertEqual(text == f"worker/renderers/fog: x_fog links {half[0]}, which is of another renderer\n", other)
+
 
 if __name__ == "__main__":
     unittest.main()

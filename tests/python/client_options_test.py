@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import importlib.machinery
 import importlib.util
+import functools
 import inspect
 import io
 import json
@@ -17,7 +18,7 @@ import client_support
 from client_support import ROOT, WithAService
 
 import slabstream as ss  # noqa: E402
-from slabstream import drafts  # noqa: E402
+from slabstream import drafts, schema  # noqa: E402
 from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
 from slabstream.options import COMMANDS  # noqa: E402
 
@@ -62,6 +63,9 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      ["--view", "front", "--clip-plane", "1,0,0,-35", "--clip-mode", "cut-away"]),
     ({"view": "back", "shading": "none", "background": "teal"}, ["--view", "back", "--shading", "none", "--background", "teal"]),
     ({"view": "top", "light": (1, 1, 2), "termination": 0.25}, ["--view", "top", "--light", "1,1,2", "--termination", "0.25"]),
+    ({"azimuth": 30, "of_patient": True}, ["--azimuth", "30", "--of-patient"]),
+    ({"azimuth": 30, "ambient": 0.5, "diffuse": 0.4, "specular": 0.7, "shininess": 5},
+     ["--azimuth", "30", "--ambient", "0.5", "--diffuse", "0.4", "--specular", "0.7", "--shininess", "5"]),
     ({"view": "bottom", "light": [(1, 1, 2), (-1, 0, 0)], "background": (0.1, 0.7, 0.3, 0.4)},
      ["--view", "bottom", "--light", "1,1,2", "--light", "-1,0,0", "--background", "0.1,0.7,0.3,0.4"]),
     ({"renderer": "splat", "background": "#1020fe80", "depth": 16}, ["--renderer", "splat", "--background", "#1020fe80", "--depth", "16"]),
@@ -88,7 +92,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      [*RAYCAST, "--overlay-transfer", "opaque", "--overlay-range", "0.2:0.9", "--overlay-weight", "0.5"]),
     ({"decomposition": "kd-tree", "axis": "x", "balance_by": "voxels"}, ["--decomposition", "kd-tree", "--axis", "x", "--balance-by", "voxels"]),
     ({"assignment": "greedy", "groups": 3}, ["--assignment", "greedy", "--groups", "3"]),
-    ({"balance": "static", "frame_parallel": 2}, ["--balance", "static", "--frame-parallel", "2"]),
+    ({"balance": "static", "teams": 2}, ["--balance", "static", "--teams", "2"]),
     ({"combine": "chain:strips=2", "pixel_error": 1e-7}, ["--combine", "chain:strips=2", "--pixel-error", "1e-7"]),  # too little for 16 bits
 ]
 SLICE_CASES: list[tuple[dict, list[str]]] = [
@@ -161,6 +165,25 @@ class Pixels(WithAService):
         self.compare("render", RENDER_CASES)
         self.compare("render", GRID_CASES, "grid")
 
+    def test_every_field_changes_the_picture_or_says_that_it_does_not(self) -> None:
+        def shown(dataset: str, options: dict):
+            try:
+                return self.service.render(dataset, **{"size": 48, **options}).rgba
+            except ss.SlabstreamError:  # it cannot be had without this option
+                return None
+
+        cases = [("head", python) for python, _ in RENDER_CASES] + [("grid", python) for python, _ in GRID_CASES]
+        for name, option in COMMANDS["render"].items():
+            if not option.path or name == "pixel_error":  # which says itself by how much
+                continue
+            with self.subTest(option=name):
+                changes = False
+                for dataset, python in cases:
+                    if name in python:
+                        without = shown(dataset, {other: value for other, value in python.items() if other != name})
+                        changes = changes or without is None or not np.array_equal(without, shown(dataset, python))
+                self.assertEqual(changes, not option.same_picture)
+
     def test_slice_makes_the_command_lines_pixels(self) -> None:
         self.compare("slice", SLICE_CASES)
 
@@ -193,8 +216,13 @@ class Drift(unittest.TestCase):
         self.assertEqual({file.name: file for file in kept.file}, {file.name: file for file in made.file}, "run python/update-options")
 
     def test_every_option_has_its_place_in_a_request(self) -> None:
-        names = {name for command in COMMANDS.values() for name in command}
-        self.assertEqual(set(drafts._PUT), names)
+        self.assertEqual({name for command in COMMANDS.values() for name, option in command.items() if not option.path}, set(drafts._PUT))
+        for command in COMMANDS.values():
+            for option in command.values():
+                *outer, field = option.path.split(".")
+                if option.path and outer != ["parameters"]:
+                    holder = functools.reduce(getattr, outer, schema.FrameRequest())
+                    self.assertIn(field, holder.DESCRIPTOR.fields_by_name, option.path)
 
     def test_signatures_and_help_show_them(self) -> None:
         signature = inspect.signature(ss.Service.render)
@@ -236,8 +264,8 @@ class Requests(unittest.TestCase):
             ({"zoom": float("nan")}, "zoom nan is not a number"),
             ({"zoom": True}, "zoom True is not a number"),
             ({"opacity_distance": 0}, "opacity_distance 0 is out of range (0, 1000000]"),
-            ({"frame_parallel": 0}, "frame_parallel 0 is out of range [1, 1024]"),
-            ({"frame_parallel": 1.5}, "frame_parallel 1.5 is not a whole number in [1, 1024]"),
+            ({"teams": 0}, "teams 0 is out of range [1, 1024]"),
+            ({"teams": 1.5}, "teams 1.5 is not a whole number in [1, 1024]"),
             ({"groups": 2000}, "groups 2000 is out of range [0, 1024]"),
             ({"sampling_rate": 100}, "sampling_rate 100 is out of range [0.1, 16]"),
             ({"label_tint": 2}, "label_tint 2 is out of range [0, 1]"),

@@ -171,7 +171,7 @@ class AtAService(WithAService):
             np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, azimuth=azimuth)))
         still = list(self.service.turntable("head", 2, turns=0, size=30, eye=(100, 0, 0)))
         np.testing.assert_array_equal(np.asarray(still[0]), np.asarray(still[1]))
-        for given, sentence in (({"frames": 0}, "frames 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye stands still"),
+        for given, sentence in (({"frames": 0}, "frames 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye fixes the viewpoint"),
                                 ({"frames": 2, "in_flight": 65}, "in_flight 65 is out of range"), ({"frames": 2, "zoom": 0}, "zoom 0 is out")):
             with self.subTest(given=given), self.assertRaisesRegex(ss.InvalidArgument, sentence):
                 self.service.turntable("head", **given)
@@ -186,7 +186,7 @@ class AtAService(WithAService):
     def test_the_services_sentence_is_the_exceptions(self) -> None:
         for options, kind, sentence in (
             ({"dataset": "foot"}, ss.NotFound, "foot"),
-            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "shading 'depth-gradient' needs a renderer with depths"),
+            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"),
             ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'splat', but isovalue needs one of: zbuffer, raycast"),
             ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
         ):

@@ -144,11 +144,11 @@ TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
     for (const RendererKind* renderer : Renderers()) {
       FrameRequest request = TestRequest(renderer, 50, 1);
       request.size = {320, 300};
-      if (renderer->draws_cells()) request.dataset = "grid";
+      if (renderer->Can(Ability::kCells)) request.dataset = "grid";
       request.policy.combine = scheme.name;
       const Result<Picture> picture = client.Render(request, seconds(60));
       ASSERT_TRUE(picture.ok()) << picture.status().message();
-      const LocalImage expected = RenderDirectly(request, renderer->draws_cells() ? *grid : *volume_);
+      const LocalImage expected = RenderDirectly(request, renderer->Can(Ability::kCells) ? *grid : *volume_);
       EXPECT_GT(HighestAlpha(expected), ExpectedAlpha(request));
       EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request)) << scheme.name;
 

@@ -71,14 +71,14 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           ++frame;
           request.policy.decomposition = decomposition;
           request.policy.assignment = assignment;
-          request.policy.load_metric = LoadMetrics()[frame % LoadMetrics().size()].name;
+          request.policy.balance_by = BalanceByChoices()[frame % BalanceByChoices().size()].name;
           request.policy.balance = BalanceModes()[frame / 3 % BalanceModes().size()].name;
           const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
           request.policy.combine = schemes[frame % schemes.size()];
           request.policy.groups = 1 + int(frame % 3);
           SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", projection " << int(projection)
                                           << ", " << request.policy.groups << " groups, " << request.policy.decomposition << ", "
-                                          << request.policy.load_metric << ", " << request.policy.assignment << ", "
+                                          << request.policy.balance_by << ", " << request.policy.assignment << ", "
                                           << request.policy.balance << ", " << request.policy.combine);
           const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));
           ASSERT_TRUE(picture.ok()) << picture.status().message();
@@ -94,7 +94,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
             }
           }
           EXPECT_EQ(picture->statistics.balance, request.policy.balance);
-          EXPECT_NE(picture->statistics.load_metric, "auto");
+          EXPECT_NE(picture->statistics.balance_by, "auto");
         }
       }
     }
@@ -104,16 +104,16 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
 // Boxes with a surface are rendered, whatever says where boxes are.
 TEST_P(PoliciesTest, NeverChangeIsosurfaces) {
   for (const RendererKind* renderer : Renderers()) {
-    if (!renderer->isosurfaces()) continue;
+    if (!renderer->Can(Ability::kIsosurfaces)) continue;
     FrameRequest request = TestRequest(renderer, 120, 1);
     request.transfer.choice = std::string(kNoTransfer);
     request.transfer.isosurfaces = {{100, {1, 0.5F, 0.2F}, 0.5}};
     const LocalImage expected = RenderDirectly(request, *volume_);
     ASSERT_GT(HighestAlpha(expected), 0.4F);
     for (const std::string_view decomposition : WithAutomatic(Decompositions())) {
-      for (const auto& metric : LoadMetrics()) {
+      for (const auto& metric : BalanceByChoices()) {
         request.policy.decomposition = decomposition;
-        request.policy.load_metric = metric.name;
+        request.policy.balance_by = metric.name;
         SCOPED_TRACE(testing::Message() << GetParam() << " workers, renderer " << renderer->name() << ", " << decomposition << ", "
                                         << metric.name);
         const Result<Picture> picture = client_->Render(request, std::chrono::seconds(60));

@@ -55,10 +55,8 @@ class WorkerAndPeer : public testing::Test {
     SendControl(Welcome{kEpoch, hello.incarnation, kWorker, "inproc://slabs", 1000, 60000});
   }
 
-  void SendControl(const AnyMessage& message) { ASSERT_TRUE(control_.Send(identity_, Encode(message)).ok()); }
-  void SendToWorker(const AnyMessage& message, const Bytes& payload = {}) {
-    ASSERT_TRUE(to_worker_.Send({}, Encode(message), payload).ok());
-  }
+  void SendControl(MessageView message) { ASSERT_TRUE(control_.Send(identity_, Encode(message)).ok()); }
+  void SendToWorker(MessageView message, const Bytes& payload = {}) { ASSERT_TRUE(to_worker_.Send({}, Encode(message), payload).ok()); }
 
   // The next message of one of these kinds that the worker sends anywhere; chunks are handed out meanwhile.
   template <class... Messages>

@@ -15,26 +15,37 @@ constexpr std::size_t kOverheard = 32;
 constexpr WorkerId kNobody = 1000000;  // no worker of any world has this id
 
 // What `make` makes, as the other end decodes it.
-template <class Make>
-AnyMessage Decodable(Make&& make) {
+auto Decodable(auto&& make) {
+  using Messages = decltype(make());
   for (int i = 0; i < 100; ++i) {
-    Result<AnyMessage> decoded = Decode(Encode(make()));
+    const Messages made = make();
+    Result<Messages> decoded = Decode<Messages>(Encode(made), ExpectedPayloadBytes(made));
     if (decoded.ok()) return *std::move(decoded);
   }
   ADD_FAILURE() << "a hostile peer has nothing to say that can be decoded";
-  return StatusQuery{};
+  return Messages{};
 }
 
 }  // namespace
 
-void HostileWords::Overhear(const AnyMessage& message, const Bytes& payload) {
-  if (std::holds_alternative<Register>(message) || std::holds_alternative<Welcome>(message) || std::holds_alternative<Heartbeat>(message)) {
-    return;
-  }
-  if (overheard_.size() < kOverheard) return overheard_.push_back({message, payload});
-  overheard_[next_place_] = {message, payload};
+template <class Messages>
+void HostileWords::Memory<Messages>::Keep(Words<Messages> words) {
+  if (words_.size() < kOverheard) return words_.push_back(std::move(words));
+  words_[next_place_] = std::move(words);
   next_place_ = (next_place_ + 1) % kOverheard;
 }
+
+template <class Messages>
+auto HostileWords::Memory<Messages>::Again(Random& random) const -> std::optional<Words<Messages>> {
+  if (words_.empty() || random.Chance(0.6)) return std::nullopt;
+  return words_[random.Integer<std::size_t>(0, words_.size() - 1)];
+}
+
+void HostileWords::Overhear(const WorkerToCoordinator& message) {
+  if (!std::holds_alternative<Register>(message) && !std::holds_alternative<Heartbeat>(message)) of_workers_.Keep({message, {}});
+}
+
+void HostileWords::Overhear(const PartialImage& image, const Bytes& payload) { images_.Keep({image, payload}); }
 
 // Mostly small ones, since ids are.
 std::uint64_t HostileWords::Number() {
@@ -49,21 +60,11 @@ Status HostileWords::Reason() {
                              : Status::Unavailable("no");
 }
 
-std::optional<HostileWords::Words> HostileWords::Again(Plane plane) {
-  std::vector<const Words*> fit;
-  for (const Words& words : overheard_) {
-    if (PlaneOf(words.message) == plane) fit.push_back(&words);
-  }
-  if (fit.empty() || random_.Chance(0.6)) return std::nullopt;
-  return *fit[random_.Integer<std::size_t>(0, fit.size() - 1)];
-}
-
-AnyMessage HostileWords::OfClient(const Policy& policy) {
-  if (const std::optional<Words> again = Again(Plane::kClient)) return again->message;
+ClientToCoordinator HostileWords::OfClient(const Policy& policy) {
   return Decodable([&] { return MakeOfClient(policy); });
 }
 
-AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
+ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
   switch (random_.Integer(0, 12)) {
     case 0:
     case 1: {
@@ -98,15 +99,15 @@ AnyMessage HostileWords::MakeOfClient(const Policy& policy) {
   }
 }
 
-HostileWords::Words HostileWords::OfWorker(const Speaker& self, std::uint32_t nodes) {
-  if (std::optional<Words> again = Again(Plane::kControl)) return *std::move(again);
+HostileWords::Words<WorkerToCoordinator> HostileWords::OfWorker(const Speaker& self, std::uint32_t nodes) {
+  if (auto again = of_workers_.Again(random_)) return *std::move(again);
   return {Decodable([&] { return MakeOfWorker(self, nodes); }), {}};
 }
 
-AnyMessage HostileWords::MakeOfWorker(const Speaker& self, std::uint32_t nodes) {
+WorkerToCoordinator HostileWords::MakeOfWorker(const Speaker& self, std::uint32_t nodes) {
   const Epoch epoch = EpochLike(self.epoch);
   const auto worker = WorkerId(Number32());
-  switch (random_.Integer(0, 6)) {
+  switch (random_.Integer(0, 5)) {
     case 0: return Heartbeat{epoch, random_.Chance(0.5) ? self.incarnation : Number(), worker, Number(), Number(), Number32()};
     case 1: return GroupDone{.epoch = epoch, .worker = worker, .key = Key(), .reports = {}, .hidden = {}};
     case 2: {
@@ -117,10 +118,9 @@ AnyMessage HostileWords::MakeOfWorker(const Speaker& self, std::uint32_t nodes) 
     }
     case 3: return WorkerTrouble{epoch, worker, Key(), WorkerId(Number32()), Reason(), random_.Chance(0.5)};
     case 4: return Leave{epoch, worker};
-    case 5: return Ping{epoch, Number(), {Number(), Number()}};
     default: break;
   }
-  if (self.incarnation == 0) return Retire{epoch};
+  if (self.incarnation == 0) return Leave{epoch, worker};
   // A new life of its own, or of a worker elsewhere.
   return Register{.incarnation = random_.Integer<Incarnation>(1, ~Incarnation{0}),
                   .pid = Number32(),
@@ -130,12 +130,12 @@ AnyMessage HostileWords::MakeOfWorker(const Speaker& self, std::uint32_t nodes) 
                   .memory_scope = Number()};
 }
 
-HostileWords::Words HostileWords::ToWorker(const Speaker& self) {
-  if (std::optional<Words> again = Again(Plane::kImages)) return *std::move(again);
+HostileWords::Words<WorkerToWorker> HostileWords::ToWorker(const Speaker& self) {
+  if (auto again = images_.Again(random_)) return *std::move(again);
   return {Decodable([&] { return MakeToWorker(self); }), {}};
 }
 
-AnyMessage HostileWords::MakeToWorker(const Speaker& self) {
+WorkerToWorker HostileWords::MakeToWorker(const Speaker& self) {
   const Epoch epoch = EpochLike(self.epoch);
   const WorkerId worker = self.worker == 0 || random_.Chance(0.5) ? kNobody : self.worker;
   const std::uint64_t pixel = random_.Integer<std::uint64_t>(0, 5);

@@ -25,17 +25,19 @@ class HostileWords {
     Incarnation incarnation = 0;  // 0: it is no worker
     std::uint32_t node = 0;
   };
+  template <class Messages>
   struct Words {
-    AnyMessage message;
+    Messages message;
     Bytes payload;
   };
 
   // From now on it may be said again.
-  void Overhear(const AnyMessage& message, const Bytes& payload);
+  void Overhear(const WorkerToCoordinator& message);
+  void Overhear(const PartialImage& image, const Bytes& payload);
 
-  AnyMessage OfClient(const Policy& policy);
-  Words OfWorker(const Speaker& self, std::uint32_t nodes);  // to the coordinator, `nodes`: workers that there ever were
-  Words ToWorker(const Speaker& self);                       // on the images plane
+  ClientToCoordinator OfClient(const Policy& policy);
+  Words<WorkerToCoordinator> OfWorker(const Speaker& self, std::uint32_t nodes);  // `nodes`: workers that there ever were
+  Words<WorkerToWorker> ToWorker(const Speaker& self);
 
  private:
   std::uint64_t Number();
@@ -43,14 +45,24 @@ class HostileWords {
   Epoch EpochLike(Epoch epoch) { return random_.Chance(0.8) ? epoch : Number(); }
   GroupKey Key() { return {Number(), Number32(), Number32()}; }
   Status Reason();
-  std::optional<Words> Again(Plane plane);
-  AnyMessage MakeOfClient(const Policy& policy);
-  AnyMessage MakeOfWorker(const Speaker& self, std::uint32_t nodes);
-  AnyMessage MakeToWorker(const Speaker& self);
+  ClientToCoordinator MakeOfClient(const Policy& policy);
+  WorkerToCoordinator MakeOfWorker(const Speaker& self, std::uint32_t nodes);
+  WorkerToWorker MakeToWorker(const Speaker& self);
 
   Random& random_;
-  std::vector<Words> overheard_;
-  std::size_t next_place_ = 0;
+  // The last words that were overheard.
+  template <class Messages>
+  class Memory {
+   public:
+    void Keep(Words<Messages> words);
+    std::optional<Words<Messages>> Again(Random& random) const;
+
+   private:
+    std::vector<Words<Messages>> words_;
+    std::size_t next_place_ = 0;
+  };
+  Memory<WorkerToCoordinator> of_workers_;
+  Memory<WorkerToWorker> images_;
 };
 
 }  // namespace slabstream

@@ -42,7 +42,7 @@ void ModelClient::Ping() {
   service_.queue().After(kPingInterval, [this] { Ping(); });
 }
 
-void ModelClient::Deliver(const AnyMessage& message) {
+void ModelClient::Deliver(const CoordinatorToClient& message) {
   if (vanished_) return;
   if (const auto* reply = std::get_if<FrameReply>(&message)) {
     const auto open = open_.find(reply->request);

@@ -14,7 +14,7 @@ namespace slabstream {
 
 class ModelClient {
  public:
-  using Send = std::function<void(AnyMessage)>;
+  using Send = std::function<void(ClientToCoordinator)>;
 
   ModelClient(SimulatedService& service, Send send) : service_(service), send_(std::move(send)) {}
 
@@ -27,7 +27,7 @@ class ModelClient {
   void Submit(SubmitFrame submit);
   void Cancel(RequestId request);
   void Vanish() { vanished_ = true; }
-  void Deliver(const AnyMessage& message);
+  void Deliver(const CoordinatorToClient& message);
 
   bool idle() const { return vanished_ || open_.empty(); }
   bool vanished() const { return vanished_; }

@@ -66,7 +66,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };
   if (random.Chance(0.7)) {
     world.policy.decomposition = one_of(Decompositions());
-    world.policy.load_metric = one_of(LoadMetrics());
+    world.policy.balance_by = one_of(BalanceByChoices());
     world.policy.assignment = one_of(Assignments());
     world.policy.balance = one_of(BalanceModes());
   }

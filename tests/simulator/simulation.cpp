@@ -21,13 +21,6 @@ constexpr Duration kSettleSlowly = seconds(90);                       // and for
 constexpr RequestId kRequestAfterHealing = 1000;
 constexpr Duration kSettle = seconds(14);  // long enough for every time-out of the machines below
 
-// What the other end would decode.
-AnyMessage OverTheWire(const AnyMessage& message) {
-  Result<AnyMessage> decoded = Decode(Encode(message));
-  EXPECT_TRUE(decoded.ok()) << NameOf(message) << ": " << decoded.status().message();
-  return decoded.ok() ? *decoded : message;
-}
-
 }  // namespace
 
 Simulation::Simulation(std::uint64_t seed, Tally& tally)
@@ -67,8 +60,8 @@ void Simulation::AddWorker(Duration after) {
 }
 
 void Simulation::AddClient() {
-  clients_.push_back(
-      std::make_unique<ModelClient>(service_, [this, i = clients_.size()](const AnyMessage& message) { FromClientNode(i, message); }));
+  clients_.push_back(std::make_unique<ModelClient>(
+      service_, [this, i = clients_.size()](const ClientToCoordinator& message) { FromClientNode(i, message); }));
 }
 
 void Simulation::StartCoordinator() {
@@ -269,7 +262,6 @@ void Simulation::Perform(ToClient& action) {
     if (image != nullptr) witness_.OnPicture(*image, action.payload, *reply);
   }
   if (const auto* status = std::get_if<StatusReply>(&action.message)) status_ = *status;
-  words_.Overhear(action.message, action.payload);
   if (const auto* credit = std::get_if<VolumeCredit>(&action.message); credit != nullptr && action.to == Admin()) {
     service_.queue().After(milliseconds(random_.Integer(1, 200)), [this, granted = *credit] { SendParts(granted); });
   }
@@ -335,7 +327,7 @@ void Simulation::Perform(const FindDatasets& action) {
 // Whatever was asked: late, and perhaps to nobody who still waits.
 void Simulation::Perform(const AnswerQuestion& action) {
   const std::uint64_t nonce = NonceOf(action.question);
-  AnyMessage answer = SampleReply{.nonce = nonce};
+  CoordinatorToClient answer = SampleReply{.nonce = nonce};
   if (random_.Chance(current_.fail_load)) answer = OrderRefused{nonce, Status::ResourceExhausted("not enough memory to answer")};
   service_.TellCoordinator(service_.now() + random_.Real(0, 0.1), QuestionAnswered{action.id, std::move(answer)});
 }
@@ -388,9 +380,15 @@ void Simulation::Perform(const PlanRequest& action) {
 
 // ---------------------------------------------------------------- messages
 
-AnyMessage Simulation::OnTheWay(const AnyMessage& message) const { return encode_messages_ ? OverTheWire(message) : message; }
+template <class Messages>
+Messages Simulation::OnTheWay(const Messages& message) const {
+  if (!encode_messages_) return message;
+  const Result<Messages> decoded = Decode<Messages>(Encode(message), ExpectedPayloadBytes(message));
+  EXPECT_TRUE(decoded.ok()) << NameOf(message) << ": " << decoded.status().message();
+  return decoded.ok() ? *decoded : message;
+}
 
-Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
+Arrivals Simulation::ToWorker(Node to, CoordinatorToWorker& message, double sent) {
   if (const auto* assignment = std::get_if<GroupAssignment>(&message)) {
     witness_.OnAssignment(*assignment, workers_.size(), most_teams_);
     EXPECT_TRUE(published_.contains(assignment->setup.dataset)) << "a group of voxels that are not there any more";
@@ -398,14 +396,13 @@ Arrivals Simulation::ToWorker(Node to, AnyMessage& message, double sent) {
   }
   if (const auto* ping = std::get_if<Ping>(&message)) witness_.OnPing(*ping);
   if (std::holds_alternative<Retire>(message)) tally_.Add(Count::kRetired);
-  words_.Overhear(message, {});
   if (const auto peer = hostile_peers_.find(to); peer != hostile_peers_.end()) return HearAsHostile(peer->second, message);
   if (told_dead_.contains(to)) return {.nobody = true};
   message = OnTheWay(message);
   return network_.Send({kCoordinatorEnd, int(to)}, sent);
 }
 
-Arrivals Simulation::ToCoordinator(Node from, AnyMessage& message) {
+Arrivals Simulation::ToCoordinator(Node from, WorkerToCoordinator& message) {
   if (IsHostile(from) && !hostile_peers_.at(from).worker) return {};
   if (const auto* done = std::get_if<GroupDone>(&message); done != nullptr && done->epoch == epoch_) witness_.OnGroupDone(*done);
   if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) {
@@ -413,7 +410,7 @@ Arrivals Simulation::ToCoordinator(Node from, AnyMessage& message) {
     if (trouble->elsewhere) tally_.Add(Count::kTroublesElsewhere);
     if (trouble->unreachable != 0) tally_.Add(Count::kComplaints);
   }
-  words_.Overhear(message, {});
+  words_.Overhear(message);
   message = OnTheWay(message);
   return network_.Send({int(from), kCoordinatorEnd}, service_.now());
 }
@@ -422,18 +419,18 @@ Arrivals Simulation::ToPeer(Node to, Job& sends) {
   if (told_dead_.contains(to) && random_.Chance(0.3)) return {.nobody = true};
   PartialImage& image = std::get<SendPartial>(sends.action).message;
   words_.Overhear(image, sends.payload ? *sends.payload : Bytes());
-  image = std::get<PartialImage>(OnTheWay(image));
+  image = std::get<PartialImage>(OnTheWay(WorkerToWorker(image)));
   return network_.Send({int(sends.node), int(to)}, service_.now());
 }
 
 void Simulation::Perform(Node node, SendChunkRequest& action) {
   workers_[node].OnRequest(action.request);
-  const ChunkRequest request = std::get<ChunkRequest>(OnTheWay(action.request));
+  const auto request = std::get<ChunkRequest>(OnTheWay(WorkerToSlabs(action.request)));
   const Arrivals asked = network_.Send({int(node), kSlabServerEnd}, service_.now());
   for (int i = 0; i < asked.count; ++i) {
     service_.queue().At(asked.times[i], [this, node, request] {
       if (!service_.coordinator_runs() || request.epoch != epoch_) return;
-      const AnyMessage answer = OnTheWay(AnswerOf(request));
+      const auto answer = Widen<MessageToWorker>(OnTheWay(AnswerOf(request)));
       const Arrivals answered = network_.Send({kSlabServerEnd, int(node)}, service_.now());
       for (int j = 0; j < answered.count; ++j) {
         service_.queue().At(answered.times[j], [this, node, answer] { service_.StepWorker(node, MessageReceived{answer, {}}); });
@@ -442,7 +439,7 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
   }
 }
 
-AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
+SlabsToWorker Simulation::AnswerOf(const ChunkRequest& request) {
   if (!published_.contains(request.dataset)) {
     return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")};
   }
@@ -464,7 +461,7 @@ AnyMessage Simulation::AnswerOf(const ChunkRequest& request) {
 
 PeerToken Simulation::TokenOfClient(std::size_t client) const { return service_.TokenOf(Node(kClientEnds + int(client))); }
 
-void Simulation::FromClientNode(std::size_t client, const AnyMessage& message) {
+void Simulation::FromClientNode(std::size_t client, const ClientToCoordinator& message) {
   const Arrivals arrivals = network_.Send({kClientEnds + int(client), kCoordinatorEnd}, service_.now());
   for (int i = 0; i < arrivals.count; ++i) {
     service_.queue().At(arrivals.times[i], [this, client, message = OnTheWay(message)] {

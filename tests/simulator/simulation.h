@@ -79,7 +79,7 @@ class Simulation : private Conditions {
   void Suspend(double seconds);
   void Cut();
   void AddHostilePeer(bool worker, Duration span);
-  Arrivals HearAsHostile(HostilePeer& peer, const AnyMessage& message);
+  Arrivals HearAsHostile(HostilePeer& peer, const CoordinatorToWorker& message);
   void Speak(HostilePeer& peer);
   void SpeakAsClient(std::size_t hostile);
   void BeatOf(HostilePeer& peer);
@@ -98,9 +98,11 @@ class Simulation : private Conditions {
   void CheckRest();
   void CheckTables();
   PeerToken TokenOfClient(std::size_t client) const;
-  AnyMessage OnTheWay(const AnyMessage& message) const;
-  void FromClientNode(std::size_t client, const AnyMessage& message);
-  AnyMessage AnswerOf(const ChunkRequest& request);
+  // In any variant of messages: what the other end would decode.
+  template <class Messages>
+  Messages OnTheWay(const Messages& message) const;
+  void FromClientNode(std::size_t client, const ClientToCoordinator& message);
+  SlabsToWorker AnswerOf(const ChunkRequest& request);
 
   // ---- Conditions
   using Conditions::Perform;
@@ -113,8 +115,8 @@ class Simulation : private Conditions {
   void Perform(Node node, const ReleaseImage& action) override { workers_[node].Perform(action); }
   void Perform(Node node, const StopProcess& action) override { workers_[node].Perform(action); }
   void AfterStep(Node node) override { workers_[node].CheckCredit(); }
-  Arrivals ToWorker(Node to, AnyMessage& message, double sent) override;
-  Arrivals ToCoordinator(Node from, AnyMessage& message) override;
+  Arrivals ToWorker(Node to, CoordinatorToWorker& message, double sent) override;
+  Arrivals ToCoordinator(Node from, WorkerToCoordinator& message) override;
   Arrivals ToPeer(Node to, Job& sends) override;
   void BeforeStep(const CoordinatorEvent& event) override { cause_ = &event; }
   void Perform(ToClient& action) override;

@@ -218,7 +218,7 @@ void Simulation::BeatOf(HostilePeer& peer) {
   service_.queue().After(milliseconds(500), [this, &peer] { BeatOf(peer); });
 }
 
-Arrivals Simulation::HearAsHostile(HostilePeer& peer, const AnyMessage& message) {
+Arrivals Simulation::HearAsHostile(HostilePeer& peer, const CoordinatorToWorker& message) {
   if (const auto* welcome = std::get_if<Welcome>(&message)) {
     if (peer.self.worker != welcome->worker) tally_.Add(Count::kHostileWorkersAdmitted);
     peer.self.epoch = welcome->epoch;
@@ -232,12 +232,12 @@ Arrivals Simulation::HearAsHostile(HostilePeer& peer, const AnyMessage& message)
 void Simulation::Speak(HostilePeer& peer) {
   const auto nodes = std::uint32_t(workers_.size());
   if (random_.Chance(0.3)) {
-    HostileWords::Words words = words_.ToWorker(peer.self);
+    HostileWords::Words<WorkerToWorker> words = words_.ToWorker(peer.self);
     const auto to = random_.Integer<Node>(0, nodes - 1);
     tally_.Add(Count::kHostileImages);
-    return service_.StepWorker(to, MessageReceived{std::move(words.message), std::move(words.payload)});
+    return service_.StepWorker(to, MessageReceived{Widen<MessageToWorker>(std::move(words.message)), std::move(words.payload)});
   }
-  HostileWords::Words words = words_.OfWorker(peer.self, nodes);
+  HostileWords::Words<WorkerToCoordinator> words = words_.OfWorker(peer.self, nodes);
   tally_.Add(Count::kHostileWorkerMessages);
   const auto* done = std::get_if<GroupDone>(&words.message);
   if (done != nullptr && done->epoch == epoch_ && done->worker == peer.self.worker) witness_.OnGroupDone(*done);
@@ -246,7 +246,7 @@ void Simulation::Speak(HostilePeer& peer) {
 
 void Simulation::SpeakAsClient(std::size_t hostile) {
   tally_.Add(Count::kHostileClientMessages);
-  AnyMessage words = words_.OfClient(world_.policy);
+  ClientToCoordinator words = words_.OfClient(world_.policy);
   const auto* const submit = std::get_if<SubmitFrame>(&words);
   if (submit != nullptr && submit->frame.policy.teams <= kMaxTeams) most_teams_ = std::max(most_teams_, submit->frame.policy.teams);
   service_.StepCoordinator(FromClient{service_.TokenOf(Node(kHostileClientEnds + int(hostile))), std::move(words)});

@@ -264,7 +264,7 @@ class PageTest(unittest.TestCase):
         viewer.final("Array.isArray(o.transfer)")
 
         # What is copied is what --transfer takes.
-        viewer.find("[aria-label='Copy as --transfer takes it']").click()
+        viewer.find("[aria-label='Copy for --transfer']").click()
         copied = json.loads(viewer.until("window.copied[0]"))
         (self.programs.folder / "copied.json").write_text(json.dumps(copied))
         now = viewer.final("Array.isArray(o.transfer)")

@@ -59,7 +59,9 @@ class WorkerMachineTest : public testing::Test {
   }
 
   Actions Tell(WorkerEvent event) { return machine->Step(std::move(event), now); }
-  Actions Tell(const AnyMessage& message, Bytes payload = {}) { return Tell(WorkerEvent(MessageReceived{message, std::move(payload)})); }
+  Actions Tell(const MessageToWorker& message, Bytes payload = {}) {
+    return Tell(WorkerEvent(MessageReceived{message, std::move(payload)}));
+  }
   // Ticks at the end, and before that whenever the machine asks for it.
   Actions After(Duration time) {
     Actions actions;

@@ -33,7 +33,7 @@ export function axesOf({ azimuth, elevation, roll }: View): { right: Vec3; up: V
 
 const angle = (degrees: number): number => rounded(((((degrees + 180) % 360) + 360) % 360) - 180, 6);
 
-// Turns by degrees to the right and upwards in the picture, whatever its roll.
+// Turns by degrees to the right and upwards in the picture, for any roll.
 export function orbited(view: View, rightwards: number, upwards: number): Partial<State> {
   const r = view.roll * DEGREE;
   const across = rightwards * Math.cos(r) - upwards * Math.sin(r), along = rightwards * Math.sin(r) + upwards * Math.cos(r);

@@ -17,7 +17,7 @@ export function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLD
 const POINTER_HELP: readonly (readonly [string, string])[] = [
   ["Drag", "Turn"], ["Shift and drag, or middle button", "Move"], ["Wheel", "Zoom about the pointer"], ["Ctrl and drag", "Roll"],
   ["Right button and drag", "Window and level: sideways widens, upwards brightens"], ["Double click", "Put the cross-hair there"],
-  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Use it as a colour map (ParaView’s JSON)"],
+  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Load it as a colour map (ParaView’s JSON)"],
 ];
 
 export function helpDialog(groups: readonly KeyGroup[]): void {
@@ -61,7 +61,7 @@ export function screenshotDialog(state: State, api: Api, width: number, height: 
     save.disabled = false;
   };
   const form = h("form", { onsubmit: (event: Event) => { event.preventDefault(); void shoot(); } },
-    h("p", { class: "hint" }, "The service renders the picture anew, at any size, lossless."),
+    h("p", { class: "hint" }, "The service renders the picture again, at any size, lossless."),
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
     h("div", { class: "button-row" }, button("As shown", null, () => { w.value = String(width); t.value = String(height); }, "quiet"), ...SIZES.map(([name, x, y]) => button(name, null, () => { w.value = String(x); t.value = String(y); }, "quiet"))),
     clear.element, notes.element, status, h("div", { class: "dialog-actions" }, save));

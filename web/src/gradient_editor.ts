@@ -2,7 +2,7 @@
 import type { Context } from "./context";
 import { iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
-import { can } from "./options";
+import { can, rendererThatCan } from "./offers";
 import { Scale } from "./plot";
 import { LOOK, type SlopePoint } from "./state";
 import { clamp, rounded } from "./vec";
@@ -57,12 +57,12 @@ export class GradientEditor {
   }
 
   private refresh(): void {
-    const { list } = this, { state } = this.context.store, on = list.length > 0, able = can("gradient", state.renderer);
+    const { list } = this, { state } = this.context.store, on = list.length > 0, able = can("gradient-opacity", state.renderer);
     this.on.set(on);
     this.body.hidden = !on;
     this.hint.hidden = !on;
     const volume = this.context.volume(), unit = volume ? unitName(volume.unit).replace(/s$/, "") : "unit";
-    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in data values per ${unit}.` : "Ray casting alone shows opacity by the gradient.";
+    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in data values per ${unit}.` : "Only ray casting shows opacity by the gradient.";
     if (!on) return;
     const scale = this.scale(), first = list[0] as SlopePoint, last = list[list.length - 1] as SlopePoint;
     this.selected = clamp(this.selected, 0, list.length - 1);
@@ -106,7 +106,7 @@ export class GradientEditor {
     const { store } = this.context, steep = this.scale().domain[1];
     this.selected = 0;
     if (!on) return this.edit([], "by gradient");
-    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...(can("gradient", store.state.renderer) ? {} : { renderer: "raycast" }) }, "by gradient");
+    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...(can("gradient-opacity", store.state.renderer) ? {} : { renderer: rendererThatCan("gradient-opacity") }) }, "by gradient");
   }
 
   private moveTo(slope: number | null, opacity: number | null): void {

@@ -1,5 +1,6 @@
 // The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
+import { limitsOf } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -17,8 +18,8 @@ const list = <T>(text: string, separator: string, read: (item: string) => T | un
 };
 const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
 const oneOf = <T extends string>(name: string, ...values: T[]): Field<T> => ({ name, write: value => value, read: value => values.find(v => v === value) });
-const real = (name: string, low: number, high: number): Field<number> => ({
-  name, write: String, read: value => { const n = number(value); return n !== undefined && n >= low && n <= high ? n : undefined; },
+const real = (name: string): Field<number> => ({
+  name, write: String, read: value => { const n = number(value), [low, high] = limitsOf(name); return n !== undefined && n >= low && n <= high ? n : undefined; },
 });
 const flag = (name: string): Field<boolean> => ({ name, write: value => (value ? "1" : "0"), read: value => (value === "1" ? true : value === "0" ? false : undefined) });
 const nullable = <T>(field: Field<T>): Field<T | null> => ({ name: field.name, write: value => (value === null ? "" : field.write(value)), read: field.read });
@@ -87,16 +88,16 @@ const opacities: Field<Readonly<Record<string, number>>> = {
 const NAME = /^[a-z][a-z-]{0,40}$/;
 const FIELDS: { [K in keyof State]: Field<State[K]> } = {
   dataset: text("dataset", /^.{0,256}$/),
-  azimuth: real("azimuth", -36000, 36000), elevation: real("elevation", -36000, 36000), roll: real("roll", -36000, 36000),
-  zoom: real("zoom", 0.01, 1000), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
-  renderer: text("renderer", NAME), samplingRate: real("sampling-rate", 0.1, 16), projectionMode: text("projection-mode", NAME),
+  azimuth: real("azimuth"), elevation: real("elevation"), roll: real("roll"),
+  zoom: real("zoom"), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
+  renderer: text("renderer", NAME), samplingRate: real("sampling-rate"), projectionMode: text("projection-mode", NAME),
   shading: text("shading", NAME), lights: many<Vec3>("light", 3), background: text("background", COLOR),
-  preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance", 1e-6, 1e6), slopes,
+  preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
-  labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint", 0, 1), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,
-  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight", 0, 1),
-  layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window", 0, 1e30)), level: nullable(real("level", -1e30, 1e30)),
+  labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,
+  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
+  layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
   marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
 };
 

@@ -4,18 +4,22 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, row, section, segmented, slider, textField, toggle } from "./controls";
 import { h, shown } from "./dom";
-import { can, projectionOf } from "./options";
+import { can, rendererThatCan, renderers, titleOf, titlesThatCan } from "./offers";
+import { projectionOf } from "./options";
 import { LOOK, type Surface } from "./state";
 import { PRESETS } from "./transfer_editor";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
-const OF_VOLUMES = [["splat", "Splatting"], ["raycast", "Ray casting"], ["shear", "Shears"], ["mip", "Intensity projection"], ["zbuffer", "Z-buffer"]] as const;
-const OF_CELLS = [["slice", "Slicing of the cells"]] as const;
+// Those that draw cells come first, and only for datasets that have cells.
+function rendererChoices(cells: boolean): (readonly [string, string])[] {
+  const [drawCells, others] = [true, false].map(draws => renderers().filter(each => each.abilities.includes("cells") === draws));
+  return [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);
+}
 
 export function renderingSection({ store, volume, onVolume }: Context): HTMLElement {
-  const renderer = choice("Renderer", OF_VOLUMES, value => store.update({ renderer: value }, "renderer"));
+  const renderer = choice("Renderer", rendererChoices(false), value => store.update({ renderer: value }, "renderer"));
   const mode = choice("Show", [["maximum", "Largest value"], ["minimum", "Least value"], ["mean", "Mean value"]], value => store.update({ projectionMode: value }, "mode"));
   const sampling = slider("Samples a voxel", 0.5, 4, 0.5, v => shown(v, 2), value => store.update({ samplingRate: value }, "sampling"));
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
@@ -24,18 +28,18 @@ export function renderingSection({ store, volume, onVolume }: Context): HTMLElem
   const background = colorField("Background", value => store.update({ background: value }, "background"));
   const update = (): void => {
     const { state } = store;
-    renderer.fill((volume()?.cells ?? 0) > 0 || state.renderer === "slice" ? [...OF_CELLS, ...OF_VOLUMES] : OF_VOLUMES);
+    renderer.fill(rendererChoices((volume()?.cells ?? 0) > 0 || can("cells", state.renderer)));
     renderer.set(state.renderer);
     mode.set(state.projectionMode);
     sampling.set(state.samplingRate);
     shading.set(state.shading);
-    shading.enable("depth-gradient", can("depthShading", state.renderer));
+    shading.enable("depth-gradient", can("depth-shading", state.renderer));
     projection.set(projectionOf(state));
     projection.enable("perspective", can("perspective", state.renderer));
     background.set(state.background);
-    mode.element.hidden = !can("projection", state.renderer);
-    sampling.element.hidden = !can("sampling", state.renderer);
-    shadingRow.hidden = !can("lit", state.renderer);
+    mode.element.hidden = !can("projection-mode", state.renderer);
+    sampling.element.hidden = !can("sampling-rate", state.renderer);
+    shadingRow.hidden = !can("lights", state.renderer);
   };
   store.subscribe(update, [...LOOK, "projection"]);
   onVolume(update);
@@ -79,7 +83,7 @@ export function surfacesSection(context: Context): HTMLElement {
     const colors = ["#e0b089", "#f2ede4", "#7fb4d8", "#d98383"];
     store.update({
       surfaces: [...store.state.surfaces, { value: rounded(low + (high - low) * 0.35, 4), color: colors[store.state.surfaces.length % colors.length] as string, opacity: 1 }],
-      ...(can("surfaces", store.state.renderer) ? {} : { renderer: "raycast" }),
+      ...(can("isosurfaces", store.state.renderer) ? {} : { renderer: rendererThatCan("isosurfaces") }),
     }, "surface");
   }, "quiet");
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Value"), h("span", {}, "Colour"), h("span", {}, "Opacity"));
@@ -90,7 +94,7 @@ export function surfacesSection(context: Context): HTMLElement {
     list.set(surfaces);
     alone.set(surfacesAlone);
     head.hidden = alone.element.hidden = surfaces.length === 0;
-    hint.hidden = surfaces.length === 0 || can("surfaces", renderer);
+    hint.hidden = surfaces.length === 0 || can("isosurfaces", renderer);
     addButton.disabled = surfaces.length >= MOST_SURFACES;
   };
   store.subscribe(update, LOOK);
@@ -121,7 +125,7 @@ export function lightSection(context: Context): HTMLElement {
     };
   });
   const at = (right: number, up: number): void => store.update({ lights: [...store.state.lights, fromEye(right, up, context)] }, "light");
-  const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay when the volume turns; they come from one side of the present view.");
+  const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay in place when the volume turns; they start at one side of the present view.");
   const adders = h("div", { class: "button-row" }, button("Left", "add", () => at(-50, 35), "quiet"), button("Above", "add", () => at(0, 70), "quiet"), button("Right", "add", () => at(50, 35), "quiet"));
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Towards x"), h("span", {}, "y"), h("span", {}, "z"));
   const update = (): void => {
@@ -148,10 +152,10 @@ export class LabelsSection {
 
   constructor(private readonly context: Context) {
     const { store } = context;
-    const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: "raycast" } : {}) }, "labels"));
+    const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
     const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
     const which = textField("Shown", "all, or 1,5-9", "[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*", value => store.update({ labelsShown: value }, "labels shown"));
-    const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: "raycast" } : {}) }, "overlay"));
+    const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: rendererThatCan("overlay") } : {}) }, "overlay"));
     const overlayPreset = choice("Overlay’s function", PRESETS.map(name => [name, name] as const), value => store.update({ overlayPreset: value }, "overlay preset"));
     const weight = slider("Weight", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ overlayWeight: value }, "weight"));
     const hint = h("p", { class: "hint" });
@@ -169,7 +173,7 @@ export class LabelsSection {
       tint.element.hidden = !labels || state.labels !== "tint";
       which.element.hidden = this.list.hidden = !on;
       hint.hidden = !on || (can("labels", state.renderer) && this.names.length > 0);
-      hint.textContent = !can("labels", state.renderer) ? "Labels are shown by ray casting and the Z-buffer." : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;
+      hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;
       overlay.element.hidden = !volume?.overlay;
       overlayPreset.element.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
       this.refresh();

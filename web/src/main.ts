@@ -14,6 +14,7 @@ import { LabelsSection, lightSection, renderingSection, surfacesSection } from "
 import { Machine } from "./machine";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
+import { loadOffers, renderers } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
@@ -136,7 +137,7 @@ class Page {
   // A socket does not say why it was refused; a request does.
   private async checkToken(): Promise<void> {
     const answer = await fetch("api/v1/datasets", { headers: { Authorization: `Bearer ${this.api.token}` } }).catch(() => null);
-    if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("The token is not that of this gateway: it is new at each start.");
+    if (answer?.status === 401 && !document.querySelector("dialog")) askForToken("This gateway has another token: each start makes a new one.");
   }
 
   // ---- what can be done
@@ -156,7 +157,7 @@ class Page {
   private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
 
   private copyLink(withToken: boolean): void {
-    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Whoever has it can use this gateway until it ends." : "The link is copied. It holds no access: others need their own."));
+    void copyText(linkOf(this.store.state, withToken ? this.api.token : "")).then(() => this.notices.say(withToken ? "The link is copied. Everybody who has it can use this gateway until it ends." : "The link is copied. It gives no access: others need their own."));
   }
 
   private actions(): ConstructorParameters<typeof Shell>[0] {
@@ -227,8 +228,13 @@ function askForToken(reason: string): void {
 
 applyTheme();
 const token = takeToken();
-if (token) new Page(token);
-else {
-  document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, "Slabstream")));
-  askForToken("This link holds no access.");
+const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
+if (token) {
+  loadOffers().then(() => {
+    INITIAL.renderer = renderers()[0]?.name ?? "";
+    new Page(token);
+  }).catch((error: unknown) => showAlone(`The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`));
+} else {
+  showAlone("Slabstream");
+  askForToken("This link gives no access.");
 }

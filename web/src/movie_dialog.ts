@@ -53,7 +53,7 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   const offerCommand = async (): Promise<void> => {
     const { command } = await api.command(options());
     const movie = command.replace(/^slabstream render/, "slabstream turntable").replace(/ -o \S+$/, ` --frames ${frames.value} --fps ${fps.value} -o turntable.mp4`);
-    help.replaceChildren(h("h3", {}, "On a machine with ffmpeg, this makes it"), h("pre", { tabindex: 0 }, movie), button("Copy", "copy", () => void copyText(movie).then(() => { status.textContent = "Copied."; }), "quiet"));
+    help.replaceChildren(h("h3", {}, "On a machine with ffmpeg, use this command"), h("pre", { tabindex: 0 }, movie), button("Copy", "copy", () => void copyText(movie).then(() => { status.textContent = "Copied."; }), "quiet"));
     help.hidden = false;
   };
 
@@ -77,7 +77,7 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
       download(`${state.dataset}-turntable.mp4`, new Blob(parts, { type: "video/mp4" }));
       status.textContent = `Saved: ${length()}, ${bytes(size)}.`;
     } catch (error) {
-      status.textContent = control.signal.aborted ? "Cancelled." : parts.length > 0 ? "The movie broke off. Is the service still there?" : error instanceof Error ? error.message : String(error);
+      status.textContent = control.signal.aborted ? "Cancelled." : parts.length > 0 ? "The movie stopped. Is the service still running?" : error instanceof Error ? error.message : String(error);
       if (error instanceof ApiError && error.status === 501) await offerCommand().catch(() => undefined);
     }
     running = null;

@@ -75,7 +75,7 @@ export class Notices {
   }
 
   private problem(): string {
-    if (this.connection === "lost") return `${this.everOpen ? "The gateway does not answer any more." : "The gateway does not answer."}${this.reason ? ` It said: ${this.reason}.` : ""} Trying again.`;
+    if (this.connection === "lost") return `${this.everOpen ? "The gateway no longer answers." : "The gateway does not answer."}${this.reason ? ` It said: ${this.reason}.` : ""} Trying again.`;
     if (this.connection === "open" && this.service && this.service.service !== "ready") {
       const { service, reason } = this.service;
       const what = service === "gone" ? `The rendering service is gone${reason ? `: ${reason}` : ""}` : "The service has no worker";

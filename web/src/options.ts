@@ -1,23 +1,17 @@
 // The state as options of the gateway, which are those of the command line.
 import { boxText, slopeText } from "./link";
+import { can } from "./offers";
 import type { State } from "./state";
 import { toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
 
 export type Options = Record<string, unknown>;
 
-// What which renderer can do; the service refuses the rest.
-const CAN = {
-  surfaces: ["raycast", "zbuffer"], labels: ["raycast", "zbuffer"], overlay: ["raycast"], sampling: ["raycast", "shear", "slice"], gradient: ["raycast", "shear"], projection: ["mip"],
-  depthShading: ["zbuffer"], lit: ["splat", "raycast", "shear", "zbuffer"], perspective: ["splat", "raycast", "mip", "zbuffer", "slice"],
-};
-export const can = (what: keyof typeof CAN, renderer: string): boolean => CAN[what].includes(renderer);
-
 function transferOptions(state: State): Options {
   const options: Options = { transfer: state.map ? toParaView(state.map) : state.preset };
   if (state.range) options["scalar-range"] = state.range.join(":");
   if (state.opacityDistance !== 1) options["opacity-distance"] = state.opacityDistance;
-  if (state.slopes.length > 0 && can("gradient", state.renderer)) options["gradient-opacity"] = slopeText(state.slopes);
+  if (state.slopes.length > 0 && can("gradient-opacity", state.renderer)) options["gradient-opacity"] = slopeText(state.slopes);
   return options;
 }
 
@@ -45,14 +39,14 @@ export function renderOptions(state: State): Options {
   const options: Options = {
     dataset: state.dataset, renderer, background: state.background, projection: projectionOf(state),
     azimuth: state.azimuth, elevation: state.elevation, roll: state.roll, zoom: state.zoom,
-    shading: state.shading === "depth-gradient" && !can("depthShading", renderer) ? "phong" : state.shading,
+    shading: state.shading === "depth-gradient" && !can("depth-shading", renderer) ? "phong" : state.shading,
   };
   if (state.lookAt) options["look-at"] = state.lookAt.join(",");
   else options["fit"] = true;
-  if (can("sampling", renderer) && state.samplingRate !== 1) options["sampling-rate"] = state.samplingRate;
-  if (can("projection", renderer)) options["projection-mode"] = state.projectionMode;
-  if (state.lights.length > 0 && can("lit", renderer)) options["light"] = state.lights.map(light => light.join(","));
-  const surfaces = can("surfaces", renderer) ? state.surfaces : [];
+  if (can("sampling-rate", renderer) && state.samplingRate !== 1) options["sampling-rate"] = state.samplingRate;
+  if (can("projection-mode", renderer)) options["projection-mode"] = state.projectionMode;
+  if (state.lights.length > 0 && can("lights", renderer)) options["light"] = state.lights.map(light => light.join(","));
+  const surfaces = can("isosurfaces", renderer) ? state.surfaces : [];
   if (surfaces.length > 0) options["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
   if (surfaces.length === 0 || !state.surfacesAlone) Object.assign(options, transferOptions(state));
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);

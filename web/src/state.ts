@@ -53,10 +53,11 @@ export interface State {
   machine: boolean;
 }
 
+// `renderer`: the first one that the gateway offers.
 export const INITIAL: State = {
   dataset: "",
   azimuth: 150, elevation: 15, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
-  renderer: "splat", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
+  renderer: "", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},

@@ -53,7 +53,7 @@ export class TransferEditor {
       h("label", {}, h("span", {}, "Value"), this.value.input), h("label", { class: "of-opacity" }, h("span", {}, "Opacity"), this.opacity.input), h("label", { class: "of-color" }, h("span", {}, "Colour"), this.color.input));
     this.element = h("div", { class: "editor" }, this.presets.element, h("div", { class: "plot-frame" }, this.plot), this.note, this.pointFields,
       h("div", { class: "tools-row" }, this.undoButton, this.redoButton, iconButton("Add a point of opacity", "add", () => this.add(), "Insert"), this.removeButton, h("span", { class: "space" }),
-        iconButton("Open a colour map", "open", () => file.click()), iconButton("Save as a file", "save", () => this.save()), iconButton("Copy as --transfer takes it", "copy", () => void this.copy()), file),
+        iconButton("Open a colour map", "open", () => file.click()), iconButton("Save as a file", "save", () => this.save()), iconButton("Copy for --transfer", "copy", () => void this.copy()), file),
       h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet")),
       this.density.element);
     new ResizeObserver(entries => { this.width = Math.max(120, Math.round(entries[0]?.contentRect.width ?? 280)); this.refresh(); }).observe(this.plot.parentElement as HTMLElement);
@@ -99,7 +99,7 @@ export class TransferEditor {
     this.ticks.replaceChildren(...([[scale.domain[0], "start"], [scale.domain[1], "end"]] as const).map(([value, anchor]) =>
       svg("text", { x: scale.x(value), y: stripY + PLOT.strip + 20, "text-anchor": anchor }, shown(value))));
     this.drawPoints(map, scale, stripY);
-    this.note.textContent = this.source.untold ? "This gateway does not tell the points of a preset. Editing begins with a ramp." : "";
+    this.note.textContent = this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
     this.low.set(low);

@@ -89,7 +89,7 @@ export class Viewer {
     this.inputAt = undefined;
   }
 
-  // `fit` frames what shows. From the first such picture on the view stays where it is, whatever else changes.
+  // `fit` frames what shows. From the first such picture on the view stays, even if other settings change.
   private resolveFit({ frame: { header, view } }: Shown): void {
     const { state } = this.context.store, volume = this.context.volume();
     if (state.lookAt || !volume || view.options["fit"] !== true || view.options["dataset"] !== state.dataset || volume.name !== state.dataset) return;

@@ -26,7 +26,7 @@ export function centreOf(token: string, dataset: string): Promise<{ centre: Vec3
       frame: ({ header: { geometry } }) => { session.end(); resolve({ centre: geometry.target, world: geometry.world, unit: geometry.unit }); },
       error: message => { session.end(); reject(new Error(message)); },
     });
-    session.show({ picture: "render", timeline: false, options: { dataset, size: "16x16", renderer: "mip" } });
+    session.show({ picture: "render", timeline: false, options: { dataset, size: "16x16" } });
   });
 }
 

@@ -1,17 +1,11 @@
-// The planning half of intensity projections: every box draws, since any may hold a ray's extreme; values become colours at the end.
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
+// The planning half of intensity projections: the transfer function colours the value of each ray.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
-#include "common/calibration/calibration.h"
-#include "common/image/local_image.h"
-#include "common/image/resolve.h"
 #include "common/renderers/mip/projection_mode.h"
-#include "common/renderers/renderer_kind.h"
+#include "common/renderers/projection_kind.h"
 #include "common/renderers/sampling_rate.h"
 
 namespace slabstream::mip {
@@ -47,43 +41,29 @@ double ValueOf(const float* pixel, ProjectionMode mode) {
     case ProjectionMode::kMinimum: return 1 - double(pixel[0]);
     case ProjectionMode::kMean: break;
   }
-  const double sum = double(pixel[0]) * 0x1p-8 + double(pixel[1]) * 0x1p-16 + double(pixel[2]) * 0x1p-24;
-  return std::min(sum / double(pixel[3]), 1.0);
+  return std::min(SumOfValues(pixel) / double(pixel[3]), 1.0);
 }
 
-// The time of a box is that of its samples, along the rays of all pixels that it covers.
-class MipCost : public AnalyticCost {
- public:
-  explicit MipCost(double sampling_rate) : sampling_rate_(sampling_rate) {}
-  double Seconds(const Box& box, const CostView& view) const override {
-    const double pixels = view.pixels_per_voxel * view.pixels_per_voxel;
-    namespace cost = calibration::mip;
-    return cost::kBox + cost::kSample * sampling_rate_ * double(box.voxel_count()) * pixels;
-  }
-
- private:
-  const double sampling_rate_;
-};
-
-class MipKind : public RendererKind {
+class MipKind : public ProjectionKind {
  public:
   MipKind()
-      : RendererKind({.name = "mip",
-                      .title = "intensity projection",
-                      .purpose = "the largest, least or mean value along each ray, for vessels",
-                      .format = PixelFormat::kMaximum,
-                      .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
-                      .footprint = 1,
-                      .stages = {Stage::kSample},
-                      .parameters = {SamplingRate(),
-                                     {.name = "projection-mode",
-                                      .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
-                                      .standard = double(ProjectionMode::kMaximum),
-                                      .choices = {"maximum", "minimum", "mean"}},
-                                     {.name = "interpolation",
-                                      .purpose = "Values between voxels: trilinear, or those of the nearest voxel",
-                                      .standard = 0,
-                                      .choices = {"linear", "nearest"}}}}) {}
+      : ProjectionKind({.name = "mip",
+                        .title = "intensity projection",
+                        .purpose = "the largest, least or mean value along each ray, for vessels",
+                        .format = PixelFormat::kMaximum,
+                        .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                        .abilities = {Ability::kPerspective},
+                        .footprint = 1,
+                        .stages = {Stage::kSample},
+                        .parameters = {SamplingRate(),
+                                       {.name = "projection-mode",
+                                        .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",
+                                        .standard = double(ProjectionMode::kMaximum),
+                                        .choices = {"maximum", "minimum", "mean"}},
+                                       {.name = "interpolation",
+                                        .purpose = "Values between voxels: trilinear, or those of the nearest voxel",
+                                        .standard = 0,
+                                        .choices = {"linear", "nearest"}}}}) {}
 
   PixelFormat FormatOf(const std::vector<double>& parameters) const override {
     return ProjectionMode(int(parameters[1])) == ProjectionMode::kMean ? PixelFormat::kSum : PixelFormat::kMaximum;
@@ -98,31 +78,13 @@ class MipKind : public RendererKind {
     return PickRule::kNone;
   }
 
-  // Whatever its value, a sample may be the one that a pixel shows.
-  ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
-    ClassificationTable table = Classify(transfer, summary.description, summary.range);
-    std::ranges::fill(table.opacity, 1.0F);
-    table.max_opacity = 1;
-    return table;
-  }
-  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override {
-    return std::make_unique<MipCost>(SamplingRateOf(basis.parameters));
-  }
-
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
     const ColorTable table(setup);
     const ProjectionMode mode = ModeOf(setup);
-    LocalImage picture = MakeLocalImage(PixelFormat::kRgba, frame.bounds);
-    constexpr std::size_t kGrain = 4096;  // pixels
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, frame.rgba.size() / 4, kGrain), [&](const auto& pixels) {
-      for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) {
-        const float* const pixel = &frame.rgba[4 * i];
-        if (pixel[3] > 0) table.Look(ValueOf(pixel, mode), &picture.rgba[4 * i]);
-      }
+    return ColorPixels(frame, setup, [&](const float* pixel, float* rgba) {
+      if (pixel[3] > 0) table.Look(ValueOf(pixel, mode), rgba);
     });
-    return Resolve(picture, setup.camera.supersample);
   }
-  bool FrameIsPicture(const FrameSetup& /*setup*/) const override { return false; }
 };
 
 }  // namespace

@@ -17,7 +17,6 @@ inline bool TakesNearestVoxel(const FrameSetup& setup) { return setup.parameters
 // What the four channels of a pixel hold. Value: data values from the volume's least (0) to its largest (1).
 //   maximum  kMaximum  (value, 0, 0, 1)
 //   minimum  kMaximum  (1 - value, 0, 0, 1)
-//   mean     kSum      sums of the bytes of min(floor(value * 2^24), 2^24 - 1), highest first, and the number of samples; exact up to
-//                      65793 samples of a ray
+//   mean     kSum      the sum of all values and their number (SumOfValues, common/renderers/projection_kind.h)
 
 }  // namespace slabstream::mip

@@ -76,10 +76,8 @@ class RaycastKind : public RendererKind {
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
-                      .shows_labels = true,
-                      .shows_overlays = true,
-                      .isosurfaces = true,
-                      .gradient_opacity = true,
+                      .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
+                                    Ability::kOverlay, Ability::kLights},
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}

@@ -12,7 +12,7 @@
 namespace slabstream::shear {
 namespace {
 
-// Every beam near drawn voxels is resampled, whatever lies before it: time grows with cells that are drawn at all, and with pixels.
+// Every beam near drawn voxels is resampled, even if it is hidden: time grows with cells that are drawn at all, and with pixels.
 class ShearCost : public AnalyticCost {
  public:
   explicit ShearCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
@@ -48,8 +48,7 @@ class ShearKind : public RendererKind {
                       .purpose = "the volume resampled onto the picture's pixels by three one-dimensional passes, with a cubic kernel",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // worker/renderers/shear/shear_passes.h says why it suffices
-                      .perspective = false,
-                      .gradient_opacity = true,
+                      .abilities = {Ability::kGradientOpacity, Ability::kLights},
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate(),
@@ -58,7 +57,7 @@ class ShearKind : public RendererKind {
                                       .standard = double(Kernel::kCatmullRom),
                                       .choices = {"catmull-rom", "mitchell", "b-spline", "linear"}},
                                      {.name = "supersampling",
-                                      .purpose = "Beams and slices that are resampled for each one of the volume",
+                                      .purpose = "Beams and slices resampled for each one of the volume",
                                       .standard = 0,
                                       .choices = {"1", "2", "3", "4"}}}}) {}
 

@@ -10,7 +10,7 @@
 namespace slabstream::slice {
 namespace {
 
-// Every tetrahedron that may show is cut, whatever lies before it: time grows with their number and with samples in drawn voxels of the
+// Every tetrahedron that may show is cut, even if it is hidden: time grows with their number and with samples in drawn voxels of the
 // lattice. Those of a brick lie evenly in its voxels, as far as is known.
 class SliceCost : public AnalyticCost {
  public:
@@ -55,7 +55,7 @@ class SliceKind : public RendererKind {
                       .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture, without lights",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 0 would do; like the other renderers, so that all use the same cached voxels
-                      .draws_cells = true,
+                      .abilities = {Ability::kPerspective, Ability::kCells},
                       .footprint = 1,
                       .stages = {Stage::kTransform, Stage::kSample},
                       .parameters = {SamplingRate()}}) {}

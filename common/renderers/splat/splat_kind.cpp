@@ -21,10 +21,11 @@ class SplatKind : public RendererKind {
   SplatKind()
       : RendererKind({.name = "splat",
                       .title = "splatting",
-                      .purpose = "soft footprints of all voxels that show anything; for translucent volumes",
+                      .purpose = "soft footprints of all visible voxels; for translucent volumes",
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,
                       .along_slices = true,
+                      .abilities = {Ability::kPerspective, Ability::kLights},
                       .footprint = 4,
                       .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite}}) {}
 

@@ -16,7 +16,7 @@ namespace {
 constexpr double kVoxels = 2;
 
 // Depths of a frame, and the physical points that they mean. Rays are linear in x and y, so three of them give all. Pixels count from the
-// frame's corner, whatever the image's bounds: the bits do not depend on these.
+// frame's corner, so the bits do not depend on the image's bounds.
 class Points {
  public:
   Points(const LocalImage& image, const Camera& camera) : image_(image) {

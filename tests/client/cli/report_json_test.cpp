@@ -23,7 +23,7 @@ std::vector<FrameRecord> TwoFrames() {
     frame.statistics.groups = 3;
     frame.statistics.attempts = 1;
     frame.statistics.decomposition = "slab";
-    frame.statistics.load_metric = "occupied";
+    frame.statistics.balance_by = "occupied";
     frame.statistics.axis = "z";
     frame.statistics.assignment = "greedy";
     frame.statistics.balance = "dynamic";

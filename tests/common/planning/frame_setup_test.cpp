@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/combining/travel.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 #include "tests/common/planning/plan_support.h"
 #include "tests/support/renderers.h"
 

@@ -22,9 +22,9 @@ TEST(PlanFrame, UsesEveryNameOfAPolicy) {
       request.policy.combine = scheme.name;
       request.policy.decomposition = decomposition.name;
       for (const AssignmentEntry& assignment : Assignments()) {
-        for (const NamedChoice& split : LoadMetrics()) {
+        for (const NamedChoice& split : BalanceByChoices()) {
           request.policy.assignment = assignment.name;
-          request.policy.load_metric = split.name;
+          request.policy.balance_by = split.name;
           request.policy.groups = 2;
           const Roster roster = FullRoster(5);
           ExpectSound(Plan(request, summary, roster), roster);
@@ -39,10 +39,10 @@ TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
   FrameRequest request = SomeRequest();
   for (const DecompositionEntry& decomposition : Decompositions()) {
     for (const AssignmentEntry& assignment : Assignments()) {
-      for (const NamedChoice& split : LoadMetrics()) {
+      for (const NamedChoice& split : BalanceByChoices()) {
         for (const AxisChoice axis : {AxisChoice::kX, AxisChoice::kAuto, AxisChoice::kView}) {
           request.policy = {.decomposition = std::string(decomposition.name),
-                            .load_metric = std::string(split.name),
+                            .balance_by = std::string(split.name),
                             .axis = axis,
                             .assignment = std::string(assignment.name),
                             .balance = std::string(kDynamicBalance)};
@@ -79,8 +79,8 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
   };
   EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
             Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));
-  EXPECT_EQ(status([](auto& r) { r.policy.load_metric = "hairs"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.load_metric is 'hairs', but must be one of: auto, voxels, occupied, cost"));
+  EXPECT_EQ(status([](auto& r) { r.policy.balance_by = "hairs"; }, FullRoster(1)),
+            Status::InvalidArgument("policy.balance_by is 'hairs', but must be one of: auto, voxels, occupied, cost"));
   EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
             Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, contiguous, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),

@@ -170,7 +170,7 @@ TEST(AnalyticCost, FollowsTheSamplingRate) {
     };
     EXPECT_EQ(at_rate(1), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
     // Shears resample slices once, and slicing sets up each cell once, whatever the rate.
-    EXPECT_GT(at_rate(2) / at_rate(1), renderer->draws_cells() ? 1.05 : 1.3);
+    EXPECT_GT(at_rate(2) / at_rate(1), renderer->Can(Ability::kCells) ? 1.05 : 1.3);
     EXPECT_LT(at_rate(2) / at_rate(1), 2.2);
     EXPECT_NEAR((at_rate(4) - at_rate(2)) / (at_rate(2) - at_rate(1)), 2, 1e-9) << "what is left is done once a box and once a pixel";
   }
@@ -307,7 +307,7 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);
       }
-      resolved.load_metric = LoadMetric::kVoxels;
+      resolved.balance_by = BalanceBy::kVoxels;
       EXPECT_LE(occupied.frame, PredictionOf(MakeLayout(request), *cost).frame) << "than boxes of equal volume";
     }
   }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 #include <string>
 
@@ -26,6 +27,19 @@ TEST(Renderers, HaveNamesOfTheirOwn) {
     EXPECT_GT(kind->footprint(), 0);
     EXPECT_NE(kind->format(), PixelFormat::kRgbaDepth) << "finished pictures do not combine";
   }
+}
+
+TEST(Renderers, NameEachAbilityOnce) {
+  std::set<std::string_view> all;
+  for (const RendererKind* kind : Renderers()) {
+    const std::vector<std::string_view> names = kind->AbilityNames();
+    EXPECT_TRUE(std::ranges::is_sorted(kind->abilities())) << kind->name();
+    EXPECT_EQ(std::set(names.begin(), names.end()).size(), names.size()) << kind->name();
+    EXPECT_EQ(kind->projections().size(), kind->Can(Ability::kPerspective) ? 2U : 1U) << kind->name();
+    EXPECT_TRUE(!kind->Can(Ability::kDepthShading) || kind->format() == PixelFormat::kDepth) << kind->name();
+    all.insert(names.begin(), names.end());
+  }
+  EXPECT_EQ(all, std::set(kAbilityNames.begin(), kAbilityNames.end()));
 }
 
 TEST(Renderers, AnUnknownNameIsAnErrorThatListsAll) {

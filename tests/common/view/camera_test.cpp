@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
@@ -386,7 +387,7 @@ TEST(Camera, SaysWhichViewsCannotBeHad) {
   EXPECT_EQ(
       refusal({.projection = Projection::kPerspective, .distance = 7}),
       "view.distance: the eye is 7 from the point that it looks at, but must be at least 7.75775 in this direction, so that the whole "
-      "volume lies before it; view.zoom magnifies the picture");
+      "volume is in front of it; view.zoom magnifies the picture");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "common/view/camera.h"
+#include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"

@@ -97,6 +97,24 @@ TEST(AnyMessage, NamesAreThoseOfTheSchema) {
   EXPECT_EQ(v1::Envelope::descriptor()->oneof_decl(0)->field_count(), int(std::variant_size_v<AnyMessage>));
 }
 
+template <class Messages>
+bool Takes(const AnyMessage& message) {
+  const Result<Messages> decoded = Decode<Messages>(Encode(message), ExpectedPayloadBytes(message));
+  EXPECT_TRUE(decoded.ok() || decoded.status().message() == std::string(NameOf(message)) + " does not belong here");
+  return decoded.ok();
+}
+
+TEST(AnyMessage, EachMessageHasOnePlaceToGo) {
+  for (const AnyMessage& message : AllSamples()) {
+    EXPECT_EQ(Takes<WorkerToCoordinator>(message) + Takes<CoordinatorToWorker>(message) + Takes<WorkerToSlabs>(message) +
+                  Takes<SlabsToWorker>(message) + Takes<WorkerToWorker>(message) + Takes<ClientToCoordinator>(message) +
+                  Takes<CoordinatorToClient>(message),
+              1)
+        << NameOf(message);
+  }
+  EXPECT_EQ(Decode<CoordinatorToWorker>(Encode(Stop{}), 7).status().message(), "Stop with a payload of 7 bytes");
+}
+
 TEST(AnyMessage, EnvelopeFaultsAreNamed) {
   EXPECT_EQ(Decode({}).status().message(), "Envelope.version: 0 is not the one spoken here, 1");
   v1::Envelope envelope;
@@ -141,8 +159,8 @@ TEST(AnyMessage, RefusedSubmitsCanBeAnswered) {
   ASSERT_FALSE(decoded.ok());
   EXPECT_THAT(decoded.status().message(), testing::StartsWith("SubmitFrame.frame: "));
   EXPECT_THAT(decoded.status().message(), HasSubstr("zoom"));
-  EXPECT_EQ(RefusalOf(header, decoded.status()), AnyMessage(FrameFailed{.request = 77, .status = decoded.status()}));
-  EXPECT_EQ(RefusalOf(Encode(SampleQuery{.nonce = 7}), decoded.status()), AnyMessage(OrderRefused{7, decoded.status()}));
+  EXPECT_EQ(RefusalOf(header, decoded.status()), CoordinatorToClient(FrameFailed{.request = 77, .status = decoded.status()}));
+  EXPECT_EQ(RefusalOf(Encode(SampleQuery{.nonce = 7}), decoded.status()), CoordinatorToClient(OrderRefused{7, decoded.status()}));
   EXPECT_FALSE(RefusalOf(Encode(CancelFrame{1}), decoded.status()));
   EXPECT_FALSE(RefusalOf({}, decoded.status()));
 }

@@ -45,7 +45,7 @@ std::vector<NamedSummary> OddVolumes() {
 
 Policy Automatic() {
   Policy policy;
-  policy.decomposition = policy.load_metric = policy.assignment = policy.combine = kAutomatic;
+  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = kAutomatic;
   return policy;
 }
 
@@ -85,15 +85,15 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       asked.decomposition = (left_open & 1) != 0 ? std::string(kAutomatic) : one_of(Decompositions());
       asked.assignment = (left_open & 2) != 0 ? std::string(kAutomatic) : one_of(Assignments());
       asked.combine = (left_open & 4) != 0 ? std::string(kAutomatic) : std::string("fan-in");
-      asked.load_metric = one_of(LoadMetrics());
+      asked.balance_by = one_of(BalanceByChoices());
       asked.groups = random.Integer(0, 3);
       asked.balance = one_of(BalanceModes());
-      SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.load_metric
+      SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.balance_by
                                       << ", " << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
       const PolicyChoice choice = question.Choose(asked);
       const Policy got = AskFor(choice.policy);
       EXPECT_TRUE(CheckNames(got).ok() && !LeavesChoice(got)) << CheckNames(got).message();
-      EXPECT_NE(got.load_metric, kAutomatic);
+      EXPECT_NE(got.balance_by, kAutomatic);
       EXPECT_GE(choice.policy.groups, 1);
       EXPECT_LE(choice.policy.groups, kMaxGroups);
       if (asked.decomposition != kAutomatic) {
@@ -105,8 +105,8 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       if (asked.combine != kAutomatic) {
         EXPECT_EQ(got.combine, asked.combine);
       }
-      if (asked.load_metric != kAutomatic) {
-        EXPECT_EQ(got.load_metric, asked.load_metric);
+      if (asked.balance_by != kAutomatic) {
+        EXPECT_EQ(got.balance_by, asked.balance_by);
       }
       if (asked.groups > 0) {
         EXPECT_EQ(got.groups, asked.groups);
@@ -144,7 +144,7 @@ TEST(ChoosePolicy, NoPartitionWithAFewSchemesAndGroupsIsMuchBetter) {
       for (const char* split : {"voxels", "occupied"}) {
         for (const char* scheme : {"fan-in", "radix-k", "direct-send"}) {
           for (const int groups : {1, 2}) {
-            const Policy policy{.decomposition = std::string(entry.name), .load_metric = split, .groups = groups, .combine = scheme};
+            const Policy policy{.decomposition = std::string(entry.name), .balance_by = split, .groups = groups, .combine = scheme};
             EXPECT_LE((1 - kLeastGain) * chosen, question.Choose(policy).prediction->latency_seconds)
                 << entry.name << " by " << split << ", " << scheme << ", " << groups << ", p = " << slots;
           }
@@ -194,7 +194,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
   question.request.policy = Automatic();
   FrameRequest holding = question.request;
-  holding.policy = {.load_metric = "voxels", .groups = 1};
+  holding.policy = {.balance_by = "voxels", .groups = 1};
   const ResolvedPolicy now = ResolvePolicy(holding, question.summary.description.geometry).value();
   PolicyQuestion asked{.frame = &question.request,
                        .summary = &question.summary,

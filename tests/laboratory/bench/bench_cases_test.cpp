@@ -1,5 +1,5 @@
 #include "laboratory/bench/bench_cases.h"
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

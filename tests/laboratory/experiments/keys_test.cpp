@@ -103,7 +103,7 @@ Changes<ViewParameters> ChangesOfView() {
 Changes<Policy> ChangesOfPartition() {
   return {
       {"decomposition", [](auto& p) { p.decomposition = "slab"; }},
-      {"split", [](auto& p) { p.load_metric = "occupied"; }},
+      {"split", [](auto& p) { p.balance_by = "occupied"; }},
       {"axis", [](auto& p) { p.axis = AxisChoice::kX; }},
       {"groups", [](auto& p) { p.groups = 3; }},
   };
@@ -138,7 +138,7 @@ Changes<Shading> ChangesOfShading() {
 FrameCase Example() {
   FrameCase frame{SphereCase({SphereClass::kHollow, 24, 0.1}, kTranslucentSphere), {32, 24}, {}, {}, 2};
   frame.view = {Projection::kPerspective, 30, 20, 10, 1.5, 25};
-  frame.policy = {.decomposition = "kd-tree", .load_metric = "voxels", .groups = 2};
+  frame.policy = {.decomposition = "kd-tree", .balance_by = "voxels", .groups = 2};
   return frame;
 }
 
@@ -317,7 +317,7 @@ TEST_F(Keys, CasesThatShareATrialHaveTheSameBoxes) {
         for (const std::string balance : {"static", "dynamic"}) {
           for (const int groups : {0, 1, 4}) {
             frame.policy = {.decomposition = std::string(decomposition.name),
-                            .load_metric = split,
+                            .balance_by = split,
                             .groups = groups,
                             .assignment = std::string(assignment.name),
                             .balance = balance,

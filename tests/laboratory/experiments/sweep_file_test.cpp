@@ -41,7 +41,7 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_EQ(sweep->views[0].name, "view 1");
   EXPECT_EQ(sweep->views[1].view.zoom, 2);
   EXPECT_EQ(sweep->policies[0].name, "slab by voxels, cyclic, static, 1 groups, fan-in");
-  EXPECT_EQ(sweep->policies[1].policy.load_metric, "occupied");
+  EXPECT_EQ(sweep->policies[1].policy.balance_by, "occupied");
   EXPECT_EQ(sweep->policies[1].policy.assignment, "greedy");
   EXPECT_EQ(sweep->policies[1].policy.balance, "dynamic");
   EXPECT_EQ(sweep->policies[1].policy.pixel_error, 0.001);

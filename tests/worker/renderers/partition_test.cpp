@@ -135,7 +135,7 @@ TEST_P(Partitions, ClippedVolumesMakeOnePicture) {
 
 // A crossing between two samples, or between two cells, belongs to one box.
 TEST_P(Partitions, IsosurfacesMakeOnePicture) {
-  if (!GetParam()->isosurfaces()) return;  // draws none
+  if (!GetParam()->Can(Ability::kIsosurfaces)) return;  // draws none
   const unsigned seed = 16;
   std::mt19937 random(seed);
   const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
@@ -162,7 +162,7 @@ TEST_P(Partitions, IsosurfacesMakeOnePicture) {
 }
 
 TEST_P(Partitions, GradientOpacityMakesOnePicture) {
-  if (!GetParam()->gradient_opacity()) return;  // has none
+  if (!GetParam()->Can(Ability::kGradientOpacity)) return;  // has none
   const unsigned seed = 17;
   std::mt19937 random(seed);
   const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed));
@@ -208,8 +208,8 @@ TEST_P(Partitions, EveryInstructionSetMakesOnePicture) {
     options.view = RandomView(projection, random);
     if (projection == GetParam()->projections().back()) {
       options.clipping = RandomClipping(volume.description.geometry, random);
-      if (GetParam()->isosurfaces()) options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}};
-      if (GetParam()->gradient_opacity()) options.transfer.gradient_opacities = {{3, 0.2}, {20, 1}};
+      if (GetParam()->Can(Ability::kIsosurfaces)) options.transfer.isosurfaces = {{60, {0.9F, 0.4F, 0.2F}, 0.3}};
+      if (GetParam()->Can(Ability::kGradientOpacity)) options.transfer.gradient_opacities = {{3, 0.2}, {20, 1}};
     }
     const FrameSetup setup = MakeSetup(volume, options);
     const LocalImage best = RenderWhole(volume, setup);

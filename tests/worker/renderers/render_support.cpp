@@ -124,12 +124,13 @@ Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {
 
 std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
 
-Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.draws_cells() ? AsGrid(volume) : std::move(volume); }
+Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.Can(Ability::kCells) ? AsGrid(volume) : std::move(volume); }
 
 std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
   const Box slab_box = Grown(box, halo, volume.block.box);
   SlabLayers layers;
-  if (kind.draws_cells() && volume.cells != nullptr) layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(slab_box));
+  if (kind.Can(Ability::kCells) && volume.cells != nullptr)
+    layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(slab_box));
   return std::make_unique<SlabData>(CutBlock(volume.block, slab_box), std::move(layers));
 }
 

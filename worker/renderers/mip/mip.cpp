@@ -1,12 +1,9 @@
 // The pixel half of intensity projections: the largest, the least or the mean sample along each ray. docs/rendering.md defines them.
 #include <array>
-#include <utility>
 
-#include "common/kernels/combine.h"
 #include "common/renderers/mip/projection_mode.h"
-#include "worker/rays/ray_volume.h"
-#include "worker/rays/render_tiles.h"
-#include "worker/renderers/mip/project.h"
+#include "worker/rays/project.h"
+#include "worker/rays/render_pieces.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 
@@ -42,45 +39,28 @@ class MipRenderer : public Renderer {
                             const std::atomic<bool>& cancelled, RankReport& report) override {
     StageClock clock(report);
     const ProjectionMode mode = ModeOf(setup);
-    ProjectWork work;
     // If data values fall as stored samples rise, the largest value belongs to the least sample.
     const ValueMapping& mapping = setup.description.mapping;
     const bool largest = (mode == ProjectionMode::kMaximum) == (mapping.scale >= 0);
-    work.sign = largest ? 1.0F : -1.0F;
-    work.complement = mode == ProjectionMode::kMinimum;
-    work.nearest = TakesNearestVoxel(setup);
-    // value = (data value - range.min) / (range.max - range.min)
-    const double range = double(setup.range.max) - double(setup.range.min);
-    if (mapping.scale != 0 && range > 0) {
-      work.low = float((double(setup.range.min) - mapping.offset) / mapping.scale);
-      work.scale = float(mapping.scale / range);
-    } else {
-      work.scale = 0;
-    }
     const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
-    const std::vector<SampleBounds>* const bounds =
-        mode == ProjectionMode::kMean ? nullptr : &slab.CacheOf<BoundsCache>().Of(pieces, work.sign);
+    const float sign = largest ? 1.0F : -1.0F;
+    const std::vector<SampleBounds>* const bounds = mode == ProjectionMode::kMean ? nullptr : &slab.CacheOf<BoundsCache>().Of(pieces, sign);
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
-    work.rays = &rays;
-    LocalImage image = MakeLocalImage(setup.format, {});
-    for (std::size_t number = 0; number < pieces.size(); ++number) {
-      const RayPiece& piece = pieces[number];
-      const Box part = Intersection(box, piece.voxels.box);
-      if (part.empty()) continue;
-      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.counts, part, WholeBox(part), rays, setup.camera);
-      work.box = &ray_box;
-      work.bounds = bounds == nullptr ? nullptr : &(*bounds)[number];
-      LocalImage layer = MakeLocalImage(setup.format, ray_box.reach.pixels);
-      RenderTiles(layer, hidden, cancelled, report,
-                  [&](const PixelBounds& tile, float* pixels, std::size_t floats_a_row) { ProjectTile(work, tile, pixels, floats_a_row); });
-      if (image.bounds.empty()) {
-        image = std::move(layer);
-      } else {
-        Combine(image, layer, Side::kBack);
-      }
-    }
+    const ValueScale values = MakeValueScale(double(setup.range.min), double(setup.range.max), mapping);
+    LocalImage image = RenderPieces(
+        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
+          const ProjectWork work = {.rays = &rays,
+                                    .box = &ray_box,
+                                    .bounds = bounds == nullptr ? nullptr : &(*bounds)[piece],
+                                    .sign = sign,
+                                    .values = values,
+                                    .complement = mode == ProjectionMode::kMinimum,
+                                    .nearest = TakesNearestVoxel(setup)};
+          ProjectTile(work, tile, pixels, floats_a_row);
+        });
     clock.Finish(Stage::kRender);
     if (cancelled) return Status::Cancelled("rendering was cancelled");
     return image;

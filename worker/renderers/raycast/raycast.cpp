@@ -10,9 +10,7 @@
 #include <utility>
 
 #include "common/frame/matter_labels.h"
-#include "common/kernels/combine.h"
-#include "worker/rays/ray_volume.h"
-#include "worker/rays/render_tiles.h"
+#include "worker/rays/render_pieces.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
@@ -148,30 +146,19 @@ class RaycastRenderer : public Renderer {
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
-    LocalImage image = MakeLocalImage(setup.format, {});
     std::atomic<std::uint64_t> shaded = 0;
-    for (const std::size_t number : NearestFirst(pieces, setup.camera)) {
-      const RayPiece& piece = pieces[number];
-      const Box part = Intersection(box, piece.voxels.box);
-      if (part.empty()) continue;
-      const RayBox ray_box = MakeRayBox(piece.voxels, piece.cells.counts, part, visible[number].region, rays, setup.camera);
-      const std::optional<RayLayers> layers = shown.Of(number);
-      const MarchWork work = {.rays = &rays,
-                              .box = &ray_box,
-                              .look = &look,
-                              .empty_distance = visible[number].distances.data(),
-                              .termination = float(setup.termination),
-                              .layers = layers ? &*layers : nullptr};
-      LocalImage layer = MakeLocalImage(setup.format, ray_box.reach.pixels);
-      RenderTiles(layer, hidden, cancelled, report, [&](const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-        shaded += MarchTile(work, tile, rgba, floats_a_row);
-      });
-      if (image.bounds.empty()) {
-        image = std::move(layer);
-      } else {
-        Combine(image, layer, Side::kBack);
-      }
-    }
+    LocalImage image = RenderPieces(
+        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t piece) { return visible[piece].region; },
+        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
+          const std::optional<RayLayers> layers = shown.Of(piece);
+          const MarchWork work = {.rays = &rays,
+                                  .box = &ray_box,
+                                  .look = &look,
+                                  .empty_distance = visible[piece].distances.data(),
+                                  .termination = float(setup.termination),
+                                  .layers = layers ? &*layers : nullptr};
+          shaded += MarchTile(work, tile, rgba, floats_a_row);
+        });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
     clock.Finish(Stage::kRender);
     if (cancelled) return Status::Cancelled("rendering was cancelled");

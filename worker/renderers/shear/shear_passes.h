@@ -2,7 +2,7 @@
 //
 // Lattice point (u, v, k) of the picture is sample k of the ray through column u of row v; u and v are counted from the picture's centre.
 // (If `turned`, u is its row and v its column.) Its place in the volume is an affine function of (u, v, k). The passes introduce u, v and k
-// one after the other, each for one data axis, which are called x, y and z here, whatever their names in the volume:
+// one after the other, each for one data axis, which are called x, y and z here, independent of their names in the volume:
 //
 //   1. (x, y, z) -> (u, y, z): along a beam of x, the point u lies at x = x_u u + x_y y + x_z z + x_0
 //   2. (u, y, z) -> (u, v, z): along y, v lies at y = y_u u + y_v v + y_z z + y_0
@@ -20,7 +20,7 @@
 //   |x_y| <= 1
 //
 // Reach. A kernel that reaches h voxels makes sample (u, v, k) at (x, y, z) from voxels less than h (1 + |x_y| + |slide_x|) <= 3 h away
-// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2, whatever the view.
+// along x, h (1 + |slide_y|) <= 2 h along y and h along z. With h = 2 these are 6, 4 and 2, for any view.
 #pragma once
 
 #include <array>

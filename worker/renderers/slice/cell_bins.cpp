@@ -74,9 +74,9 @@ Result<CellBins> CellBins::Make(std::span<const PointBounds> points, std::span<c
     for (Block& block : blocks) total += std::exchange(block.next[tile], total);
   }
   if (total > most_entries) {
-    return Status::InvalidArgument(fmt::format(
-        "the grid's cells lie over each other: {} of them are in more than {} tiles of the picture; a smaller picture has fewer",
-        shown.size(), most_entries));
+    return Status::InvalidArgument(
+        fmt::format("the grid's cells overlap: {} of them are in more than {} tiles of the picture; request a smaller picture",
+                    shown.size(), most_entries));
   }
   bins.first_[tiles] = total;
   bins.entries_.resize(total);

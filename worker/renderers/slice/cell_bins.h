@@ -15,7 +15,7 @@
 namespace slabstream::slice {
 
 // A tile is kTileWidth x kTileHeight pixels of the frame; a chunk is kChunkPlanes planes. Both are counted from pixel (0, 0) and plane 0,
-// whatever the box, so that samples have the same bits in every box.
+// for any box, so that samples have the same bits in every box.
 inline constexpr std::int32_t kTileWidth = 64, kTileHeight = 16, kChunkPlanes = 8;
 
 // Whole numbers x, y and k of the samples that a cell may have; begin >= end: none.

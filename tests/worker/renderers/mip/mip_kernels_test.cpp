@@ -7,7 +7,7 @@
 #include "tests/support/random_box.h"
 #include "tests/support/simd_targets.h"
 #include "tests/worker/renderers/render_support.h"
-#include "worker/renderers/mip/project.h"
+#include "worker/rays/project.h"
 
 namespace slabstream {
 namespace {
@@ -24,7 +24,7 @@ struct Scene {
         cells(FindCellRanges(padded)),
         ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)),
         bounds(BoundSamples(cells, mode == Mode::kMinimum ? -1 : 1)) {
-    work = {.rays = &rays, .box = &ray_box, .low = 10, .scale = 1.0F / 180};
+    work = {.rays = &rays, .box = &ray_box, .values = {10, 1.0F / 180}};
     if (mode != Mode::kMean) work.bounds = &bounds;
     if (mode == Mode::kMinimum) work.sign = -1, work.complement = true;
   }

@@ -1,4 +1,4 @@
-#include "common/planning/validate_request.h"
+#include "common/wire/validate_request.h"
 
 #include <gtest/gtest.h>
 
@@ -57,10 +57,10 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.termination = 0.6; }, "termination is 0.6, but must lie in [0, 0.5]"},
       {[](auto& r) { r.termination = kNan; }, "termination is nan"},
       {[](auto& r) { r.policy.decomposition = ""; }, "policy.decomposition has 0 bytes"},
-      {[](auto& r) { r.policy.load_metric = ""; }, "policy.load_metric has 0 bytes"},
+      {[](auto& r) { r.policy.balance_by = ""; }, "policy.balance_by has 0 bytes"},
       {[](auto& r) { r.policy.assignment = ""; }, "policy.assignment has 0 bytes"},
       {[&](auto& r) { r.policy.balance = long_name; }, "policy.balance has 257 bytes"},
-      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is 5, but must lie in [0, 4]"},
+      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is none of its choices: x, y, z, auto, view"},
       {[](auto& r) { r.policy.groups = -1; }, "policy.groups is -1, but must lie in [0, 1024]"},
       {[&](auto& r) { r.policy.combine = long_name; }, "policy.combine has 257 bytes"},
   };

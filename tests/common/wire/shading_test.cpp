@@ -1,4 +1,4 @@
-#include "common/view/shading.h"
+#include "common/wire/validate_request.h"
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ TEST(Shading, ValidateNamesTheFieldAndTheLimits) {
   EXPECT_EQ(message([](auto& s) { s.diffuse = 2; }), "shading.diffuse is 2, but must lie in [0, 1]");
   EXPECT_NE(message([&](auto& s) { s.specular = kNan; }).find("shading.specular"), std::string::npos);
   EXPECT_EQ(message([](auto& s) { s.shininess = 0; }), "shading.shininess is 0, but must lie in [1, 1000]");
-  EXPECT_NE(message([](auto& s) { s.lights.resize(9, Vec3{0, 0, 1}); }).find("9 lights"), std::string::npos);
+  EXPECT_NE(message([](auto& s) { s.lights.resize(9, Vec3{0, 0, 1}); }).find("shading.lights has 9"), std::string::npos);
 }
 
 TEST(Shading, LightsMustBeDirections) {

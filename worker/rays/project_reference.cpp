@@ -4,7 +4,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "worker/renderers/mip/project.h"
+#include "worker/rays/project.h"
 
 namespace slabstream {
 namespace {
@@ -36,7 +36,7 @@ template <class T>
 std::array<float, 4> Pixel(const ProjectWork& work, std::int32_t x, std::int32_t y) {
   const RayBox& box = *work.box;
   const PixelRay ray = RayOf(*work.rays, x, y);
-  const auto value_of = [&](float sample) { return std::abs(std::clamp((sample - work.low) * work.scale, 0.0F, 1.0F)); };
+  const auto value_of = [&](float sample) { return std::abs(std::clamp((sample - work.values.low) * work.values.scale, 0.0F, 1.0F)); };
   bool found = false;
   float best = 0;
   std::array<float, 4> sums{};

@@ -1,10 +1,13 @@
-#include "client/cli/option_description.h"
+#include "client/request/option_description.h"
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 #include <set>
+#include <string>
+#include <vector>
 
+#include "client/request/request_options.h"
 #include "common/cli/add_option.h"
+#include "common/renderers/registry.h"
 
 namespace slabstream {
 namespace {
@@ -23,6 +26,21 @@ Json NamesOf(const std::set<CLI::Option*>& options) {
   return names;
 }
 
+Json DescribeRenderers() {
+  Json renderers = Json::array();
+  for (const RendererKind* kind : Renderers()) {
+    Json json = {{"name", kind->name()},
+                 {"title", kind->title()},
+                 {"purpose", kind->purpose()},
+                 {"abilities", Json::array()},
+                 {"parameters", Json::array()}};
+    for (const Ability ability : kind->abilities()) json["abilities"].push_back(NameOf(ability));
+    for (const RendererParameter& parameter : kind->parameters()) json["parameters"].push_back(parameter.name);
+    renderers.push_back(std::move(json));
+  }
+  return renderers;
+}
+
 Json Describe(CLI::Option& option) {
   Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
   if (option.get_items_expected_max() > 0) json["type"] = option.get_type_name();
@@ -37,18 +55,26 @@ Json Describe(CLI::Option& option) {
   if (option.get_required()) json["required"] = true;
   if (!option.get_excludes().empty()) json["excludes"] = NamesOf(option.get_excludes());
   if (!option.get_needs().empty()) json["needs"] = NamesOf(option.get_needs());
+  const RequestOption* const field = FindRequestOption(NameOf(option));
+  if (field != nullptr && field->help == option.get_description()) {
+    json["path"] = field->path;
+    if (!field->unit.empty()) json["unit"] = field->unit;
+    if (!field->ability.empty()) json["ability"] = field->ability;
+    if (field->same_picture) json["same_picture"] = true;
+    if (field->path == "renderer") json["renderers"] = DescribeRenderers();
+  }
   json["help"] = option.get_description();
   return json;
 }
 
 }  // namespace
 
-std::string DescribeOptions(CLI::App& command) {
+Json DescribeOptions(CLI::App& command) {
   Json options = Json::array();
   for (CLI::Option* option : command.get_options()) {
     if (!option->get_group().empty() && option != command.get_help_ptr()) options.push_back(Describe(*option));
   }
-  return options.dump(1) + "\n";
+  return options;
 }
 
 }  // namespace slabstream

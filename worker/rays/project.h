@@ -1,12 +1,12 @@
-// ProjectTile: the kernel of intensity projections. It reduces the samples of a box along a pixel's ray to one value: the largest, the
-// least, or their mean.
+// ProjectTile: the kernel of projections. It reduces the samples of a box along a pixel's ray to one value: the largest, the least, or
+// their sum.
 //
 // Samples are interpolated trilinearly and clamped to the range of their eight voxels, so that a cell's range bounds them exactly. Samples
 // that are not finite are skipped. Results have the same bits on every instruction set, and combining the boxes of any partition gives the
 // same bits as one box:
 //
 //   extreme  the extreme of `sign` * sample; then normalised, which is monotonic
-//   mean     sums of integers
+//   sum      sums of integers
 #pragma once
 
 #include <cstddef>
@@ -29,13 +29,22 @@ struct SampleBounds {
 };
 SampleBounds BoundSamples(const CellRanges& cells, float sign);
 
+// How samples become values: value = clamp((sample - low) * scale, 0, 1).
+struct ValueScale {
+  float low = 0, scale = 1;
+};
+// Of data values, so that `least` becomes 0 and `largest` 1; all 0 unless least < largest.
+inline ValueScale MakeValueScale(double least, double largest, const ValueMapping& mapping) {
+  if (mapping.scale == 0 || !(least < largest)) return {0, 0};
+  return {float((least - mapping.offset) / mapping.scale), float(mapping.scale / (largest - least))};
+}
+
 struct ProjectWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
-  const SampleBounds* bounds = nullptr;  // for the same sign; null for a mean
+  const SampleBounds* bounds = nullptr;  // for the same sign; null for a sum
   float sign = 1;                        // 1: the largest sample; -1: the least
-  // Of a sample: value = clamp((sample - low) * scale, 0, 1).
-  float low = 0, scale = 1;
+  ValueScale values;
   bool complement = false;  // store 1 - value, which is largest for the least value
   bool nearest = false;     // samples are those of the nearest voxel, not interpolated
 };

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "worker/renderers/mip/project.h"
+#include "worker/rays/project.h"
 
 namespace slabstream {
 

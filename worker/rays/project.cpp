@@ -1,7 +1,7 @@
-#include "worker/renderers/mip/project.h"
+#include "worker/rays/project.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "worker/renderers/mip/project.cpp"
+#define HWY_TARGET_INCLUDE "worker/rays/project.cpp"
 #include <hwy/foreach_target.h>
 // Highway wants this order.
 #include <hwy/highway.h>
@@ -38,7 +38,7 @@ HWY_INLINE Samples SamplesAt(const RayBox& box, SamplePlace place, Mask owned) {
 }
 
 HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {
-  const auto value = hn::Mul(hn::Sub(samples, Set(work.low)), Set(work.scale));
+  const auto value = hn::Mul(hn::Sub(samples, Set(work.values.low)), Set(work.values.scale));
   return hn::Abs(hn::Min(hn::Max(value, hn::Zero(FloatTag())), Set(1)));  // without a sign of 0
 }
 

@@ -1,0 +1,20 @@
+// The options of a command as JSON, for programs that offer the same ones: `slabstream options`, the gateway, the viewer's page and the
+// Python package (python/slabstream/options.json).
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+namespace CLI {
+class App;
+}
+
+namespace slabstream {
+
+// A list in the order of the help text, without hidden options. Each has a name without dashes (or of a positional argument) and a help
+// text; and where they apply: group, type (none: a flag), default, choices, min or above, max, repeatable, required, excludes, needs.
+// Fields of a request also have their path in it, and where they apply: unit, ability (that a renderer needs), same_picture (it never
+// changes). The option renderer also tells what each of them is called and can do: renderers, a list of {name, title, purpose, abilities,
+// parameters}.
+nlohmann::ordered_json DescribeOptions(CLI::App& command);
+
+}  // namespace slabstream

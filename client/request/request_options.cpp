@@ -1,0 +1,418 @@
+#include "client/request/request_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <type_traits>
+#include <variant>
+
+#include "client/request/values.h"
+#include "client/request/volume_argument.h"
+#include "common/base/check.h"
+#include "common/combining/schemes.h"
+#include "common/decomposition/decomposition.h"
+#include "common/planning/assignment.h"
+#include "common/planning/policy_names.h"
+#include "common/renderers/registry.h"
+#include "common/wire/field_walk.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::string_view kParameters = "parameters";
+
+// Members of requests whose own members are fields with names.
+template <class T>
+concept Part = std::is_same_v<T, ViewParameters> || std::is_same_v<T, Clipping> || std::is_same_v<T, TransferChoice> ||
+    std::is_same_v<T, Shading> || std::is_same_v<T, LabelChoice> || std::is_same_v<T, OverlayChoice> || std::is_same_v<T, Policy>;
+
+// ---- the table
+
+struct Choices {
+  std::vector<std::string> names;  // empty: other texts are possible, too
+  std::string explained;
+
+  void Add(std::string_view name, std::string_view purpose) {
+    names.emplace_back(name);
+    explained += fmt::format("\n  {}: {}", name, purpose);
+  }
+};
+
+// Of a list that the schema names.
+Choices ChoicesOf(const std::string& list) {
+  Choices choices;
+  const auto add_all = [&](const auto& entries) {
+    for (const auto& entry : entries) choices.Add(entry.name, entry.purpose);
+  };
+  if (list == "decompositions" || list == "assignments" || list == "combining schemes") {
+    choices.Add(kAutomatic, "what should be fastest for this volume, view and service");
+  }
+  if (list == "decompositions") add_all(Decompositions());
+  if (list == "assignments") add_all(Assignments());
+  if (list == "loads") add_all(BalanceByChoices());
+  if (list == "balance modes") add_all(BalanceModes());
+  if (list == "presets") add_all(TransferPresets());
+  if (list == "renderers") {
+    for (const RendererKind* kind : Renderers()) choices.Add(kind->name(), kind->purpose());
+  }
+  if (list == "combining schemes") {
+    for (const CombiningEntry& entry : CombiningSchemes()) {
+      choices.Add(fmt::format("{}{}{}", entry.name, entry.arguments.empty() ? "" : ":", entry.arguments), entry.purpose);
+    }
+  }
+  if (list == "combining schemes" || list == "presets") choices.names.clear();
+  return choices;
+}
+
+std::string RenderersWith(std::string_view ability) {
+  std::string names;
+  for (const RendererKind* kind : Renderers()) {
+    if (!std::ranges::any_of(kind->abilities(), [&](Ability a) { return NameOf(a) == ability; })) continue;
+    names += (names.empty() ? "" : " and ") + std::string(kind->name());
+  }
+  return names;
+}
+
+template <class T>
+RequestOption Describe(const Field& field, const T&, std::string path, const std::string& group) {
+  const v1::About& about = AboutOf(field);
+  RequestOption option{.name = about.name(),
+                       .path = std::move(path),
+                       .group = group,
+                       .help = about.help(),
+                       .value = about.value(),
+                       .standard = about.standard(),
+                       .unit = about.unit(),
+                       .ability = about.ability(),
+                       .same_picture = about.same_picture(),
+                       .excludes = {about.excludes().begin(), about.excludes().end()},
+                       .needs = {about.needs().begin(), about.needs().end()}};
+  if (!about.list().empty()) {
+    Choices choices = ChoicesOf(about.list());
+    option.choices = std::move(choices.names);
+    option.help += choices.explained;
+  }
+  if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", RenderersWith(option.ability));
+  const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };
+  if constexpr (requires(T value) { value.number(); }) {
+    option.choices = WordsOf(*field.enum_type());
+  } else if constexpr (std::is_same_v<T, bool>) {
+    option.standard.clear();  // a flag: it is there or not
+    return option;
+  } else if constexpr (std::is_arithmetic_v<T>) {
+    option.range = NumberRange{about.least(), about.most(), about.above_least()};
+    option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
+  }
+  option.repeatable = std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>;
+  option.value = named("NAME");
+  return option;
+}
+
+// Any renderer's parameters, by name. Whether the chosen renderer has one is checked with the request.
+void AddParameters(const std::string& group, std::vector<RequestOption>& table) {
+  std::map<std::string_view, std::pair<const RendererParameter*, std::string>> parameters;  // and the renderers with this parameter
+  for (const RendererKind* kind : Renderers()) {
+    for (const RendererParameter& parameter : kind->parameters()) {
+      auto& [entry, renderers] = parameters[parameter.name];
+      entry = &parameter;
+      renderers += (renderers.empty() ? "" : " and ") + std::string(kind->name());
+    }
+  }
+  for (const auto& [name, entry] : parameters) {
+    const auto& [parameter, renderers] = entry;
+    const bool choice = !parameter->choices.empty();
+    RequestOption& option = table.emplace_back(RequestOption{
+        .name = std::string(name),
+        .path = fmt::format("{}.{}", kParameters, name),
+        .group = group,
+        .help = fmt::format("{}; for --renderer {}", parameter->purpose, renderers),
+        .value = choice ? "NAME" : "NUMBER",
+        .standard = choice ? std::string(parameter->choices[std::size_t(parameter->standard)]) : fmt::format("{:g}", parameter->standard),
+        .choices = {parameter->choices.begin(), parameter->choices.end()}});
+    if (!choice) option.range = NumberRange{parameter->least, parameter->most};
+  }
+}
+
+template <class Struct>
+void Collect(const std::string& place, const std::string& outer_group, const Struct& part, std::vector<RequestOption>& table) {
+  Walk(part, [&](const Field& field, const auto& member, std::size_t) {
+    using T = std::remove_cvref_t<decltype(member)>;
+    const v1::About& about = AboutOf(field);
+    const std::string& group = about.group().empty() ? outer_group : about.group();
+    const std::string path = place + field.name();
+    if (!about.name().empty()) {
+      table.push_back(Describe(field, member, path, group));
+    } else if (path == kParameters) {
+      AddParameters(group, table);
+    } else if constexpr (Part<T>) {
+      Collect(path + ".", group, member, table);
+    } else if constexpr (requires { requires Part<typename T::value_type>; }) {
+      if constexpr (requires { member.has_value(); }) Collect(path + ".", group, typename T::value_type(), table);
+    }
+  });
+}
+
+// ---- one field
+
+// Calls use(member, most items) for the member of `whole` at `path`. Optional parts: made, if `whole` is not const; else one that is not
+// there is skipped.
+template <class Struct, class Use>
+void At(std::string_view path, Struct& whole, const Use& use) {
+  Walk(whole, [&](const Field& field, auto& member, std::size_t most) {
+    using T = std::remove_cvref_t<decltype(member)>;
+    if (!path.starts_with(field.name())) return;
+    const std::string_view rest = path.substr(field.name().size());
+    if (rest.empty()) return use(field, member, most);
+    if (!rest.starts_with('.')) return;
+    if constexpr (Part<T>) {
+      At(rest.substr(1), member, use);
+    } else if constexpr (requires { member.has_value(); }) {
+      if constexpr (Part<typename T::value_type>) {
+        if constexpr (!std::is_const_v<std::remove_reference_t<decltype(member)>>) {
+          if (!member) member.emplace();
+        }
+        if (member) At(rest.substr(1), *member, use);
+      }
+    }
+  });
+}
+
+// What texts are turned into values with.
+struct OptionReader {
+  const RequestOption& option;
+  const std::string& shown;
+  ColorMaps maps;
+  std::size_t most;  // items of a repeatable option
+  Status status = {};
+
+  template <class T, class Value>
+  void Take(T& target, Result<Value> value) {
+    if (value.ok()) {
+      target = *std::move(value);
+    } else {
+      status = value.status();
+    }
+  }
+
+  Result<std::size_t> Choice(const std::string& text) const {
+    return ParseChoice(shown, text, std::vector<std::string_view>(option.choices.begin(), option.choices.end()));
+  }
+
+  void Read(const std::string& text, double& value) { Take(value, ParseNumber(shown, text, *option.range)); }
+  void Read(const std::string& text, float& value) { Take(value, ParseNumber(shown, text, *option.range)); }
+  void Read(const std::string& text, int& value) {
+    if (text == kAutomatic && text == option.standard) return void(value = 0);
+    Take(value, ParseInteger(shown, text, int(option.range->min), int(option.range->max)));
+  }
+  void Read(const std::string& text, bool& value) {
+    if (text != "true" && text != "false") status = Status::InvalidArgument(fmt::format("{} '{}' is neither true nor false", shown, text));
+    value = text == "true";
+  }
+  template <class T>
+  void Read(const std::string& text, EnumMember<T>& value) {
+    const Result<std::size_t> choice = Choice(text);
+    if (choice.ok()) value.set(int(*choice) + 1);
+    status = choice.status();
+  }
+  void Read(const std::string& text, std::string& value) {
+    if (!option.choices.empty()) status = Choice(text).status();
+    if (option.path == "policy.combine" && text != kAutomatic) {
+      if (const auto parsed = ParseCombining(text); !parsed.ok()) {
+        status = Status::InvalidArgument(fmt::format("{} {}", shown, parsed.status().message()));
+      }
+    }
+    value = text;
+  }
+  void Read(const std::string& text, std::variant<std::string, TransferFunction>& value) {
+    Take(value, maps == ColorMaps::kFilesToo ? ParseTransfer(shown, text) : ParseTransferText(shown, text));
+  }
+  void Read(const std::string& text, ImageSize& value) { Take(value, ParseImageSize(shown, text)); }
+  void Read(const std::string& text, std::optional<Vec3>& value) { Take(value, ParsePoint(shown, text)); }
+  void Read(const std::string& text, std::optional<ClipBox>& value) { Take(value, ParseClipBox(shown, text)); }
+  void Read(const std::string& text, std::optional<ScalarRange>& value) { Take(value, ParseScalarRange(shown, text)); }
+  void Read(const std::string& text, std::vector<Isosurface>& value) { Take(value, ParseIsosurfaces(shown, text)); }
+  void Read(const std::string& text, std::vector<GradientOpacityPoint>& value) { Take(value, ParseGradientOpacities(shown, text)); }
+  void Read(const std::string& text, std::vector<LabelOpacity>& value) { Take(value, ParseLabelOpacities(shown, text)); }
+  void Read(const std::string& text, std::vector<LabelRange>& value) { Take(value, ParseLabelRanges(shown, text)); }
+  void Read(const std::string& text, Vec3& value) { Take(value, ParseDirection(shown, text)); }
+  void Read(const std::string& text, ClipPlane& value) { Take(value, ParseClipPlane(shown, text)); }
+
+  template <class T>
+  void ReadAll(std::span<const std::string> texts, T& value) {
+    if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
+      value.clear();
+      for (const std::string& text : texts) {
+        if (status.ok()) Read(text, value.emplace_back());
+      }
+      if (status.ok() && value.size() > most) {
+        status = Status::InvalidArgument(fmt::format("{} is given {} times, at most {} are possible", shown, value.size(), most));
+      }
+    } else if constexpr (requires { Read(texts.back(), value); }) {
+      Read(texts.back(), value);
+    } else {
+      CHECK(false) << option.path << " has no form as a text";
+    }
+  }
+};
+
+// Texts of a member, whatever its standard is.
+std::string Text(double value) { return fmt::format("{}", value); }
+std::string Text(float value) { return fmt::format("{}", value); }
+std::string Text(int value) { return fmt::format("{}", value); }
+std::string Text(const std::string& value) { return value; }
+template <class T>
+std::string Text(const T& value) requires requires {
+  TextOf(value);
+}
+{ return TextOf(value); }
+
+template <class T>
+std::vector<std::string> Texts(const RequestOption& option, const Field& field, const T& value) {
+  if constexpr (std::is_same_v<T, bool>) {
+    return value ? std::vector<std::string>{"true"} : std::vector<std::string>{};
+  } else if constexpr (requires { value.number(); }) {
+    return {WordOf(*field.enum_type()->FindValueByNumber(value.number()))};
+  } else if constexpr (requires { value.index(); }) {
+    if (const auto* preset = std::get_if<std::string>(&value)) return {*preset};
+    return {option.path.starts_with("overlay") ? kOverlayMapFile : kColorMapFile};
+  } else if constexpr (std::is_same_v<T, std::vector<Vec3>> || std::is_same_v<T, std::vector<ClipPlane>>) {
+    std::vector<std::string> texts;
+    for (const auto& item : value) texts.push_back(TextOf(item));
+    return texts;
+  } else if constexpr (requires { value.has_value(); }) {
+    if constexpr (requires { TextOf(*value); }) {
+      return value ? std::vector<std::string>{TextOf(*value)} : std::vector<std::string>{};
+    } else {
+      return {};
+    }
+  } else if constexpr (requires { Text(value); }) {
+    const std::string text = Text(value);
+    return text.empty() ? std::vector<std::string>{} : std::vector<std::string>{text};
+  } else {
+    return {};
+  }
+}
+
+std::vector<std::string> AllTextsOf(const RequestOption& option, const FrameRequest& request) {
+  std::vector<std::string> texts;
+  At(option.path, request, [&](const Field& field, const auto& member, std::size_t) { texts = Texts(option, field, member); });
+  return texts;
+}
+
+const std::string* ParameterOf(const RequestOption& option, const FrameRequest& request) {
+  const auto found = request.parameters.find(option.name);
+  return found == request.parameters.end() ? nullptr : &found->second;
+}
+
+bool IsParameter(const RequestOption& option) { return option.path.starts_with(kParameters); }
+
+}  // namespace
+
+const std::vector<RequestOption>& RequestOptions() {
+  static const std::vector<RequestOption> kTable = [] {
+    std::vector<RequestOption> table;
+    Collect("", "", FrameRequest(), table);
+    return table;
+  }();
+  return kTable;
+}
+
+const RequestOption* FindRequestOption(std::string_view name) {
+  std::string wanted(name);
+  std::ranges::replace(wanted, '_', '-');
+  const auto found = std::ranges::find(RequestOptions(), wanted, &RequestOption::name);
+  return found == RequestOptions().end() ? nullptr : &*found;
+}
+
+Status SetOption(const RequestOption& option, const std::string& shown, std::span<const std::string> texts, ColorMaps maps,
+                 FrameRequest& request) {
+  if (IsParameter(option)) {
+    request.parameters[option.name] = texts.back();
+    return Status::Ok();
+  }
+  Status status;
+  At(option.path, request, [&](const Field&, auto& member, std::size_t most) {
+    OptionReader reader{.option = option, .shown = shown, .maps = maps, .most = most};
+    reader.ReadAll(texts, member);
+    status = reader.status;
+  });
+  return status;
+}
+
+std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest& request) {
+  if (IsParameter(option)) {
+    const std::string* text = ParameterOf(option, request);
+    return text == nullptr ? std::vector<std::string>{} : std::vector{*text};
+  }
+  static const FrameRequest kStandard = [] {
+    FrameRequest standard;
+    standard.labels.emplace();
+    standard.overlay.emplace();
+    return standard;
+  }();
+  const bool shows_layer = option.path == "labels.mode" || option.path == "overlay.preset";
+  std::vector<std::string> texts = AllTextsOf(option, request);
+  if (!shows_layer && texts == AllTextsOf(option, kStandard)) return {};
+  return texts;
+}
+
+std::optional<std::vector<std::string>> TextsOfJson(const Json& value, bool repeatable) {
+  const auto dumped = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
+  const auto text_of = [&](const Json& item) -> std::optional<std::string> {
+    if (item.is_string()) return item.get<std::string>();
+    if (item.is_boolean()) return item.get<bool>() ? "true" : "false";
+    if (item.is_number_float()) return fmt::format("{}", item.get<double>());  // the fewest digits that read back the same
+    if (item.is_number() || item.is_object()) return dumped(item);
+    if (!item.is_array() || item.empty()) return std::nullopt;
+    if (item.front().is_object()) return dumped(item);  // a colour map
+    std::string joined;
+    for (const Json& number : item) {
+      if (!number.is_number()) return std::nullopt;
+      joined += fmt::format("{}{}", joined.empty() ? "" : ",", number.get<double>());
+    }
+    return joined;
+  };
+  const bool list = repeatable && value.is_array() && !std::ranges::all_of(value, [](const Json& item) { return item.is_number(); });
+  std::vector<std::string> texts;
+  for (const Json& item : list ? value : Json::array({value})) {
+    std::optional<std::string> text = text_of(item);
+    if (!text) return std::nullopt;
+    texts.push_back(*std::move(text));
+  }
+  return texts;
+}
+
+std::vector<std::pair<std::string, JsonValue::Read>> OptionFields(FrameRequest& request, std::initializer_list<std::string_view> places) {
+  std::vector<std::pair<std::string, JsonValue::Read>> fields;
+  for (const RequestOption& option : RequestOptions()) {
+    if (std::ranges::none_of(places, [&](std::string_view place) { return option.path.starts_with(place); })) continue;
+    fields.emplace_back(option.name, [&request, &option](const JsonValue& value) {
+      const auto texts = TextsOfJson(value.json(), option.repeatable);
+      if (!texts || texts->empty()) return value.Complain(fmt::format("{} is no value of '{}'", value.Shown(), option.name));
+      if (const Status status = SetOption(option, option.name, *texts, ColorMaps::kTexts, request); !status.ok()) {
+        value.Complain(status.message());
+      }
+    });
+  }
+  return fields;
+}
+
+Json OptionsJson(const FrameRequest& request, std::string_view place) {
+  Json json = Json::object();
+  for (const RequestOption& option : RequestOptions()) {
+    if (!option.path.starts_with(place)) continue;
+    const std::vector<std::string> texts = TextsOf(option, request);
+    if (texts.empty()) continue;
+    if (option.flag()) {
+      json[option.name] = true;
+    } else if (option.range) {
+      json[option.name] = Json::parse(texts.front());
+    } else {
+      json[option.name] = option.repeatable ? Json(texts) : Json(texts.front());
+    }
+  }
+  return json;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,27 @@
+// Ability: what some renderers can do and others cannot. A request for what its renderer cannot do is refused, except that lights have no
+// effect without kLights.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace slabstream {
+
+enum class Ability : std::uint8_t {
+  kPerspective = 0,      // draws perspective views, too
+  kIsosurfaces = 1,      // draws TransferFunction::isosurfaces
+  kGradientOpacity = 2,  // multiplies opacities by TransferFunction::gradient_opacities
+  kLabels = 3,           // shows the labels of a dataset
+  kOverlay = 4,          // shows the overlay of a dataset
+  kCells = 5,            // draws the cells of unstructured grids; other datasets are refused
+  kLights = 6,           // lights surfaces (Shading)
+  kDepthShading = 7,     // lights them by ShadingModel::kDepthGradient, too
+};
+
+// By value; as the service tells them to clients.
+inline constexpr std::array<std::string_view, 8> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
+                                                                  "overlay",     "cells",       "lights",           "depth-shading"};
+constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
+
+}  // namespace slabstream

@@ -1,0 +1,44 @@
+// ProjectionKind: the planning half of renderers that project values: the samples along each pixel's ray become one value (ProjectTile,
+// worker/rays/project.h), and values become colours at the end. Every box draws, since any may change a ray's value.
+#pragma once
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <memory>
+
+#include "common/image/local_image.h"
+#include "common/image/resolve.h"
+#include "common/renderers/renderer_kind.h"
+
+namespace slabstream {
+
+class ProjectionKind : public RendererKind {
+ public:
+  using RendererKind::RendererKind;
+
+  // The first parameter is the sampling rate. The time of a box is that of its samples, along the rays of all pixels that it covers.
+  std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override;
+  ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override;
+  bool FrameIsPicture(const FrameSetup& /*setup*/) const override { return false; }
+
+ protected:
+  // The picture of a frame. color(pixel, rgba): premultiplied RGBA of a pixel of the frame; `rgba` is 0 before.
+  template <class Color>
+  static LocalImage ColorPixels(const LocalImage& frame, const FrameSetup& setup, Color&& color) {
+    LocalImage picture = MakeLocalImage(PixelFormat::kRgba, frame.bounds);
+    constexpr std::size_t kGrain = 4096;  // pixels
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, frame.rgba.size() / 4, kGrain), [&](const auto& pixels) {
+      for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) color(&frame.rgba[4 * i], &picture.rgba[4 * i]);
+    });
+    return Resolve(picture, setup.camera.supersample);
+  }
+};
+
+// Of a pixel of format kSum that holds a sum of values in [0, 1]: the sums over all samples of the bytes of min(floor(value * 2^24),
+// 2^24 - 1), highest first, and the number of samples. Exact up to 65793 samples of a ray.
+inline double SumOfValues(const float* pixel) {
+  return double(pixel[0]) * 0x1p-8 + double(pixel[1]) * 0x1p-16 + double(pixel[2]) * 0x1p-24;
+}
+
+}  // namespace slabstream

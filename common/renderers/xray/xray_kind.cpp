@@ -1,0 +1,88 @@
+// The planning half of radiographs: pixels sum up the attenuation of their samples, and a window of these sums becomes grey.
+#include <tbb/parallel_reduce.h>
+
+#include <algorithm>
+
+#include "common/renderers/projection_kind.h"
+#include "common/renderers/sampling_rate.h"
+#include "common/renderers/xray/attenuation.h"
+
+namespace slabstream::xray {
+namespace {
+
+// The largest sum of values of a frame's pixels.
+double LargestSum(const LocalImage& frame) {
+  constexpr std::size_t kGrain = 4096;  // pixels
+  const tbb::blocked_range<std::size_t> all(0, frame.rgba.size() / 4, kGrain);
+  const auto largest = [&](const auto& pixels, double sum) {
+    for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) sum = std::max(sum, SumOfValues(&frame.rgba[4 * i]));
+    return sum;
+  };
+  return tbb::parallel_reduce(all, 0.0, largest, [](double a, double b) { return std::max(a, b); });
+}
+
+class XrayKind : public ProjectionKind {
+ public:
+  XrayKind()
+      : ProjectionKind({.name = "xray",
+                        .title = "radiography",
+                        .purpose = "a radiograph: line integrals of X-ray attenuation, in grey; for CT",
+                        .format = PixelFormat::kSum,
+                        .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
+                        .abilities = {Ability::kPerspective},
+                        .footprint = 1,
+                        .stages = {Stage::kSample},
+                        .parameters = {SamplingRate(),
+                                       {.name = "energy",
+                                        .purpose = "Energy of the X-rays in keV, which decides how much water attenuates",
+                                        .standard = 70,
+                                        .least = kLeastEnergy,
+                                        .most = kMostEnergy},
+                                       {.name = "attenuation",
+                                        .purpose = "What values attenuate: hounsfield (units of CT); range (the least value nothing, the "
+                                                   "largest one twice as much as water); automatic (hounsfield if a value is -500 or less)",
+                                        .standard = double(Attenuating::kAutomatic),
+                                        .choices = {"automatic", "hounsfield", "range"}},
+                                       {.name = "integral-window",
+                                        .purpose = "Line integrals from black to white; 0: as many as the picture has",
+                                        .standard = 0,
+                                        .least = 0,
+                                        .most = 1000},
+                                       {.name = "integral-level",
+                                        .purpose = "Line integral in the middle of the window; 0: half of the window",
+                                        .standard = 0,
+                                        .least = 0,
+                                        .most = 1000},
+                                       {.name = "polarity",
+                                        .purpose = "Whether what attenuates most is bright (bright-bone) or dark (dark-bone)",
+                                        .standard = 0,
+                                        .choices = {"bright-bone", "dark-bone"}}}}) {}
+
+  PickRule PickRuleOf(const std::vector<double>& /*parameters*/) const override { return PickRule::kNone; }
+
+  LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
+    const std::vector<double>& parameters = setup.parameters;
+    const double step = Least(setup.description.geometry.spacing) / parameters.at(0);  // mm
+    const double integral_of_one = AttenuationOf(setup).Of(double(setup.range.max)) * step;
+    double window = parameters.at(kWindow);
+    if (window <= 0) window = std::max(LargestSum(frame) * integral_of_one, 1e-6);
+    const double level = parameters.at(kLevel) > 0 ? parameters.at(kLevel) : window / 2;
+    const bool dark = parameters.at(kPolarity) != 0;
+    return ColorPixels(frame, setup, [=](const float* pixel, float* rgba) {
+      if (!(pixel[3] > 0)) return;  // the ray misses the volume
+      const double place = std::clamp((SumOfValues(pixel) * integral_of_one - level) / window + 0.5, 0.0, 1.0);
+      const auto grey = float(dark ? 1 - place : place);
+      std::fill_n(rgba, 3, grey);
+      rgba[3] = 1;
+    });
+  }
+};
+
+}  // namespace
+
+const RendererKind& Kind() {
+  static const XrayKind kind;
+  return kind;
+}
+
+}  // namespace slabstream::xray

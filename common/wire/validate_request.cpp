@@ -1,0 +1,247 @@
+#include "common/wire/validate_request.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/range_status.h"
+#include "common/renderers/registry.h"
+#include "common/wire/field_walk.h"
+
+namespace slabstream {
+namespace {
+
+// What the schema says of values, one by one. Only the first failure counts.
+class SchemaCheck {
+ public:
+  // `renderer`: null, then what it can do is not asked for.
+  SchemaCheck(std::string path, const RendererKind* renderer) : path_(std::move(path)), renderer_(renderer) {}
+
+  template <class Struct>
+  Status Of(const Struct& value) {
+    Members(value, {});
+    return status_;
+  }
+
+ private:
+  struct Limits {
+    double least = 0, most = 0;  // both 0: none
+    bool above_least = false;
+    std::string unit = {};
+  };
+
+  template <class Struct>
+  void Members(const Struct& value, const Limits& outer) {
+    Walk(value, [&](const Field& field, const auto& member, std::size_t most) {
+      const v1::About& about = AboutOf(field);
+      const bool limited = about.least() != 0 || about.most() != 0;
+      const std::size_t length = path_.size();
+      path_ += (path_.empty() ? "" : ".") + field.name();
+      Member(field, member, most, limited ? Limits{about.least(), about.most(), about.above_least(), about.unit()} : outer);
+      path_.resize(length);
+    });
+  }
+
+  template <class T>
+  void Member(const Field& field, const T& value, std::size_t most, const Limits& limits) {
+    if constexpr (std::is_same_v<T, std::string>) {
+      Name(value);
+    } else if constexpr (std::is_arithmetic_v<T>) {
+      if (limits.least != 0 || limits.most != 0) Number(double(value), limits);
+    } else if constexpr (requires { value.number(); }) {
+      const auto* const chosen = field.enum_type()->FindValueByNumber(value.number());
+      if (chosen == nullptr || value.number() == 0) {
+        return Keep(
+            Status::InvalidArgument(fmt::format("{} is none of its choices: {}", path_, fmt::join(WordsOf(*field.enum_type()), ", "))));
+      }
+      const std::string& ability = chosen->options().GetExtension(v1::value_ability);
+      if (!ability.empty()) Require(ability, fmt::format("{} '{}'", AboutOf(field).name(), WordOf(*chosen)));
+    } else if constexpr (requires { value.has_value(); }) {
+      if (value.has_value()) Given(field), Members(*value, limits);
+    } else if constexpr (requires { value.index(); }) {
+      if (const auto* name = std::get_if<std::string>(&value)) {
+        Name(*name);
+      } else {
+        Keep(Validate(std::get<TransferFunction>(value)));
+      }
+    } else if constexpr (requires { value.size(); }) {
+      if (!value.empty()) Given(field);
+      if (value.size() > most)
+        Keep(Status::InvalidArgument(fmt::format("{} has {} items, at most {} are possible", path_, value.size(), most)));
+      if constexpr (requires { value.data(); }) Items(value, limits);
+    } else {
+      Members(value, limits);
+    }
+  }
+
+  template <class T>
+  void Items(const std::vector<T>& items, const Limits& limits) {
+    const std::size_t length = path_.size();
+    for (std::size_t i = 0; i < items.size() && status_.ok(); ++i) {
+      path_ += fmt::format("[{}]", i);
+      Members(items[i], limits);
+      path_.resize(length);
+    }
+  }
+
+  void Number(double value, const Limits& limits) {
+    const auto& [least, most, above_least, unit] = limits;
+    if ((above_least ? value > least : value >= least) && value <= most) return;
+    Keep(Status::InvalidArgument(fmt::format("{} is {}, but must lie in {}{}, {}]{}{}", path_, value, above_least ? '(' : '[', least, most,
+                                             unit.empty() ? "" : " ", unit)));
+  }
+
+  void Name(const std::string& name) {
+    if (!name.empty() && name.size() <= kMaxNameBytes) return;
+    Keep(Status::InvalidArgument(fmt::format("{} has {} bytes, but must have 1 to {}", path_, name.size(), kMaxNameBytes)));
+  }
+
+  void Given(const Field& field) {
+    const v1::About& about = AboutOf(field);
+    if (!about.ability().empty()) Require(about.ability(), about.name().empty() ? field.name() : about.name());
+  }
+
+  void Require(const std::string& ability, const std::string& what) {
+    const auto can = [&](const RendererKind& kind) {
+      return std::ranges::any_of(kind.abilities(), [&](Ability a) { return NameOf(a) == ability; });
+    };
+    if (renderer_ == nullptr || can(*renderer_)) return;
+    std::vector<std::string_view> names;
+    for (const RendererKind* kind : Renderers()) {
+      if (can(*kind)) names.push_back(kind->name());
+    }
+    Keep(
+        Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, fmt::join(names, ", "))));
+  }
+
+  void Keep(const Status& status) {
+    if (status_.ok()) status_ = status;
+  }
+
+  std::string path_;
+  const RendererKind* renderer_;
+  Status status_;
+};
+
+template <class T>
+Status CheckSchema(const char* path, const T& value) {
+  return SchemaCheck(path, nullptr).Of(value);
+}
+
+// ---- what holds between values
+
+// The squared length must be usable, too: it normalises the direction.
+Status CheckDirection(const std::string& field, const Vec3& v) {
+  if (std::isnormal(Dot(v, v))) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is {},{},{}, but must be a direction other than 0,0,0", field, v.x, v.y, v.z));
+}
+
+Status CheckRules(const ViewParameters& view) {
+  if (view.fit && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
+  if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll_degrees turns the picture");
+  if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
+  if (view.distance > 0 && view.projection != Projection::kPerspective) {
+    return Status::InvalidArgument("view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
+  }
+  return view.up ? CheckDirection("view.up", *view.up) : Status::Ok();
+}
+
+Status CheckRules(const ImageSize& size) {
+  return InRange("size.width * size.height", double(size.width) * size.height, 1, double(kMaxImagePixels));
+}
+
+Status CheckRules(const Clipping& clipping) {
+  const auto& [box, slab, planes, mode] = clipping;
+  for (const Axis axis : kAxes) {
+    if (!box || box->low[axis] < box->high[axis]) continue;
+    return Status::InvalidArgument(
+        fmt::format("clipping.box is {}:{} along {}, but must rise", box->low[axis], box->high[axis], Letter(axis)));
+  }
+  if (slab && slab->through && slab->index)
+    return Status::InvalidArgument("clipping.slab has both a point and an index, but one is enough");
+  if (slab) {
+    if (Status s = CheckDirection("clipping.slab.normal", slab->normal); !s.ok()) return s;
+    if (Status s = InRange("clipping.slab.slice", slab->index.value_or(0), 0, kMaxVolumeSide - 1); !s.ok()) return s;
+  }
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    if (Status s = CheckDirection(fmt::format("clipping.clip_planes[{}].normal", i), planes[i].normal); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
+Status CheckRules(const std::optional<ScalarRange>& range, const char* field) {
+  if (!range) return Status::Ok();
+  const double least = range->percentiles ? 0 : -kMaxScalar, most = range->percentiles ? 100 : kMaxScalar;
+  if (Status s = InRange(fmt::format("{}.min", field), range->min, least, most); !s.ok()) return s;
+  if (Status s = InRange(fmt::format("{}.max", field), range->max, least, most); !s.ok()) return s;
+  if (range->min < range->max) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is {:g} to {:g}, but must rise", field, range->min, range->max));
+}
+
+Status CheckRules(const TransferChoice& transfer) {
+  if (Status s = CheckRules(transfer.scalar_range, "transfer.scalar_range"); !s.ok()) return s;
+  if (Status s = Validate(transfer.isosurfaces); !s.ok()) return s;
+  return Validate(transfer.gradient_opacities);
+}
+
+Status CheckRules(const Shading& shading) {
+  for (std::size_t i = 0; i < shading.lights.size(); ++i) {
+    if (Status s = CheckDirection(fmt::format("shading.lights[{}]", i), shading.lights[i]); !s.ok()) return s;
+  }
+  return Status::Ok();
+}
+
+Status CheckRules(const LabelChoice& labels) {
+  std::set<std::uint32_t> named;
+  for (const auto& [value, opacity] : labels.opacities) {
+    if (!named.insert(value).second) return Status::InvalidArgument(fmt::format("labels.opacities names label {} twice", value));
+  }
+  for (const auto& [first, last] : labels.shown) {
+    if (first > last) return Status::InvalidArgument(fmt::format("labels.shown has the range {} to {}, but must rise", first, last));
+  }
+  return Status::Ok();
+}
+
+// Overlays have no isosurfaces and no opacity by gradient.
+Status CheckRules(const OverlayChoice& overlay) {
+  const auto* function = std::get_if<TransferFunction>(&overlay.choice);
+  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty())) {
+    return Status::InvalidArgument("overlay.function has isosurfaces or gradient_opacities, which are of the volume alone");
+  }
+  return CheckRules(overlay.scalar_range, "overlay.scalar_range");
+}
+
+template <class T>
+Status ValidatePart(const char* name, const T& part) {
+  if (Status s = CheckSchema(name, part); !s.ok()) return s;
+  return CheckRules(part);
+}
+
+}  // namespace
+
+Status Validate(const TransferChoice& transfer) { return ValidatePart("transfer", transfer); }
+Status Validate(const ViewParameters& view) { return ValidatePart("view", view); }
+Status Validate(const ImageSize& size) { return ValidatePart("size", size); }
+Status Validate(const Clipping& clipping) { return ValidatePart("clipping", clipping); }
+Status Validate(const Shading& shading) { return ValidatePart("shading", shading); }
+
+Status Validate(const FrameRequest& request) {
+  const Result<const RendererKind*> renderer = RequireRenderer(request.renderer);
+  if (!renderer.ok()) return renderer.status();
+  if (const auto parameters = ParseParameters(**renderer, request.parameters); !parameters.ok()) return parameters.status();
+  if (Status s = SchemaCheck("", *renderer).Of(request); !s.ok()) return s;
+  if (Status s = CheckRules(request.size); !s.ok()) return s;
+  if (Status s = CheckRules(request.view); !s.ok()) return s;
+  if (Status s = CheckRules(request.clipping); !s.ok()) return s;
+  if (Status s = CheckRules(request.transfer); !s.ok()) return s;
+  if (Status s = CheckRules(request.shading); !s.ok()) return s;
+  if (Status s = request.labels ? CheckRules(*request.labels) : Status::Ok(); !s.ok()) return s;
+  return request.overlay ? CheckRules(*request.overlay) : Status::Ok();
+}
+
+}  // namespace slabstream

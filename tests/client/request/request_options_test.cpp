@@ -1,0 +1,252 @@
+// The schema describes each field of a request once: whoever offers, reads or writes requests follows that description.
+#include "client/request/request_options.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "client/cli/option_groups.h"
+#include "client/request/picture_fields.h"
+#include "client/request/picture_record.h"
+#include "common/wire/about.h"
+#include "common/wire/request_fields.h"
+#include "common/wire/request_json.h"
+#include "common/wire/validate_request.h"
+
+namespace slabstream {
+namespace {
+
+using google::protobuf::Descriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using testing::HasSubstr;
+
+FrameRequest Standard() {
+  FrameRequest request;
+  request.dataset = "head";
+  return request;
+}
+
+// A value of each option that is not its standard one, with the options that it needs.
+const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
+    {"size", {"30x20", {}}},
+    {"projection", {"perspective", {}}},
+    {"azimuth", {"-30.5", {}}},
+    {"elevation", {"12", {}}},
+    {"of-patient", {"true", {}}},
+    {"look-at", {"1,-2,3", {}}},
+    {"fit", {"true", {}}},
+    {"eye", {"-100,5,7", {}}},
+    {"up", {"0,1,0", {{"eye", "1,2,3"}}}},
+    {"distance", {"90", {{"projection", "perspective"}}}},
+    {"roll", {"5", {}}},
+    {"zoom", {"2.5", {}}},
+    {"fov", {"12", {}}},
+    {"clip-box", {"0:1,:,-3:v", {}}},
+    {"clip-plane", {"1,0,0,-5", {}}},
+    {"clip-mode", {"cut-away", {}}},
+    {"renderer", {"zbuffer", {}}},
+    {"transfer", {"gray-ramp", {}}},
+    {"scalar-range", {"2%:98%", {}}},
+    {"opacity-distance", {"0.25", {}}},
+    {"isovalue", {"300:1,0.5,0:0.25", {{"renderer", "raycast"}, {"transfer", "auto"}}}},
+    {"gradient-opacity", {"0:0.5,3:1", {{"renderer", "raycast"}}}},
+    {"shading", {"none", {}}},
+    {"light", {"0,0,1", {}}},
+    {"ambient", {"0.5", {}}},
+    {"diffuse", {"0.25", {}}},
+    {"specular", {"0.75", {}}},
+    {"shininess", {"3", {}}},
+    {"termination", {"0.25", {}}},
+    {"label-mode", {"surface", {{"renderer", "raycast"}}}},
+    {"label-tint", {"0.25", {{"renderer", "raycast"}}}},
+    {"label-opacity", {"3=0.5", {{"renderer", "raycast"}}}},
+    {"labels-shown", {"1,5-9", {{"renderer", "raycast"}}}},
+    {"overlay-transfer", {"gray-ramp", {{"renderer", "raycast"}}}},
+    {"overlay-range", {"-1:2", {{"renderer", "raycast"}}}},
+    {"overlay-weight", {"0.5", {{"renderer", "raycast"}}}},
+    {"decomposition", {"kd-tree", {}}},
+    {"axis", {"view", {}}},
+    {"balance-by", {"voxels", {}}},
+    {"assignment", {"greedy", {}}},
+    {"balance", {"dynamic", {}}},
+    {"groups", {"3", {}}},
+    {"teams", {"2", {}}},
+    {"combine", {"radix-k:2x2", {}}},
+    {"pixel-error", {"0.01", {}}},
+};
+
+bool IsParameter(const RequestOption& option) { return option.path.starts_with("parameters."); }
+bool IsCompared(const RequestOption& option) { return option.name != "dataset" && option.name != "previews" && !IsParameter(option); }
+
+FrameRequest Asked(const RequestOption& option, bool with_option = true) {
+  auto [text, fields] = kOthers.at(option.name);
+  if (with_option) fields.push_back({option.name, text});
+  fields.push_back({"dataset", "head"});
+  const Result<RenderRequest> request = ParseRenderFields(fields);
+  EXPECT_TRUE(request.ok()) << request.status().message();
+  return request.ok() ? request->frame : FrameRequest();
+}
+
+// Leaves without a name lie in a field that has one, or say what sets them.
+void ExpectDescribed(const Descriptor& message, const std::string& place, bool inside, std::set<std::string>& names) {
+  for (int i = 0; i < message.field_count(); ++i) {
+    const FieldDescriptor& field = *message.field(i);
+    const v1::About& about = AboutOf(field);
+    const std::string path = place + field.name();
+    if (!about.name().empty()) {
+      EXPECT_FALSE(about.help().empty()) << path;
+      EXPECT_TRUE(names.insert(about.name()).second) << about.name() << " is the name of two fields";
+    }
+    const bool settled = inside || !about.name().empty() || !about.apart().empty();
+    if (field.message_type() != nullptr && !settled) {
+      ExpectDescribed(*field.message_type(), path + ".", settled, names);
+    } else {
+      EXPECT_TRUE(settled) << path << " has neither a name nor a reason to have none";
+    }
+  }
+}
+
+TEST(RequestOptionsTest, EveryFieldOfTheSchemaIsAnOptionOrSaysWhyNot) {
+  std::set<std::string> names, found;
+  ExpectDescribed(*v1::FrameRequest::descriptor(), "", false, names);
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsParameter(option)) found.insert(option.name);
+  }
+  EXPECT_EQ(found, names);
+  for (const std::string& name : names) {
+    if (name != "dataset" && name != "previews") EXPECT_TRUE(kOthers.contains(name)) << "no other value of " << name << " is tried here";
+  }
+}
+
+TEST(RequestOptionsTest, EveryOptionIsOneOfTheCommandLineAndAQuery) {
+  CLI::App app;
+  FrameOptions options;
+  AddFrameOptions(app, options);
+  const Json queries = RenderFields();
+  for (const RequestOption& option : RequestOptions()) {
+    SCOPED_TRACE(option.name);
+    const auto query = std::ranges::find_if(queries, [&](const Json& field) { return field["name"] == option.name; });
+    if (option.name == "previews") continue;  // of render alone
+    ASSERT_NE(query, queries.end());
+    EXPECT_EQ((*query)["path"], option.path);
+    if (option.name == "dataset") continue;  // SOURCE on the command line
+    const CLI::Option* const typed = app.get_option_no_throw("--" + option.name);
+    ASSERT_NE(typed, nullptr);
+    EXPECT_EQ(typed->get_description(), option.help);
+    EXPECT_EQ(typed->get_group(), option.group);
+  }
+}
+
+TEST(RequestOptionsTest, EveryOptionReachesRequestRecordAndKey) {
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsCompared(option)) continue;
+    SCOPED_TRACE(option.name);
+    const FrameRequest with = Asked(option), without = Asked(option, false);
+    EXPECT_NE(with, without);
+    EXPECT_NE(RequestToJson(with), RequestToJson(without));
+    // The record of the picture tells the line that asks for it.
+    const Result<PictureRecord> record = ParseRecord(RecordText("head", with, {}, {.pixel_size = 1}));
+    ASSERT_TRUE(record.ok()) << record.status().message();
+    const std::vector<std::string> words = RenderArguments(*record, "a.png");
+    EXPECT_THAT(words, testing::Contains(HasSubstr("--" + option.name)));
+    // Texts are read back the same.
+    FrameRequest again = without;
+    const std::vector<std::string> texts = TextsOf(option, with);
+    ASSERT_FALSE(texts.empty());
+    EXPECT_TRUE(SetOption(option, option.name, texts, ColorMaps::kTexts, again).ok());
+    EXPECT_EQ(again, with);
+  }
+}
+
+TEST(RequestOptionsTest, LimitsHoldForTextsAndForRequests) {
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsCompared(option) || !option.range) continue;
+    SCOPED_TRACE(option.name);
+    const auto refused = [&](double value) {
+      FrameRequest request = Asked(option, false);
+      const Status status = SetOption(option, "--" + option.name, std::vector{fmt::format("{}", value)}, ColorMaps::kTexts, request);
+      return !status.ok() && status.message().starts_with("--" + option.name);
+    };
+    const auto& [least, most, above] = *option.range;
+    EXPECT_EQ(refused(least), above);
+    EXPECT_FALSE(refused(most));
+    EXPECT_TRUE(refused(least - 1));
+    EXPECT_TRUE(refused(most + 1));
+  }
+}
+
+// The message of the field at `path`, and the field.
+std::pair<Message*, const FieldDescriptor*> FieldAt(Message& whole, const std::string& path) {
+  Message* message = &whole;
+  std::size_t begin = 0;
+  for (std::size_t dot = path.find('.'); dot != std::string::npos; begin = dot + 1, dot = path.find('.', begin)) {
+    message = message->GetReflection()->MutableMessage(message, message->GetDescriptor()->FindFieldByName(path.substr(begin, dot - begin)));
+  }
+  return {message, message->GetDescriptor()->FindFieldByName(path.substr(begin))};
+}
+
+FrameRequest Received(const v1::FrameRequest& message) {
+  FrameRequest request;
+  Checker check("FrameRequest");
+  Read(message, request, check);
+  EXPECT_TRUE(check.ok()) << check.status().message();
+  return request;
+}
+
+TEST(RequestOptionsTest, WhatIsLeftOutHasItsStandardValue) {
+  v1::FrameRequest bare;
+  bare.set_dataset("head");
+  EXPECT_EQ(Received(bare), Standard());
+  bare.mutable_labels();
+  bare.mutable_overlay();
+  bare.set_renderer("raycast");
+  EXPECT_EQ(Received(bare).labels, LabelChoice());
+  EXPECT_EQ(Received(bare).overlay, OverlayChoice());
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsCompared(option)) continue;
+    SCOPED_TRACE(option.name);
+    v1::FrameRequest message;
+    Write(Asked(option), message);
+    const auto [holder, field] = FieldAt(message, option.path);
+    ASSERT_NE(field, nullptr);
+    holder->GetReflection()->ClearField(holder, field);
+    FrameRequest expected = Asked(option, false);
+    if (option.path.starts_with("labels.") && !expected.labels) expected.labels.emplace();
+    if (option.path.starts_with("overlay.") && !expected.overlay) expected.overlay.emplace();
+    EXPECT_EQ(Received(message), expected);
+  }
+}
+
+TEST(RequestOptionsTest, StandardTextsOfTheSchemaAreThoseOfTheStruct) {
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsCompared(option) || option.standard.empty()) continue;
+    SCOPED_TRACE(option.name);
+    FrameRequest request = Asked(option, false), unchanged = request;
+    if (option.path.starts_with("labels.") && !unchanged.labels) unchanged.labels.emplace();
+    if (option.path.starts_with("overlay.") && !unchanged.overlay) unchanged.overlay.emplace();
+    EXPECT_TRUE(SetOption(option, option.name, std::vector{option.standard}, ColorMaps::kTexts, request).ok());
+    EXPECT_EQ(request, unchanged);
+  }
+}
+
+TEST(RequestOptionsTest, ValuesOfFilesMayBeNumbersListsAndTexts) {
+  FrameRequest request = Standard();
+  std::optional<std::string> mistake;
+  const Json json = Json::parse(R"({"look_at": [1, 2.5, -3], "zoom": 0.1, "projection": "perspective"})");
+  JsonValue(json, "view", mistake).Fields(OptionFields(request, {"view."}));
+  EXPECT_EQ(mistake, std::nullopt);
+  EXPECT_EQ(request.view.look_at, (Vec3{1, 2.5, -3}));
+  EXPECT_EQ(request.view.zoom, 0.1);
+  EXPECT_EQ(OptionsJson(request, "view.").dump(), R"({"projection":"perspective","look-at":"1,2.5,-3","zoom":0.1})");
+  const Json bad = Json::parse(R"({"zoom": 0})");
+  JsonValue(bad, "view", mistake).Fields(OptionFields(request, {"view."}));
+  EXPECT_EQ(mistake, "view.zoom: zoom 0 is out of range [0.001, 10000]");
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,48 @@
+// RenderPieces: the image of a box of a slab, from the pieces that kernels can address (RayPiece).
+#pragma once
+
+#include <atomic>
+#include <span>
+#include <utility>
+
+#include "common/frame/frame_setup.h"
+#include "common/kernels/combine.h"
+#include "worker/rays/ray_volume.h"
+#include "worker/rays/render_tiles.h"
+
+namespace slabstream {
+
+// What is rendered (Renderer::Render), and its rays.
+struct RayFrame {
+  const Box& box;
+  const FrameSetup& setup;
+  const ViewRays& rays;
+  const OcclusionMask& hidden;
+  const std::atomic<bool>& cancelled;
+  RankReport& report;
+};
+
+// Renders the box's part in each piece and combines their images. region_of(number of the piece): the positions whose samples may matter.
+// render(number, ray box, tile, pixels, floats a row) renders a tile, as RenderTiles says.
+template <class RegionOf, class Render>
+LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame, RegionOf&& region_of, Render&& render) {
+  const FrameSetup& setup = frame.setup;
+  LocalImage image = MakeLocalImage(setup.format, {});
+  for (const std::size_t number : NearestFirst(pieces, setup.camera)) {
+    const RayPiece& piece = pieces[number];
+    const Box part = Intersection(frame.box, piece.voxels.box);
+    if (part.empty()) continue;
+    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera);
+    LocalImage layer = MakeLocalImage(setup.format, box.reach.pixels);
+    RenderTiles(layer, frame.hidden, frame.cancelled, frame.report,
+                [&](const PixelBounds& tile, float* pixels, std::size_t floats_a_row) { render(number, box, tile, pixels, floats_a_row); });
+    if (image.bounds.empty()) {
+      image = std::move(layer);
+    } else {
+      Combine(image, layer, Side::kBack);
+    }
+  }
+  return image;
+}
+
+}  // namespace slabstream

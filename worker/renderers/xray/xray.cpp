@@ -1,0 +1,38 @@
+// The pixel half of radiographs: sums of attenuation along each ray, as shares of that of the volume's largest value. docs/rendering.md
+// defines them.
+#include "common/renderers/xray/attenuation.h"
+#include "worker/rays/project.h"
+#include "worker/rays/render_pieces.h"
+#include "worker/renderers/renderer.h"
+#include "worker/renderers/stage_clock.h"
+
+namespace slabstream::xray {
+namespace {
+
+class XrayRenderer : public Renderer {
+ public:
+  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+                            const std::atomic<bool>& cancelled, RankReport& report) override {
+    StageClock clock(report);
+    const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
+    clock.Charge(Stage::kPrepare);
+
+    const VolumeDescription& volume = setup.description;
+    const ViewRays rays = MakeViewRays(setup.camera, volume.geometry, setup.parameters.at(0), setup.clip);
+    const auto values = MakeValueScale(AttenuationOf(setup).clear, double(setup.range.max), volume.mapping);
+    LocalImage image = RenderPieces(
+        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
+          ProjectTile({.rays = &rays, .box = &ray_box, .values = values}, tile, pixels, floats_a_row);
+        });
+    clock.Finish(Stage::kRender);
+    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    return image;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Renderer> MakePixelHalf() { return std::make_unique<XrayRenderer>(); }
+
+}  // namespace slabstream::xray
