@@ -36,7 +36,7 @@ using Error = beast::error_code;
 using PlainStream = beast::tcp_stream;
 using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 
-// Everything that is open and must be closed when the server stops.
+// Whatever is open and must be closed when the server stops.
 class Closable {
  public:
   virtual ~Closable() = default;

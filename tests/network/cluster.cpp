@@ -19,6 +19,8 @@ constexpr char kDataset[] = "ball";
 constexpr std::chrono::seconds kFrameDeadline{45};
 constexpr int kPictureSize = 512, kVolumeSize = 128, kGroups = 8;
 
+bool IsHeard(const WorkerStatus& worker) { return worker.silent_ms < 2000; }
+
 }  // namespace
 
 std::vector<float> SamplesOf(const Picture& picture) {
@@ -153,17 +155,29 @@ std::uint32_t ClusterTest::RenderThrough(const std::function<void()>& disturb) {
   return attempts;
 }
 
-void ClusterTest::WaitForWorkers(int workers) {
+void ClusterTest::WaitForStatus(Client& client, const std::string& expected, const std::function<bool(const StatusReply&)>& holds) {
   const Time deadline = MonotonicNow() + kProgramTimeout;
   std::string seen;
   while (MonotonicNow() < deadline) {
-    const Result<StatusReply> status = client_->QueryStatus();
-    const auto heard = [](const WorkerStatus& worker) { return worker.silent_ms < 2000; };
+    const Result<StatusReply> status = client.QueryStatus();
+    if (status.ok() && holds(*status)) return;
     seen = status.ok() ? std::to_string(status->workers.size()) + " workers" : status.status().message();
-    if (status.ok() && int(status->workers.size()) == workers && std::ranges::all_of(status->workers, heard)) return;
-    (void)client_->Next(milliseconds(20));
+    (void)client.Next(milliseconds(20));
   }
-  FAIL() << "expected " << workers << " workers, there are " << seen;
+  FAIL() << "expected " << expected << ", there are " << seen;
+}
+
+void ClusterTest::WaitForWorkers(int workers) {
+  WaitForStatus(*client_, std::to_string(workers) + " workers", [&](const StatusReply& status) {
+    return int(status.workers.size()) == workers && std::ranges::all_of(status.workers, IsHeard);
+  });
+}
+
+void ClusterTest::WaitForSilence() {
+  const std::unique_ptr<Client> client = Connect(kOtherClient);
+  ASSERT_NE(client, nullptr);
+  WaitForStatus(*client, "a worker that is not heard",
+                [](const StatusReply& status) { return !std::ranges::all_of(status.workers, IsHeard); });
 }
 
 void ClusterTest::ExpectHealthy(int workers) {

@@ -43,12 +43,15 @@ class ClusterTest : public EndToEndTest {
   // There are `workers` workers, which are heard, and frames are as ever.
   void ExpectHealthy(int workers);
   void WaitForWorkers(int workers);
+  // Until there is a worker that was not heard for two seconds, as the coordinator tells another client on the other client's host.
+  void WaitForSilence();
 
   std::optional<Hosts> hosts_;
   std::unique_ptr<RunningProgram> coordinator_;
   std::vector<std::unique_ptr<RunningProgram>> workers_;
 
  private:
+  void WaitForStatus(Client& client, const std::string& expected, const std::function<bool(const StatusReply&)>& holds);
   std::vector<Result<Picture>> Render(Client& client, const std::vector<FrameRequest>& requests,
                                       const std::function<void()>& in_the_middle);
   void ExpectUndisturbed(const std::vector<Result<Picture>>& pictures) const;

@@ -1,10 +1,9 @@
-// Networks that fail in the middle of a frame. The lengths of failures are inputs; nothing is timed, but that every frame must end before
-// its deadline, which is shorter than a frame waits for messages that do not come.
+// Networks that fail in the middle of a frame. Nothing is timed, but every frame must end before its deadline, which is shorter than a frame
+// waits for messages that do not come.
 #include <gtest/gtest.h>
 
 #include <chrono>
 #include <csignal>
-#include <thread>
 
 #include "tests/network/cluster.h"
 #include "tests/network/proxy.h"
@@ -13,7 +12,6 @@ namespace slabstream {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 
 class LinksTest : public ClusterTest {
  protected:
@@ -40,7 +38,7 @@ class LinksTest : public ClusterTest {
 TEST_F(LinksTest, LinksOfAWorkerAndOfAClientGoDownAndUp) {
   RenderThrough([&] {
     for (const int host : {kFirstWorker, int(kClient)}) ASSERT_TRUE(hosts_->SetLink(host, false).ok());
-    std::this_thread::sleep_for(seconds(2));
+    WaitForSilence();
     for (const int host : {kFirstWorker, int(kClient)}) ASSERT_TRUE(hosts_->SetLink(host, true).ok());
   });
   ExpectHealthy(kWorkers);
