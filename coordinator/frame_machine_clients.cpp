@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
@@ -99,6 +100,11 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                              .silent_ms = Milliseconds(std::max(now - member.last_heard, Duration::zero())),
                              .leaving = member.leaving,
                              .memory_bytes = member.description.memory_bytes});
+  }
+  for (const RendererKind* kind : Renderers()) {
+    RendererStatus& renderer = reply.renderers.emplace_back(RendererStatus{std::string(kind->name()), std::string(kind->title()), {}, {}});
+    for (const Ability ability : kind->abilities()) renderer.abilities.emplace_back(NameOf(ability));
+    for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
   }
   SendClient(client, std::move(reply));
 }

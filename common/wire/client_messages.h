@@ -151,6 +151,13 @@ struct RefusedRequests {
   friend bool operator==(const RefusedRequests&, const RefusedRequests&) = default;
 };
 
+// A renderer of the service: what requests may ask of it.
+struct RendererStatus {
+  std::string name, title;
+  std::vector<std::string> abilities, parameters;  // names
+  friend bool operator==(const RendererStatus&, const RendererStatus&) = default;
+};
+
 struct StatusReply {
   Epoch epoch = 0;
   std::uint64_t nonce = 0;
@@ -162,6 +169,7 @@ struct StatusReply {
   std::vector<DatasetStatus> datasets;
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   RefusedRequests refused;
+  std::vector<RendererStatus> renderers = {};
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 
