@@ -25,6 +25,7 @@
 #include "client/service/service_state.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "common/cli/program.h"
 #include "common/keys/role.h"

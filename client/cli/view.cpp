@@ -16,6 +16,7 @@
 #include "client/cli/service_connection.h"
 #include "client/service/process.h"
 #include "client/service/service_state.h"
+#include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "data/volume_io/read_options.h"
 
