@@ -48,7 +48,9 @@ struct WorkerMachine::State {
   void On(MessageReceived&& event) {
     std::visit([&](auto& message) { On(std::move(message), event.payload); }, event.message);
   }
-  void On(const ImageUnreadable& unreadable);
+  void On(const ImageUnreadable& unreadable) {
+    if (worker == 0 || unreadable.image.epoch == epoch) links.Refuse(unreadable.image, actions);  // it may have overtaken the Welcome
+  }
   void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
   void On(const RenderDone& done);
   void On(const CombineDone& done);
@@ -69,8 +71,12 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(PartialImage&& partial, const Bytes& payload);
-  void On(const ImageReceived& received, const Bytes&);
-  void On(const ImageRefused& refused, const Bytes&);
+  void On(const ImageReceived& received, const Bytes&) {
+    if (received.epoch == epoch) links.On(received, now);
+  }
+  void On(const ImageRefused& refused, const Bytes&) {
+    if (refused.epoch == epoch) links.On(refused, actions);
+  }
 
   // ---- registration
   bool Heard(Epoch from);  // false: not from the coordinator that this worker is registered with
@@ -310,18 +316,6 @@ void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   }
   const GroupKey key = partial.key;
   if (const Status kept = early.Keep(std::move(partial), payload, now); !kept.ok()) Trouble(key, kept);
-}
-
-void WorkerMachine::State::On(const ImageUnreadable& unreadable) {
-  if (worker == 0 || unreadable.image.epoch == epoch) links.Refuse(unreadable.image, actions);  // it may have overtaken the Welcome
-}
-
-void WorkerMachine::State::On(const ImageReceived& received, const Bytes&) {
-  if (worker != 0 && received.epoch == epoch) links.On(received, now);
-}
-
-void WorkerMachine::State::On(const ImageRefused& refused, const Bytes&) {
-  if (worker != 0 && refused.epoch == epoch) links.On(refused, actions);
 }
 
 void WorkerMachine::State::On(const RenderDone& done) {

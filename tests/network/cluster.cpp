@@ -17,6 +17,7 @@ using std::chrono::milliseconds;
 constexpr char kDataset[] = "ball";
 // Less than the minute after which a frame without progress is handed out again.
 constexpr std::chrono::seconds kFrameDeadline{45};
+constexpr std::uint32_t kSilentMs = 2000;  // a worker has missed several heartbeats
 constexpr int kPictureSize = 512, kVolumeSize = 128, kGroups = 8;
 
 }  // namespace
@@ -158,12 +159,26 @@ void ClusterTest::WaitForWorkers(int workers) {
   std::string seen;
   while (MonotonicNow() < deadline) {
     const Result<StatusReply> status = client_->QueryStatus();
-    const auto heard = [](const WorkerStatus& worker) { return worker.silent_ms < 2000; };
+    const auto heard = [](const WorkerStatus& worker) { return worker.silent_ms < kSilentMs; };
     seen = status.ok() ? std::to_string(status->workers.size()) + " workers" : status.status().message();
     if (status.ok() && int(status->workers.size()) == workers && std::ranges::all_of(status->workers, heard)) return;
     (void)client_->Next(milliseconds(20));
   }
   FAIL() << "expected " << workers << " workers, there are " << seen;
+}
+
+void ClusterTest::WaitUntilAWorkerIsSilent() {
+  const std::unique_ptr<Client> observer = Connect(kCoordinator);
+  ASSERT_NE(observer, nullptr);
+  const auto silent = [](const WorkerStatus& worker) { return worker.silent_ms >= kSilentMs; };
+  const Time deadline = MonotonicNow() + kProgramTimeout;
+  while (MonotonicNow() < deadline) {
+    const Result<StatusReply> status = observer->QueryStatus();
+    ASSERT_TRUE(status.ok()) << status.status().message();
+    if (std::ranges::any_of(status->workers, silent)) return;
+    (void)observer->Next(milliseconds(20));
+  }
+  FAIL() << "the coordinator heard all workers";
 }
 
 void ClusterTest::ExpectHealthy(int workers) {

@@ -43,6 +43,8 @@ class ClusterTest : public EndToEndTest {
   // There are `workers` workers, which are heard, and frames are as ever.
   void ExpectHealthy(int workers);
   void WaitForWorkers(int workers);
+  // Until the coordinator has not heard some worker for a while. The coordinator's own host is asked, whatever happens to networks.
+  void WaitUntilAWorkerIsSilent();
 
   std::optional<Hosts> hosts_;
   std::unique_ptr<RunningProgram> coordinator_;

@@ -4,7 +4,6 @@
 
 #include <chrono>
 #include <csignal>
-#include <thread>
 
 #include "tests/network/cluster.h"
 #include "tests/network/proxy.h"
@@ -13,7 +12,6 @@ namespace slabstream {
 namespace {
 
 using std::chrono::milliseconds;
-using std::chrono::seconds;
 
 class LinksTest : public ClusterTest {
  protected:
@@ -40,7 +38,7 @@ class LinksTest : public ClusterTest {
 TEST_F(LinksTest, LinksOfAWorkerAndOfAClientGoDownAndUp) {
   RenderThrough([&] {
     for (const int host : {kFirstWorker, int(kClient)}) ASSERT_TRUE(hosts_->SetLink(host, false).ok());
-    std::this_thread::sleep_for(seconds(2));
+    WaitUntilAWorkerIsSilent();
     for (const int host : {kFirstWorker, int(kClient)}) ASSERT_TRUE(hosts_->SetLink(host, true).ok());
   });
   ExpectHealthy(kWorkers);

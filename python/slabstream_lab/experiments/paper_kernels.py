@@ -360,8 +360,7 @@ def _points(run: Run) -> Section:
 
 # What a volume of figure 12 is, by where it comes from.
 _SOURCES = {
-    "CT head": "No --volume was given, so figure 12 shows a CT head.",
-    "MRI brain": "No --volume was given and there is no CT head here, so figure 12 shows the MRI brain of Debian's mricron-data.",
+    "MRI brain": "No --volume was given, so figure 12 shows the MRI brain of Debian's mricron-data.",
     "--volume": "Figure 12 shows the volume that --volume named.",
 }
 
@@ -370,7 +369,7 @@ def pictures(run: Run) -> Section:
     pictures = run.attached("pictures")
     heads = pictures[pictures["figure"] == "Figure 12"]
     if heads.empty:
-        answer = "There is no figure 12: no --volume was given, and neither a CT head nor mricron-data is here."
+        answer = "There is no figure 12: no --volume was given, and mricron-data is not here."
     else:
         head = heads.iloc[0]
         answer = f"{_SOURCES[head['source']]} It is '{head['volume']}', {head['nx']} x {head['ny']} x {head['nz']} voxels."
