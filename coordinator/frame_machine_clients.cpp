@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/planning/resolve_look.h"
 #include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 

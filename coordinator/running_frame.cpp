@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"
+#include "common/planning/placement.h"
 
 namespace slabstream {
 
