@@ -11,6 +11,7 @@
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/resolve_look.h"
 #include "common/planning/team.h"
 #include "common/renderers/registry.h"
 #include "common/wire/validate_request.h"
