@@ -13,9 +13,22 @@
 
 namespace slabstream {
 
-// Calls render(tile, first, floats a row) for the parts of the image's bounds in each tile of the frame that `hidden` does not hide, in
-// parallel; `first` is where the tile's first pixel is stored. Charges the time of all threads to Stage::kSample. Returns early if
+// Calls render(number) for each number of `count` tiles, in parallel. Charges the time of all threads to Stage::kSample. Returns early if
 // `cancelled`.
+template <class Render>
+void ForEachTile(std::int32_t count, const std::atomic<bool>& cancelled, RankReport& report, Render&& render) {
+  std::atomic<std::int64_t> ns = 0;
+  tbb::parallel_for(0, count, [&](std::int32_t number) {
+    if (cancelled.load(std::memory_order_relaxed)) return;
+    const Time begin = MonotonicNow();
+    render(number);
+    ns += (MonotonicNow() - begin).count();
+  });
+  report.stage_ns[std::size_t(Stage::kSample)] += ns;
+}
+
+// Calls render(tile, first, floats a row) for the parts of the image's bounds in each tile of the frame that `hidden` does not hide, as
+// ForEachTile does; `first` is where the tile's first pixel is stored.
 template <class Render>
 void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const std::atomic<bool>& cancelled, RankReport& report, Render&& render) {
   const PixelBounds& bounds = image.bounds;
@@ -23,17 +36,13 @@ void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const std::atom
   const std::int32_t first_x = bounds.x_begin / kOcclusionTile, first_y = bounds.y_begin / kOcclusionTile;
   const std::int32_t columns = (bounds.x_end - 1) / kOcclusionTile + 1 - first_x, rows = (bounds.y_end - 1) / kOcclusionTile + 1 - first_y;
   const auto width = std::size_t(bounds.width());
-  std::atomic<std::int64_t> ns = 0;
-  tbb::parallel_for(0, columns * rows, [&](std::int32_t number) {
+  ForEachTile(columns * rows, cancelled, report, [&](std::int32_t number) {
     const std::int32_t x = (first_x + number % columns) * kOcclusionTile, y = (first_y + number / columns) * kOcclusionTile;
-    if (hidden.Hides(x, y) || cancelled.load(std::memory_order_relaxed)) return;
-    const Time begin = MonotonicNow();
+    if (hidden.Hides(x, y)) return;
     const PixelBounds tile = Intersection(bounds, {x, y, x + kOcclusionTile, y + kOcclusionTile});
     const std::size_t pixel = std::size_t(tile.y_begin - bounds.y_begin) * width + std::size_t(tile.x_begin - bounds.x_begin);
     render(tile, &image.rgba[4 * pixel], 4 * width);
-    ns += (MonotonicNow() - begin).count();
   });
-  report.stage_ns[std::size_t(Stage::kSample)] += ns;
 }
 
 }  // namespace slabstream

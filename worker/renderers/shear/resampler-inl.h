@@ -46,19 +46,9 @@ class Resampler : TileContext {
       auto least = Set(kLargest), greatest = Set(-kLargest);
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
         const Places places = PlacesOf(strip, row, column, 1, 2);
-        // Of each lane: the beams of the first place, then of the others in turn.
-        const float* from = room_.beams.data() + (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
-        auto a = hn::Load(df, from), b = hn::Load(df, from + kChunk), c = hn::Load(df, from + 2 * kChunk),
-             d = hn::Load(df, from + 3 * kChunk);
-        for (float at = places.first + 1; at <= places.last; ++at) {
-          from += kChunk;
-          const auto here = hn::Eq(places.beam, Set(at));
-          a = hn::IfThenElse(here, hn::Load(df, from), a);
-          b = hn::IfThenElse(here, hn::Load(df, from + kChunk), b);
-          c = hn::IfThenElse(here, hn::Load(df, from + 2 * kChunk), c);
-          d = hn::IfThenElse(here, hn::Load(df, from + 3 * kChunk), d);
-        }
-        const auto value = Reconstruct(WeightsAt(work_.kernel, places.t), a, b, c, d);
+        Floats beam[kSlots];
+        LoadBeams<1>(strip, places, column, beam);
+        const auto value = Reconstruct(WeightsAt(work_.kernel, places.t), beam[0], beam[1], beam[2], beam[3]);
         hn::Store(value, df, &to.values[row][chunk * kChunk + column]);
         if constexpr (std::is_same_v<T, float>) {  // values that are not finite tell nothing of their range
           const auto finite = hn::Le(hn::Abs(value), Set(kLargest));
@@ -99,22 +89,10 @@ class Resampler : TileContext {
     for (std::int32_t row = row_begin; row < row_end; ++row) {
       for (std::int32_t column = 0; column < kChunk; column += kVector) {
         const Places places = PlacesOf(strip, row, column, 0, 1);
-        const float* from = room_.beams.data() + 3 * (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
-        Floats a[3], b[3];
-        const auto load = [&](std::int32_t i) SLABSTREAM_INLINED { return hn::Load(df, from + i * kChunk); };
-        for (std::int32_t i = 0; i < 3; ++i) {
-          a[i] = load(i);
-          b[i] = load(3 + i);
-        }
-        for (float at = places.first + 1; at <= places.last; ++at) {
-          from += 3 * kChunk;
-          const auto here = hn::Eq(places.beam, Set(at));
-          for (std::int32_t i = 0; i < 3; ++i) {
-            a[i] = hn::IfThenElse(here, load(i), a[i]);
-            b[i] = hn::IfThenElse(here, load(3 + i), b[i]);
-          }
-        }
-        for (std::int32_t i = 0; i < 3; ++i) hn::Store(Lerp(places.t, a[i], b[i]), df, &to.along[i][row][chunk * kChunk + column]);
+        Floats along[6];  // x, y and z of one beam, and of the next
+        LoadBeams<3>(strip, places, column, along);
+        for (std::int32_t i = 0; i < 3; ++i)
+          hn::Store(Lerp(places.t, along[i], along[3 + i]), df, &to.along[i][row][chunk * kChunk + column]);
       }
     }
   }
@@ -165,6 +143,20 @@ class Resampler : TileContext {
     const auto lowest = Set(float(strip.beam_begin)), highest = Set(float(strip.beam_end - 1 - before - behind));
     const auto beam = hn::Min(hn::Max(hn::Sub(floor, Set(float(before))), lowest), highest);
     return {beam, hn::Sub(y, floor), hn::GetLane(hn::MinOfLanes(df, beam)), hn::GetLane(hn::MaxOfLanes(df, beam))};
+  }
+
+  // What pass 1 made, lane by lane, of the beams that `places` are made from. A beam has kLines lines in room_.beams.
+  template <std::int32_t kLines, std::size_t kCount>
+  HWY_INLINE void LoadBeams(const Strip& strip, const Places& places, std::int32_t column, Floats (&lines)[kCount]) const {
+    const FloatTag df;
+    // The beams of the first place, then of the others in turn.
+    const float* from = room_.beams.data() + kLines * (std::int32_t(places.first) - strip.beam_begin) * kChunk + column;
+    for (std::size_t i = 0; i < kCount; ++i) lines[i] = hn::Load(df, from + i * kChunk);
+    for (float at = places.first + 1; at <= places.last; ++at) {
+      from += kLines * kChunk;
+      const auto here = hn::Eq(places.beam, Set(at));
+      for (std::size_t i = 0; i < kCount; ++i) lines[i] = hn::IfThenElse(here, hn::Load(df, from + i * kChunk), lines[i]);
+    }
   }
 
   // Lattice points u_first + column ... at x along a beam, in samples of TurnedVoxels::Beam from a lattice point's first one on.

@@ -6,7 +6,6 @@
 //   3. once a transfer function, too: find where anything can be visible (ActiveCells)
 //   4. once a frame: tiles of the picture are separate tasks (ShearTile)
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +13,8 @@
 #include <tuple>
 #include <utility>
 
-#include "common/base/time.h"
+#include "worker/rays/ray_box.h"
+#include "worker/rays/render_tiles.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/shear/shear_tile.h"
 #include "worker/renderers/stage_clock.h"
@@ -70,12 +70,9 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
   const std::int32_t v_begin = turned ? bounds.x_begin : bounds.y_begin, v_end = turned ? bounds.x_end : bounds.y_end;
   const std::ptrdiff_t column = 4, row = 4 * std::ptrdiff_t{bounds.width()};
   const std::int32_t across = (u_end - u_begin - 1) / kTileColumns + 1, down = (v_end - v_begin - 1) / kTileRows + 1;
-  std::atomic<std::int64_t> ns = 0;
   std::atomic<std::uint64_t> shaded = 0;
   tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
-  tbb::parallel_for(0, across * down, [&](std::int32_t number) {
-    if (cancelled.load(std::memory_order_relaxed)) return;
-    const Time begin = MonotonicNow();
+  ForEachTile(across * down, cancelled, report, [&](std::int32_t number) {
     TilePixels tile;
     tile.u_begin = u_begin + number % across * kTileColumns;
     tile.v_begin = v_begin + number / across * kTileRows;
@@ -87,9 +84,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
     const PixelBounds pixels = turned ? PixelBounds{tile.v_begin, tile.u_begin, tile.v_end, tile.u_end}
                                       : PixelBounds{tile.u_begin, tile.v_begin, tile.u_end, tile.v_end};
     if (!work.hidden->HidesAll(pixels)) shaded += ShearTile(work, tile, *rooms.local());
-    ns += (MonotonicNow() - begin).count();
   });
-  report.stage_ns[std::size_t(Stage::kSample)] += ns;
   return shaded;
 }
 
@@ -118,12 +113,12 @@ class ShearRenderer : public Renderer {
                       .termination = float(setup.termination)};
     clock.Charge(Stage::kPrepare);
 
-    const Vec3 half = {0.5, 0.5, 0.5}, low = ToVec3(box.begin) - half, high = ToVec3(box.end) - half;
-    work.low = {float(low.x), float(low.y), float(low.z)};
-    work.high = {float(high.x), float(high.y), float(high.z)};
+    const SampledRegion owned = WholeBox(box);
+    work.low = ToFloat3(owned.low);
+    work.high = ToFloat3(owned.high);
     const Box active = Intersection(box, work.active->hull);
     RayReach reach;
-    if (!active.empty()) reach = ReachOfBox(rays, setup.camera, ToVec3(active.begin) - half, ToVec3(active.end) - half);
+    if (!active.empty()) reach = ReachOfBox(rays, setup.camera, WholeBox(active).low, WholeBox(active).high);
     work.k_begin = reach.begin;
     work.k_end = reach.end;
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);

@@ -4,11 +4,11 @@
 //   2. once a frame: move the cells' points to frame space (FrameSpace), and find the cells of each tile of the picture (CellBins)
 //   3. tiles are separate tasks (SliceTile)
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
 
 #include <cmath>
 
-#include "common/base/time.h"
+#include "worker/rays/ray_box.h"
+#include "worker/rays/render_tiles.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/slice/shown_cells.h"
 #include "worker/renderers/slice/slice_tile.h"
@@ -19,7 +19,7 @@ namespace {
 
 // The samples of the box, and pixels of the frame that they may lie in.
 RayReach SetBox(const Box& box, SliceWork& work) {
-  const Vec3 half = {0.5, 0.5, 0.5}, low = ToVec3(box.begin) - half, high = ToVec3(box.end) - half;
+  const auto& [low, high] = WholeBox(box);
   for (const Axis axis : kAxes) {
     const auto i = std::size_t(Number(axis));
     work.low[i] = float(low[axis]);
@@ -76,19 +76,15 @@ class SliceRenderer : public Renderer {
   static std::uint64_t RenderTiles(const SliceWork& work, const CellBins& bins, LocalImage& image, const std::atomic<bool>& cancelled,
                                    RankReport& report) {
     const auto width = std::size_t(image.bounds.width());
-    std::atomic<std::int64_t> ns = 0;
     std::atomic<std::uint64_t> drawn = 0;
     tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
-    tbb::parallel_for(0, bins.tiles(), [&](std::int32_t number) {
+    ForEachTile(bins.tiles(), cancelled, report, [&](std::int32_t number) {
       const std::span<const CellBins::Entry> cells = bins.CellsOf(number);
-      if (cells.empty() || cancelled.load(std::memory_order_relaxed)) return;
-      const Time begin = MonotonicNow();
+      if (cells.empty()) return;
       const PixelBounds tile = bins.TileAt(number);
       const std::size_t pixel = std::size_t(tile.y_begin - image.bounds.y_begin) * width + std::size_t(tile.x_begin - image.bounds.x_begin);
       drawn += SliceTile(work, tile, cells, *rooms.local(), &image.rgba[4 * pixel], 4 * width);
-      ns += (MonotonicNow() - begin).count();
     });
-    report.stage_ns[std::size_t(Stage::kSample)] += ns;
     return drawn;
   }
 };
