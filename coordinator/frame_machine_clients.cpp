@@ -34,7 +34,8 @@ void FrameMachine::State::On(const DatasetNews& event) {
       if (first) SendQueued(request, awaited->loading);
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
-    } else if (const auto& ready = std::get<DatasetReady>(news->second); request.dataset() != nullptr) {
+    } else if (const auto& ready = std::get<DatasetReady>(news->second);
+               request.dataset() != nullptr && request.dataset()->volume.dataset() == ready.dataset) {
       request.dataset()->seen = ready.seen;
     } else if (const Status suits = Classify(request, ready); suits.ok()) {
       SendQueued(request, false);
@@ -170,8 +171,8 @@ void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status
 void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status, RefusedAs as) {
   actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
   AnswerFailure(request, status, as);
-  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: dataset {}: {}", request.submit.request, request.client,
-       as == nullptr ? "ends without a frame" : "is refused", request.submit.frame.dataset, status.message());
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: {}", request.submit.request, request.client,
+       as == nullptr ? "ends without a frame: dataset " + request.submit.frame.dataset : "is refused", status.message());
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {

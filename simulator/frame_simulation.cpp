@@ -160,8 +160,9 @@ void FrameSimulation::OnPicture(std::uint32_t frame) {
 
 // Every dataset is there.
 void FrameSimulation::Perform(const ToDatasets& action) {
+  static const auto summary = std::make_shared<const VolumeSummary>();
   if (const auto* seek = std::get_if<SeekDataset>(&action)) {
-    service_.StepCoordinator(DatasetNews{.uses = {{seek->use, DatasetReady{1, std::make_shared<const VolumeSummary>()}}}});
+    service_.StepCoordinator(DatasetNews{.uses = {{seek->use, DatasetReady{1, summary}}}});
   }
 }
 

@@ -1,5 +1,4 @@
 // What is chosen where a policy leaves a choice.
-#include "common/planning/resolve_look.h"
 #include "coordinator/tuning/choose_policy.h"
 
 #include <gtest/gtest.h>
@@ -12,6 +11,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/resolve_look.h"
 #include "coordinator/tuning/service_machine.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/renderers.h"
