@@ -26,12 +26,11 @@ TEST(ValidateFrameRequest, AcceptsDefaultsAndLimits) {
 }
 
 TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
-  struct Case {
+  const std::string long_name(kMaxNameBytes + 1, 'x');
+  const struct {
     std::function<void(FrameRequest&)> change;
     std::string message;  // how it begins
-  };
-  const std::string long_name(kMaxNameBytes + 1, 'x');
-  const Case cases[] = {
+  } cases[] = {
       {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
       {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
       {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
@@ -64,7 +63,7 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.policy.groups = -1; }, "policy.groups is -1, but must lie in [0, 1024]"},
       {[&](auto& r) { r.policy.combine = long_name; }, "policy.combine has 257 bytes"},
   };
-  for (const Case& c : cases) {
+  for (const auto& c : cases) {
     FrameRequest request = SomeRequest();
     c.change(request);
     const Status status = Validate(request);
