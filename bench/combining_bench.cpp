@@ -141,7 +141,7 @@ class PreparedPicture : public Renderer {
   if (config.link == "sealed")
     options.keys = ClientKeys{MakeKeyPair().public_key, MakeKeyPair()};  // the coordinator's is not used over ipc
   options.share_memory = config.link == "shared";
-  options.compression = config.compression;
+  options.machine.compression = config.compression;
   options.make_renderer = [&](const RendererKind&) { return std::make_unique<PreparedPicture>(config, rank, shared); };
   auto service = WorkerService::Start(context, std::move(options));
   CHECK(service.ok()) << service.status().message();

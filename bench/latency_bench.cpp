@@ -12,7 +12,7 @@
 
 #include "bench/program.h"
 #include "bench/service_processes.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "common/base/check.h"
 #include "laboratory/measure/statistics.h"
 #include "tests/support/temporary_directory.h"
@@ -95,8 +95,8 @@ Measured MeasureProcesses(const Options& options, const std::string& listen, con
 
 Measured MeasureEmbedded(const Options& options, const std::shared_ptr<const Volume>& volume, int workers, int threads) {
   const auto load = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
-  Session session = Session::OpenLocal({.local_workers = workers, .local_threads = threads}, {load}).value();
-  return Measure(session.client(), session.dataset(), options);
+  ServiceConnection connection = ServiceConnection::OpenLocal({.local_workers = workers, .local_threads = threads}, {load}).value();
+  return Measure(connection.client(), connection.dataset(), options);
 }
 
 Status Run(const Options& options) {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "common/base/check.h"
+#include "common/base/program_beside.h"
 #include "common/volume/sphere.h"
 #include "data/volume_io/volume_reader.h"
 

@@ -5,11 +5,12 @@
 #include <deque>
 #include <iterator>
 #include <map>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "common/base/any_of.h"
 #include "common/base/log.h"
+#include "common/base/overloaded.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 #include "common/wire/validate_request.h"
@@ -52,22 +53,36 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   return picture;
 }
 
-// A question that has no answer yet.
+// A question or an order that has no answer yet.
 struct OpenQuestion {
-  Time submitted, deadline;
+  Duration patience{};
+  Time deadline;
+  bool order = false;  // services answer those at once; a wakeup ends the wait for one
 };
 
-constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
+struct Event {
+  RequestId request = 0;
+  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> what;
+};
 
-// Of an answer to a question or an order.
-std::optional<std::uint64_t> NonceOfAnswer(const CoordinatorToClient& message) {
-  if (const auto* status = std::get_if<StatusReply>(&message)) return status->nonce;
-  if (const auto* end = std::get_if<ShutDownReply>(&message)) return end->nonce;
-  if (const auto* keys = std::get_if<KeysReply>(&message)) return keys->nonce;
-  if (const auto* data = std::get_if<DataReply>(&message)) return data->nonce;
-  if (const auto* refused = std::get_if<OrderRefused>(&message)) return refused->nonce;
-  return std::nullopt;
+// Answers to orders are for those who wait for them.
+ClientEvent ToClientEvent(Event event) {
+  const auto what =
+      Overloaded{[](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
+                 [](AnyOf<SummaryReply, SampleReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
+                   return QuestionReply(std::move(reply));
+                 },
+                 [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
+                   return Status::Internal("the service answered another question");
+                 }};
+  return {event.request, std::visit(what, event.what)};
 }
+
+std::string Milliseconds(Duration duration) {
+  return std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) + " ms";
+}
+
+constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 }  // namespace
 
@@ -85,38 +100,23 @@ struct Client::Impl {
 
   Status NoAnswer(Duration timeout) const {
     if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
-    return Status::Unavailable("no service answers at " + endpoint + " within " +
-                               std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(timeout).count()) + " ms");
+    return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
   }
 
-  // Pumps until `done()`; false: the time is over. `woken` becomes true once a wakeup has ended a wait.
-  template <class Done>
-  bool PumpUntil(Duration timeout, Done&& done, bool* woken = nullptr) {
-    const Time limit = MonotonicNow() + timeout;
-    while (!done()) {
-      if (MonotonicNow() >= limit) return false;
-      const bool by_wakeup = Pump(limit);
-      if (woken != nullptr) *woken = *woken || by_wakeup;
-    }
-    return true;
-  }
-
-  // Sends a message and waits for its answer, of the type Answer. Errors: the service refused it, or did not answer in time.
-  template <class Answer, class Question>
-  Result<Answer> Ask(Question question_message, Duration timeout);
+  // Sends a question or an order, of the number that is returned. It ends with its answer or a Status.
+  template <class Message>
+  RequestId Ask(Message message, Duration patience);
+  // Waits for the end of what was submitted or asked. `Reply`: Picture, or the type of the answer.
+  template <class Reply>
+  Result<Reply> Await(RequestId id);
   void SendPing(Time now);
   bool Receive();  // true: something came
   void Handle(CoordinatorToClient& message, const Bytes& payload);
   void Handle(FrameReply& reply, const Bytes& payload);
   void Handle(const ClientPong& pong);
   void SubmitAgain(OpenRequest& lost);
-  // False: nobody waits for it.
-  bool EndQuestion(std::uint64_t nonce, std::variant<FrameProgress, Picture, QuestionReply, Status> end);
-  void ExpireQuestions(Time now);
-  // Waits for the end of a request that was submitted.
-  template <class Reply>
-  Result<Reply> Await(Client& client, RequestId id);
-  void End(RequestId request, Status status);  // with a failure
+  void End(RequestId request, decltype(Event::what) end);  // nothing happens if it has ended
+  bool ExpireQuestions(Time now);                          // true: some have ended
   void FailAll(const std::string& reason);
 
   std::string endpoint;
@@ -126,11 +126,9 @@ struct Client::Impl {
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
   std::map<RequestId, OpenRequest> open;
-  std::map<std::uint64_t, OpenQuestion> questions;         // by nonce
+  std::map<RequestId, OpenQuestion> questions;             // by nonce
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
-  std::deque<ClientEvent> events;
-  std::optional<CoordinatorToClient> answer;  // to the one question or order that waits for it
-  std::uint64_t question = 0;                 // its nonce
+  std::deque<Event> events;
   Time next_ping;
   std::optional<Time> unanswered_since;  // time of the first ping since the last message
 };
@@ -155,21 +153,20 @@ void Client::Impl::SendPing(Time now) {
 
 bool Client::Impl::Pump(Time limit) {
   // Messages that have already come are handled before silence is judged: the caller may have been busy elsewhere for long.
-  const bool received = Receive();
+  bool ready = Receive();
   Time now = MonotonicNow();
-  ExpireQuestions(now);
+  if (ExpireQuestions(now)) ready = true;
   if (!open.empty() || !questions.empty()) {
     if (unanswered_since && now - *unanswered_since >= timing.silence) {
-      FailAll("the service at " + endpoint + " has not answered for " +
-              std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(now - *unanswered_since).count()) + " ms");
+      FailAll("the service at " + endpoint + " has not answered for " + Milliseconds(now - *unanswered_since));
       return false;
     }
     if (now >= next_ping) SendPing(now);
     limit = std::min(limit, next_ping);
     if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
-    for (const auto& [nonce, question_asked] : questions) limit = std::min(limit, question_asked.deadline);
+    for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
   }
-  if (received) return false;  // a message may be what the caller waits for
+  if (ready) return false;  // this may be what the caller waits for
   const std::array<Socket*, 1> sockets = {&socket};
   now = MonotonicNow();
   const bool notified = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
@@ -197,41 +194,19 @@ bool Client::Impl::Receive() {
 }
 
 void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
-  if (const auto* progress = std::get_if<FrameProgress>(&message)) {
-    if (open.contains(progress->request)) events.push_back({progress->request, *progress});
-  } else if (auto* reply = std::get_if<FrameReply>(&message)) {
-    Handle(*reply, payload);
-  } else if (const auto* failed = std::get_if<FrameFailed>(&message)) {
-    End(failed->request, failed->status);
-  } else if (const auto* pong = std::get_if<ClientPong>(&message)) {
-    Handle(*pong);
-  } else if (auto* summary = std::get_if<SummaryReply>(&message)) {
-    EndQuestion(summary->nonce, QuestionReply(std::move(*summary)));
-  } else if (auto* samples = std::get_if<SampleReply>(&message)) {
-    EndQuestion(samples->nonce, QuestionReply(std::move(*samples)));
-  } else if (auto* picked = std::get_if<PickReply>(&message)) {
-    EndQuestion(picked->nonce, QuestionReply(std::move(*picked)));
-  } else if (const std::optional<std::uint64_t> nonce = NonceOfAnswer(message)) {
-    const auto* refused = std::get_if<OrderRefused>(&message);
-    if (refused != nullptr && EndQuestion(*nonce, refused->status)) return;
-    if (*nonce == question) answer = std::move(message);  // else it comes too late
-  } else {
-    LogWarning("client plane: dropped " + std::string(NameOf(message)) + ", which services do not send to clients");
-  }
-}
-
-template <class Answer, class Question>
-Result<Answer> Client::Impl::Ask(Question question_message, Duration timeout) {
-  answer.reset();
-  question_message.nonce = question = ++last_id;
-  (void)Send(question_message);
-  bool woken = false;
-  const auto ends_early = [&] { return answer.has_value() || woken; };
-  if (!PumpUntil(timeout, ends_early, &woken)) return NoAnswer(timeout);
-  if (!answer) return Status::Unavailable("the question to the service was given up");
-  if (const auto* refused = std::get_if<OrderRefused>(&*answer)) return refused->status;
-  if (auto* found = std::get_if<Answer>(&*answer)) return std::move(*found);
-  return Status::Internal("the service answered " + std::string(NameOf(*answer)));
+  const auto handle =
+      Overloaded{[&](const FrameProgress& progress) {
+                   if (open.contains(progress.request)) events.push_back({progress.request, progress});
+                 },
+                 [&](FrameReply& reply) { Handle(reply, payload); },
+                 [&](const FrameFailed& failed) { End(failed.request, failed.status); },
+                 [&](const ClientPong& pong) { Handle(pong); },
+                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+                 [&](AnyOf<SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
+                   End(reply.nonce, std::move(reply));
+                 },
+                 [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
+  std::visit(handle, message);
 }
 
 void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
@@ -284,29 +259,23 @@ void Client::Impl::SubmitAgain(OpenRequest& lost) {
   }
 }
 
-void Client::Impl::End(RequestId request, Status status) {
-  if (open.erase(request) > 0) events.push_back({request, std::move(status)});
+void Client::Impl::End(RequestId request, decltype(Event::what) end) {
+  if (open.erase(request) + questions.erase(request) > 0) events.push_back({request, std::move(end)});
 }
 
-bool Client::Impl::EndQuestion(std::uint64_t nonce, std::variant<FrameProgress, Picture, QuestionReply, Status> end) {
-  if (questions.erase(nonce) == 0) return false;
-  events.push_back({nonce, std::move(end)});
-  return true;
-}
-
-void Client::Impl::ExpireQuestions(Time now) {
-  std::vector<std::uint64_t> late;
-  for (const auto& [nonce, asked] : questions) {
-    if (now >= asked.deadline) late.push_back(nonce);
+bool Client::Impl::ExpireQuestions(Time now) {
+  const std::size_t asked = questions.size();
+  for (auto next = questions.begin(); next != questions.end();) {
+    const auto [nonce, question] = *next++;  // a copy: End removes it
+    if (now < question.deadline) continue;
+    const std::string text = "the service at " + endpoint + " has not answered within " + Milliseconds(question.patience);
+    End(nonce, question.order ? NoAnswer(question.patience) : Status::DeadlineExceeded(text));
   }
-  for (const std::uint64_t nonce : late) {
-    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(now - questions.at(nonce).submitted).count();
-    EndQuestion(nonce, Status::DeadlineExceeded("the service at " + endpoint + " has not answered within " + std::to_string(ms) + " ms"));
-  }
+  return questions.size() < asked;
 }
 
 void Client::Impl::FailAll(const std::string& reason) {
-  while (!questions.empty()) EndQuestion(questions.begin()->first, Status::Unavailable(reason));
+  while (!questions.empty()) End(questions.begin()->first, Status::Unavailable(reason));
   while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
   pinged.clear();
   unanswered_since.reset();
@@ -320,14 +289,12 @@ Result<Client> Client::Connect(Context& context, const ServiceAddress& service, 
   Client client(std::make_unique<Impl>(service.endpoint, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
   constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up
-  const auto connected_or = [&client](Duration time) {
-    return client.impl_->PumpUntil(time, [&] { return client.impl_->pinged.empty(); });
-  };
-  for (const Time end = MonotonicNow() + timeout;;) {
-    const Duration left = end - MonotonicNow();
-    if (connected_or(give_up ? std::min(left, kEachLook) : left)) return client;
-    if (MonotonicNow() >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
+  for (const Time end = MonotonicNow() + timeout; !client.impl_->pinged.empty();) {
+    const Time now = MonotonicNow();
+    if (now >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
+    client.impl_->Pump(give_up ? std::min(end, now + kEachLook) : end);
   }
+  return client;
 }
 
 Client::Client(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -356,20 +323,23 @@ RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
   return id;
 }
 
-RequestId Client::Submit(Question question, Duration deadline) {
-  const RequestId id = ++impl_->last_id;
-  std::visit([id](auto& query) { query.nonce = id; }, question);
-  const Time now = MonotonicNow();
-  impl_->questions.emplace(id, OpenQuestion{now, now + deadline});
+template <class Message>
+RequestId Client::Impl::Ask(Message message, Duration patience) {
+  const RequestId id = message.nonce = ++last_id;
+  questions[id] = {patience, MonotonicNow() + patience, AnyOf<Message, StatusQuery, ShutDown, KeysOrder, DataOrder>};
   // What the service would refuse to decode is refused here, by the same rules.
-  if (const auto checked = Decode<ClientToCoordinator>(Encode(question), 0); !checked.ok()) {
-    impl_->EndQuestion(id, checked.status());
-  } else if (impl_->questions.size() > kMaxOpenQuestions) {
-    impl_->EndQuestion(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenQuestions) + " questions may be open at once"));
-  } else if (const Status sent = impl_->Send(question); !sent.ok()) {
-    impl_->EndQuestion(id, Status::Unavailable("no service at " + impl_->endpoint + ": " + sent.message()));
+  if (const auto checked = Decode<ClientToCoordinator>(Encode(message), 0); !checked.ok()) {
+    End(id, checked.status());
+  } else if (questions.size() > kMaxOpenQuestions) {
+    End(id, Status::ResourceExhausted("at most " + std::to_string(kMaxOpenQuestions) + " questions may be open at once"));
+  } else if (const Status sent = Send(message); !sent.ok()) {
+    End(id, Status::Unavailable("no service at " + endpoint + ": " + sent.message()));
   }
   return id;
+}
+
+RequestId Client::Submit(Question question, Duration deadline) {
+  return std::visit([&](auto& query) { return impl_->Ask(std::move(query), deadline); }, question);
 }
 
 void Client::Cancel(RequestId request) {
@@ -388,46 +358,34 @@ std::optional<ClientEvent> Client::Next(Duration timeout) {
     woken = impl_->Pump(impl_->events.empty() ? limit : MonotonicNow());
   } while (impl_->events.empty() && !woken && MonotonicNow() < limit);
   if (impl_->events.empty()) return std::nullopt;
-  ClientEvent event = std::move(impl_->events.front());
+  ClientEvent event = ToClientEvent(std::move(impl_->events.front()));
   impl_->events.pop_front();
   return event;
 }
 
 template <class Reply>
-Result<Reply> Client::Impl::Await(Client& client, RequestId id) {
-  std::deque<ClientEvent> others;  // of other open requests
-  std::optional<Result<Reply>> end;
-  while (!end) {
-    std::optional<ClientEvent> event = client.Next(timing.ping);
-    if (!event) continue;
-    if (event->request != id) {
-      others.push_back(std::move(*event));
-    } else if (const auto* failure = std::get_if<Status>(&event->what)) {
-      end = *failure;
-    } else if constexpr (std::is_same_v<Reply, Picture>) {
-      auto* picture = std::get_if<Picture>(&event->what);
-      if (picture != nullptr && picture->final) end = std::move(*picture);
-    } else if (auto* reply = std::get_if<QuestionReply>(&event->what)) {
-      auto* wanted = std::get_if<Reply>(reply);
-      end = wanted != nullptr ? Result<Reply>(std::move(*wanted)) : Status::Internal("the service answered another question");
-    }
+Result<Reply> Client::Impl::Await(RequestId id) {
+  while (open.contains(id) || questions.contains(id)) {
+    const bool woken = Pump(Time::max());
+    if (const auto asked = questions.find(id); woken && asked != questions.end() && asked->second.order)
+      End(id, Status::Unavailable("the question to the service was given up"));
   }
-  events.insert(events.begin(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
-  return std::move(*end);
+  decltype(Event::what) end = std::move(std::ranges::find(events.rbegin(), events.rend(), id, &Event::request)->what);
+  std::erase_if(events, [id](const Event& event) { return event.request == id; });
+  if (auto* failure = std::get_if<Status>(&end)) return std::move(*failure);
+  if (auto* reply = std::get_if<Reply>(&end)) return std::move(*reply);
+  return Status::Internal("the service answered another question");
 }
 
-Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) {
-  return impl_->Await<Picture>(*this, Submit(request, deadline));
-}
+Result<Picture> Client::Render(const FrameRequest& request, Duration deadline) { return impl_->Await<Picture>(Submit(request, deadline)); }
 
 Result<SummaryReply> Client::Summarize(const std::string& dataset, const TransferChoice& transfer, Duration deadline) {
-  return impl_->Await<SummaryReply>(*this, Submit(SummaryQuery{.dataset = dataset, .transfer = transfer}, deadline));
+  return impl_->Await<SummaryReply>(impl_->Ask(SummaryQuery{.dataset = dataset, .transfer = transfer}, deadline));
 }
 
 Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline) {
   const std::size_t count = points.size();
-  Result<SampleReply> reply =
-      impl_->Await<SampleReply>(*this, Submit(SampleQuery{.dataset = dataset, .points = std::move(points)}, deadline));
+  Result<SampleReply> reply = impl_->Await<SampleReply>(impl_->Ask(SampleQuery{.dataset = dataset, .points = std::move(points)}, deadline));
   if (!reply.ok()) return reply.status();
   if (reply->samples.size() != count) {
     return Status::DataLoss("the service answered " + std::to_string(reply->samples.size()) + " of " + std::to_string(count) + " points");
@@ -435,22 +393,18 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
   return std::move(reply->samples);
 }
 
-Result<PickReply> Client::Pick(const FrameRequest& frame, double x, double y, Duration deadline) {
-  return impl_->Await<PickReply>(*this, Submit(PickQuery{.frame = frame, .x = x, .y = y}, deadline));
-}
+Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Await<StatusReply>(impl_->Ask(StatusQuery{}, timeout)); }
 
-Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Ask<StatusReply>(StatusQuery{}, timeout); }
-
-Status Client::ShutDownService(Duration timeout) { return impl_->Ask<ShutDownReply>(ShutDown{}, timeout).status(); }
+Status Client::ShutDownService(Duration timeout) { return impl_->Await<ShutDownReply>(impl_->Ask(ShutDown{}, timeout)).status(); }
 
 Result<std::vector<AdmittedKey>> Client::OrderKeys(KeysOrder order, Duration timeout) {
-  Result<KeysReply> reply = impl_->Ask<KeysReply>(std::move(order), timeout);
+  Result<KeysReply> reply = impl_->Await<KeysReply>(impl_->Ask(std::move(order), timeout));
   if (!reply.ok()) return reply.status();
   return std::move(reply->keys);
 }
 
 Result<std::vector<DatasetStatus>> Client::OrderData(DataOrder order, Duration timeout) {
-  Result<DataReply> reply = impl_->Ask<DataReply>(std::move(order), timeout);
+  Result<DataReply> reply = impl_->Await<DataReply>(impl_->Ask(std::move(order), timeout));
   if (!reply.ok()) return reply.status();
   return std::move(reply->datasets);
 }

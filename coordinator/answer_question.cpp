@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/resolve_look.h"
 #include "coordinator/probe/percentiles.h"
 #include "coordinator/probe/pick.h"
 

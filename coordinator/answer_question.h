@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "coordinator/frame_machine.h"
+#include "coordinator/dataset_machine.h"
 #include "coordinator/slab_server.h"
 
 namespace slabstream {

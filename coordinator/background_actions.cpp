@@ -170,17 +170,14 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
-  const auto refusal = [id = action.id, nonce = NonceOf(action.question)](const Status& why) {
-    return QuestionAnswered{id, OrderRefused{nonce, why}};
-  };
   return Post(
-      answers_, "answering a question",
-      [action, refusal, samples = slabs_.Find(action.dataset)] {
-        Result<QuestionReply> answer = AnswerTo(action, samples);
-        if (!answer.ok()) return News{refusal(answer.status())};
-        return News{QuestionAnswered{action.id, Widen<CoordinatorToClient>(*std::move(answer))}};
+      answers_, "an answer to a question",
+      [action, samples = slabs_.Find(action.dataset)] {
+        return News{QuestionAnswered{action.id, AnswerTo(action, samples)}};
       },
-      refusal);
+      [id = action.id](const Status& why) {
+        return QuestionAnswered{id, why};
+      });
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {

@@ -1,8 +1,8 @@
-// BackgroundActions: the actions of the coordinator's machine that take long, on threads of their own: up to kLoadsAtOnce load datasets or
+// BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets or
 // take memory for uploads, up to kLooksAtOnce look at files, two answer questions about voxels, one counts occupied voxels, one plans. None
-// waits for another. An exception in one fails only what it was doing. What they find comes back as events for the machine.
+// waits for another. An exception in one fails only what it was doing. What they find comes back as events for the machines.
 //
-// One thread uses an object of this class: the one that runs the machine.
+// One thread uses an object of this class: the one that runs the machines.
 #pragma once
 
 #include <atomic>
@@ -11,17 +11,21 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <variant>
 #include <vector>
 
 #include "common/base/background_tasks.h"
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
+#include "coordinator/dataset_machine.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 #include "coordinator/slab_server.h"
 #include "coordinator/upload_buffer.h"
 
 namespace slabstream {
+
+using CoordinatorEvent = Merged<FrameEvent, DatasetEvent>;
 
 // Called by the planning and the counting thread. Tests replace them by functions that fail or wait.
 using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;

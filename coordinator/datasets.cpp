@@ -31,6 +31,11 @@ const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
   return entry == entries_.end() ? nullptr : &entry->second;
 }
 
+bool DatasetTable::IsListed(const std::string& name) const {
+  const Entry* const entry = Find(name);
+  return entry != nullptr && entry->awaited == 0;
+}
+
 DatasetTable::Entry* DatasetTable::FindLoad(const std::string& name, LoadId load) {
   Entry* const entry = Find(name);
   return entry != nullptr && entry->state == DatasetState::kReady && entry->load == load ? entry : nullptr;

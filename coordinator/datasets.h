@@ -46,7 +46,8 @@ class DatasetTable {
 
   DatasetTable(Catalogue catalogue, std::set<std::string> folders);
 
-  Entry* Find(const std::string& name);  // null: neither in the catalogue nor awaited
+  bool IsListed(const std::string& name) const;  // in the catalogue
+  Entry* Find(const std::string& name);          // null: neither in the catalogue nor awaited
   const Entry* Find(const std::string& name) const;
   // Ready, by this load.
   Entry* FindLoad(const std::string& name, LoadId load);

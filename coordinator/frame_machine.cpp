@@ -8,10 +8,9 @@
 #include <optional>
 #include <utility>
 
+#include "common/base/overloaded.h"
 #include "common/planning/team.h"
 #include "common/planning/worker_memory.h"
-#include "common/renderers/registry.h"
-#include "common/volume/memory_budget.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
@@ -28,7 +27,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
     const auto waits = [&](const OpenRequest& request) {
-      return request.volume && request.volume->Whole() == *failed && request.needs_occupancy;
+      return request.needs_occupancy && request.dataset() != nullptr && request.dataset()->volume.Whole() == *failed;
     };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
@@ -39,25 +38,21 @@ void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
   const Result<int> fit =
       event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.summary) : Result<int>(event.frame.status());
+  const auto asked = [&](const OpenRequest& request) {
+    const auto* const ask = request.plan<PlanAsked>();
+    return ask != nullptr && ask->plan == event.plan ? ask : nullptr;
+  };
   if (fit.ok()) {
-    queue.ForEach([&](OpenRequest& request) {
-      if (request.plan != event.plan) return;
-      request.planned = *event.frame;
-      request.fit = *fit;
+    return queue.ForEach([&](OpenRequest& request) {
+      if (const PlanAsked* ask = asked(request)) request.dataset()->plan = PlanMade{*event.frame, *fit, ask->version};
     });
-  } else {
-    const auto is_it = [&](const OpenRequest& request) { return request.plan == event.plan && request.planned_for == roster.version(); };
-    const StatusCode code = fit.status().code();
-    const bool bad = code == StatusCode::kInvalidArgument || code == StatusCode::kNotFound;
-    const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
-    for (const OpenRequest& request : queue.Extract(is_it)) {
-      if (bad || too_large) {
-        RefuseRequest(request, fit.status(), bad ? &RefusedRequests::bad_request : &RefusedRequests::too_large);
-      } else {
-        FailRequest(request, fit.status());
-      }
-    }
   }
+  const StatusCode code = fit.status().code();
+  const bool bad = code == StatusCode::kInvalidArgument || code == StatusCode::kNotFound;
+  const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
+  const RefusedAs as = bad ? &RefusedRequests::bad_request : too_large ? &RefusedRequests::too_large : nullptr;
+  const auto is_it = [&](const OpenRequest& request) { return asked(request) != nullptr && asked(request)->version == roster.version(); };
+  for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, fit.status(), as);
 }
 
 Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const {
@@ -70,11 +65,11 @@ Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, con
 void FrameMachine::State::CountAhead() {
   std::size_t ahead = 0;
   queue.VisitInTurn([&](const OpenRequest& request) {
-    if (!request.volume || request.plan != 0 || !request.needs_occupancy) return true;
-    const ClassifiedVolume volume = request.volume->Whole();
+    const auto* const dataset = request.dataset();
+    if (dataset == nullptr || !request.needs_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
+    const ClassifiedVolume volume = dataset->volume.Whole();
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
-      const auto& summary = datasets.Find(request.submit.frame.dataset)->summary;
-      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = summary});
+      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->summary});
     }
     return ++ahead < kCountAhead;
   });
@@ -84,29 +79,30 @@ void FrameMachine::State::CountAhead() {
 void FrameMachine::State::PlanAhead() {
   std::size_t ahead = 0;
   const std::size_t most = frames.Room(roster.staying()) + kPlansAhead;
+  const auto is_present =
+      Overloaded{[](std::monostate) { return false; }, [this](const auto& plan) { return plan.version == roster.version(); }};
   queue.VisitInTurn([&](OpenRequest& request) {
-    if (!request.volume) return true;
-    const bool under_way = request.plan != 0 && request.planned_for == roster.version();
-    if (!under_way) {
-      if (WaitsForCount(request)) return true;
-      request.plan = ++last_plan;
-      request.planned_for = roster.version();
-      request.planned = nullptr;
-      planning.insert(request.plan);
-      actions.emplace_back(MakePlanRequest(request));
+    auto* const dataset = request.dataset();
+    if (dataset == nullptr) return true;
+    if (!std::visit(is_present, dataset->plan)) {
+      const auto occupied = request.needs_occupancy ? occupancy.Find(dataset->volume.Whole()) : nullptr;
+      if (request.needs_occupancy && occupied == nullptr) return true;  // it waits for the count
+      dataset->plan = PlanAsked{++last_plan, roster.version()};
+      planning.insert(last_plan);
+      actions.emplace_back(MakePlanRequest(request, occupied));
     }
     return ++ahead < most;
   });
 }
 
-PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
+PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
   const FrameRequest& frame = request.submit.frame;
-  Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), request.plan);
-  PlanRequest ask{.plan = request.plan,
+  Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), last_plan);
+  PlanRequest ask{.plan = last_plan,
                   .frame = frame,
-                  .volume = *request.volume,
-                  .summary = datasets.Find(frame.dataset)->summary,
-                  .occupied = request.needs_occupancy ? occupancy.Find(request.volume->Whole()) : nullptr,
+                  .volume = request.dataset()->volume,
+                  .summary = request.dataset()->summary,
+                  .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
                   .turn = team.turn};
   for (const Member& member : roster.members()) {
@@ -121,7 +117,9 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request) {
 void FrameMachine::State::DropPlans() {
   if (planning.empty()) return;
   std::set<PlanId> wanted;
-  queue.ForEach([&](const OpenRequest& request) { wanted.insert(request.plan); });
+  queue.ForEach([&](const OpenRequest& request) {
+    if (const auto* asked = request.plan<PlanAsked>()) wanted.insert(asked->plan);
+  });
   std::erase_if(planning, [&](PlanId plan) {
     if (wanted.contains(plan)) return false;
     actions.emplace_back(DropPlan{plan});
@@ -148,6 +146,7 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
   const Duration cost = frame.between_attempts() ? Duration::zero() : now - std::max(frame.attempt_begin(), last_end);
   queue.Settle(frame.request(), cost);
   last_end = now;
+  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
   frames.Remove(id);
   for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }
@@ -167,32 +166,21 @@ void FrameMachine::State::Expire() {
 
   const auto out_of_time = [&](const OpenRequest& request) { return now >= request.deadline(); };
   const auto without_workers = [&](const OpenRequest& request) { return now >= EndOfWait(request); };
-  const auto late = [&](const OpenRequest& request, const std::string& state) {
-    return Status::DeadlineExceeded("the frame was not finished within its " + std::to_string(request.submit.deadline_ms) +
-                                    " ms: " + state);
+  const auto late = [&](const OpenRequest& request, std::string_view state) {
+    return Status::DeadlineExceeded(fmt::format("the frame was not finished within its {} ms: {}", request.submit.deadline_ms, state));
   };
   const auto wait_seconds = std::chrono::duration_cast<std::chrono::seconds>(config.worker_wait).count();
   const Status no_worker = Status::Unavailable("no worker registered within " + std::to_string(wait_seconds) +
                                                " s, at least one is needed; start one with slabstream-worker");
 
-  for (const OpenRequest& request : queue.Extract(out_of_time)) {
-    const DatasetTable::Entry& dataset = *datasets.Find(request.submit.frame.dataset);
-    const bool counting = request.volume && occupancy.Counting(request.volume->Whole());
-    FailRequest(request, late(request, dataset.state != DatasetState::kReady ? "its dataset was still being loaded"
-                                       : !IsSeen(request)                    ? "its dataset's files were still being looked at"
-                                       : clients.IsBehind(request.client)    ? "this client did not read its earlier pictures"
-                                       : roster.empty()                      ? "there was no worker"
-                                       : counting                            ? "the occupied voxels of its dataset were still being counted"
-                                       : request.plan != 0 && !HasPlan(request) ? "it was still being planned"
-                                                                                : "it was still queued"));
-  }
+  for (const OpenRequest& request : queue.Extract(out_of_time)) FailRequest(request, late(request, WhatLacks(request)));
   for (const OpenRequest& request : queue.Extract(without_workers)) FailRequest(request, no_worker);
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
     const OpenRequest& request = frame.request();
     if (out_of_time(request)) {
-      FailFrame(frame, late(request, std::to_string(frame.groups_done()) + " of " + std::to_string(frame.group_count()) +
-                                         " groups were done at attempt " + std::to_string(frame.attempt())));
+      FailFrame(frame, late(request, fmt::format("{} of {} groups were done at attempt {}", frame.groups_done(), frame.group_count(),
+                                                 frame.attempt())));
     } else if (without_workers(request)) {
       FailFrame(frame, Status::Unavailable("all workers were lost, and " + no_worker.message()));
     } else if (const Status status = frame.Expire(now); !status.ok()) {
@@ -200,11 +188,21 @@ void FrameMachine::State::Expire() {
     }
   }
 
-  if (!datasets.folders.empty() && now >= next_round && !folder_looks.UnderWay()) LookAtEverything();
   if (!roster.empty() && now >= next_ping) {
     for (const Member& member : roster.members()) SendWorker(member.id, MakePing(member.id));
     next_ping = now + config.heartbeat;
   }
+}
+
+std::string_view FrameMachine::State::WhatLacks(const OpenRequest& request) const {
+  const auto* const dataset = request.dataset();
+  if (dataset == nullptr) return "its dataset was still being loaded";
+  if (!dataset->seen) return "its dataset's files were still being looked at";
+  if (clients.IsBehind(request.client)) return "this client did not read its earlier pictures";
+  if (roster.empty()) return "there was no worker";
+  if (occupancy.Counting(dataset->volume.Whole())) return "the occupied voxels of its dataset were still being counted";
+  const bool under_way = request.plan<PlanAsked>() != nullptr || (request.plan<PlanMade>() != nullptr && ReadyPlan(request) == nullptr);
+  return under_way ? "it was still being planned" : "it was still queued";
 }
 
 // Workers that are leaving finish what they have. If nobody else is there, that includes the frames that run; the others wait.
@@ -237,7 +235,7 @@ void FrameMachine::State::BeginAttempts() {
     Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
-      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.request().planned->asked.summary);
+      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.summary);
       if (fit.ok()) frame.SetFit(*fit);
       status = fit.status();
     }
@@ -261,9 +259,12 @@ void FrameMachine::State::DismissWorkers() {
 // Starts the first frame in turn that is planned for the present workers. False: there is none, or the workers' memory has no room for it
 // yet. None overtakes it then, so that it gets the room.
 bool FrameMachine::State::StartNextFrame() {
-  const auto ready = [&](const OpenRequest& open) { return HasPlan(open) && IsSeen(open) && !clients.IsBehind(open.client); };
+  const auto ready = [&](const OpenRequest& open) {
+    return ReadyPlan(open) != nullptr && open.dataset()->seen && !clients.IsBehind(open.client);
+  };
   const OpenRequest* const next = queue.FindNext(ready);
-  if (next == nullptr || !frames.HasRoomFor(*next)) return false;
+  if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
+  actions.emplace_back(ToDatasets(KeepDataset{next->use, next->dataset()->volume.dataset()}));
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
@@ -286,7 +287,7 @@ void FrameMachine::State::StopAll(const CoordinatorToWorker& goodbye, const std:
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
   for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));
-  for (const auto& [id, open] : questions) RefuseQuestion(open, Status::Unavailable(reason));
+  actions.emplace_back(ToDatasets(EndDatasets{reason}));
   for (const Member& member : roster.members()) SendWorker(member.id, goodbye);
   actions.emplace_back(StopService{});
   stopped = true;
@@ -302,7 +303,6 @@ Time FrameMachine::State::EndOfWait(const OpenRequest& request) const {
 
 Time FrameMachine::State::NextWake() {
   Time next = std::min(roster.NextWake(), clients.NextWake());
-  if (!datasets.folders.empty() && !folder_looks.UnderWay()) next = std::min(next, next_round);
   const auto consider = [&](const OpenRequest& request) {
     next = std::min(next, request.deadline());
     next = std::min(next, EndOfWait(request));
@@ -325,15 +325,11 @@ FrameMachine::FrameMachine(CoordinatorConfig config) : state_(std::make_unique<S
 FrameMachine::~FrameMachine() = default;
 FrameMachine::FrameMachine(FrameMachine&&) noexcept = default;
 
-std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event, Time now) {
+std::vector<FrameAction> FrameMachine::Step(const FrameEvent& event, Time now) {
   State& state = *state_;
   if (state.stopped) return {};
   state.now = now;
-  if (!state.started) {
-    state.started = now;
-    state.next_round = now + state.config.look_interval;
-    state.datasets.ForEach([now](const std::string&, DatasetTable::Entry& entry) { entry.since = now; });
-  }
+  if (!state.started) state.started = now;
   if (now > state.wake) {
     // The executor was held up (a stopped process, a busy machine): unread messages are no silence of the others.
     state.roster.Postpone(now - state.wake, now);
@@ -344,9 +340,7 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
   if (!state.stopped) {
     state.Expire();
     state.Advance();
-    state.AskExecutor();
     state.DropPlans();
-    state.UnloadRetired();
   }
   state.wake = state.stopped ? Time::max() : state.NextWake();
   return std::exchange(state.actions, {});
@@ -354,10 +348,8 @@ std::vector<CoordinatorAction> FrameMachine::Step(const CoordinatorEvent& event,
 
 Time FrameMachine::NextWake() const { return state_->wake; }
 
-CoordinatorSizes FrameMachine::sizes() const {
-  State& state = *state_;
-  std::size_t awaited = 0;
-  state.datasets.ForEach([&](const std::string&, const DatasetTable::Entry& entry) { awaited += entry.awaited != 0 ? 1 : 0; });
+FrameSizes FrameMachine::sizes() const {
+  const State& state = *state_;
   return {.clients = state.clients.size(),
           .queued = state.queue.size(),
           .running = state.frames.size(),
@@ -366,12 +358,7 @@ CoordinatorSizes FrameMachine::sizes() const {
           .counting = state.occupancy.counting(),
           .grids = state.occupancy.grids(),
           .workers = state.roster.members().size(),
-          .slots = state.roster.slots().slots.size(),
-          .orders = state.orders.size(),
-          .awaited = awaited,
-          .retired = state.datasets.retired(),
-          .questions = state.questions.size(),
-          .uploads = state.uploads.size()};
+          .slots = state.roster.slots().slots.size()};
 }
 
 }  // namespace slabstream

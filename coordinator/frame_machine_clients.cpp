@@ -1,35 +1,62 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/planning/resolve_look.h"
+#include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
 namespace slabstream {
-
-void FrameMachine::State::On(const BadRequest& event) {
-  ++refused.bad_request;
-  Tell(NoteAbout::kFrames, LogLevel::kInfo, "a request of client {} is refused: {}", event.from, event.why.message());
-  if (const auto* order = std::get_if<OrderRefused>(&event.answer)) {
-    if (const Upload upload = UploadOf(event.from, order->nonce); upload != uploads.end()) return EndUpload(upload, event.why);
-  }
-  SendClient(event.from, event.answer);
-}
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& message) {
   clients.Meet(client, now);
   if (IsOpen(client, message.request)) return;
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
 
+  const Policy& policy = message.frame.policy;
   OpenRequest request{.client = client, .submit = message, .arrived = now};
-  const std::string& name = message.frame.dataset;
-  if (datasets.folders.empty() && datasets.Find(name) == nullptr) {
-    return RefuseRequest(request, datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset);
+  if (Status names = CheckNames(policy); !names.ok()) return FailRequest(request, names, &RefusedRequests::bad_request);
+  if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
+  request.needs_occupancy = NeedsOccupancy(policy);
+  request.use = ++last_use;
+  queue.Push(std::move(request));
+  actions.emplace_back(ToDatasets(SeekDataset{last_use, message.frame.dataset}));
+}
+
+void FrameMachine::State::On(const DatasetNews& event) {
+  for (const DatasetId dataset : event.unloaded) occupancy.Forget(dataset);
+  std::map<UseId, DatasetLost> lost;
+  queue.ForEach([&](OpenRequest& request) {
+    const auto news = event.uses.find(request.use);
+    if (news == event.uses.end()) return;
+    if (const auto* awaited = std::get_if<DatasetAwaited>(&news->second)) {
+      const bool first = std::holds_alternative<OpenRequest::Submitted>(request.state);
+      request.state = OpenRequest::AwaitsDataset{};  // DropPlans drops a plan that it had
+      if (first) SendQueued(request, awaited->loading);
+    } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
+      lost[request.use] = *ended;
+    } else if (const auto& ready = std::get<DatasetReady>(news->second); request.dataset() != nullptr) {
+      request.dataset()->seen = ready.seen;
+    } else if (const Status suits = Classify(request, ready); suits.ok()) {
+      SendQueued(request, false);
+    } else {
+      lost[request.use] = {suits, &RefusedRequests::bad_request};
+    }
+  });
+  for (const OpenRequest& request : queue.Extract([&](const OpenRequest& each) { return lost.contains(each.use); })) {
+    FailRequest(request, lost.at(request.use).why, lost.at(request.use).refused);
   }
-  if (Status names = CheckNames(message.frame.policy); !names.ok()) return RefuseRequest(request, names, &RefusedRequests::bad_request);
-  if (Status quota = WithinQuota(client); !quota.ok()) return RefuseRequest(request, quota, &RefusedRequests::over_quota);
-  request.needs_occupancy = NeedsOccupancy(message.frame.policy);
-  if (Status sought = Seek(request); !sought.ok()) return RefuseRequest(request, sought, &RefusedRequests::bad_request);
-  queue.Push(request);
-  SendQueued(request);
+}
+
+// NotFound: no such preset; InvalidArgument: clipping or layers do not suit the dataset.
+Status FrameMachine::State::Classify(OpenRequest& request, const DatasetReady& ready) const {
+  const FrameRequest& frame = request.submit.frame;
+  Result<VolumeLook> look = ResolveLook(frame, *ready.summary);
+  if (!look.ok()) return look.status();
+  request.state = OpenRequest::HasDataset{
+      .volume = {ready.dataset, std::move(look->transfer), FindRenderer(frame.renderer), std::move(look->clip), std::move(look->layers)},
+      .summary = ready.summary,
+      .seen = ready.seen};
+  return Status::Ok();
 }
 
 Status FrameMachine::State::WithinQuota(PeerToken client) const {
@@ -84,7 +111,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                     .frames_done = frames_done,
                     .frames_failed = frames_failed,
                     .workers_lost = workers_lost,
-                    .datasets = datasets.Report(now),
+                    .datasets = {},
                     .memory_bytes = config.memory_bytes,
                     .refused = refused};
   for (const Member& member : roster.members()) {
@@ -100,7 +127,12 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
                              .leaving = member.leaving,
                              .memory_bytes = member.description.memory_bytes});
   }
-  SendClient(client, std::move(reply));
+  for (const RendererKind* kind : Renderers()) {
+    RendererStatus& renderer = reply.renderers.emplace_back(RendererStatus{std::string(kind->name()), std::string(kind->title()), {}, {}});
+    for (const Ability ability : kind->abilities()) renderer.abilities.emplace_back(NameOf(ability));
+    for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
+  }
+  actions.emplace_back(ToDatasets(FinishStatus{client, std::move(reply)}));
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& message) {
@@ -108,8 +140,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& mess
   StopAll(Stop{.epoch = config.epoch}, "the service was shut down");
 }
 
-void FrameMachine::State::SendQueued(const OpenRequest& request) {
-  const bool loading = datasets.Find(request.submit.frame.dataset)->state == DatasetState::kLoading;
+void FrameMachine::State::SendQueued(const OpenRequest& request, bool loading) {
   SendClient(request.client, FrameProgress{.request = request.submit.request,
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
@@ -126,30 +157,27 @@ void FrameMachine::State::EndRequest(PeerToken client, RequestId request, Coordi
   clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
 }
 
-void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status& status) {
+void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status& status, RefusedAs as) {
   EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
-  if (status.code() != StatusCode::kCancelled) ++frames_failed;
+  if (as != nullptr) {
+    ++(refused.*as);
+  } else if (status.code() != StatusCode::kCancelled) {
+    ++frames_failed;
+  }
 }
 
 // Of a request whose frame has not begun.
-void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status) {
-  AnswerFailure(request, status);
-  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} ends without a frame: dataset {}: {}", request.submit.request,
-       request.client, request.submit.frame.dataset, status.message());
-}
-
-void FrameMachine::State::RefuseRequest(const OpenRequest& request, const Status& status, Refusal reason) {
-  ++(refused.*reason);
-  EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
-  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} is refused: {}", request.submit.request, request.client,
-       status.message());
+void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status, RefusedAs as) {
+  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  AnswerFailure(request, status, as);
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: dataset {}: {}", request.submit.request, request.client,
+       as == nullptr ? "ends without a frame" : "is refused", request.submit.frame.dataset, status.message());
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
-  if (const Upload upload = UploadOf(client); upload != uploads.end()) EndUpload(upload, Status::Unavailable("its client has gone"));
-  std::erase_if(questions, [client](const auto& open) { return open.second.client == client; });
+  actions.emplace_back(ToDatasets(ForgetClient{client}));
   if (!clients.Forget(client)) return;
-  queue.Forget(client);
+  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());

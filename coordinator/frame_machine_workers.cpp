@@ -70,7 +70,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
     return;
   }
   reply.statistics = frame->Statistics(now);
-  if (request.planned->teaches()) actions.emplace_back(FrameMeasured{request.planned, reply.statistics.reports});
+  if (frame->planned()->teaches()) actions.emplace_back(FrameMeasured{frame->planned(), reply.statistics.reports});
   EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
   ++frames_done;
   EndFrame(message.frame, "done");

@@ -44,9 +44,9 @@ FrameWindow FramesInFlight::Window(std::size_t workers) const {
 }
 
 // Frames of other sizes count as if they took as much as this one, or as the largest that runs: a mixture takes less.
-bool FramesInFlight::HasRoomFor(const OpenRequest& request) const {
-  const auto teams = std::size_t(request.planned->plan.turn.teams);
-  return frames_.empty() || frames_.size() < std::size_t(request.fit) * teams;
+bool FramesInFlight::HasRoomFor(const PlanMade& plan) const {
+  const auto teams = std::size_t(plan.frame->plan.turn.teams);
+  return frames_.empty() || frames_.size() < std::size_t(plan.fit) * teams;
 }
 
 std::size_t FramesInFlight::Room(std::size_t workers) const {

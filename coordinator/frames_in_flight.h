@@ -28,8 +28,8 @@ class FramesInFlight {
   Choice Next(std::size_t workers);
   // How many more frames `workers` workers may have under way.
   std::size_t Room(std::size_t workers) const;
-  // Whether the workers' memory has room for this frame, which is planned, beside those that run.
-  bool HasRoomFor(const OpenRequest& request) const;
+  // Whether the workers' memory has room for a frame of this plan beside those that run.
+  bool HasRoomFor(const PlanMade& plan) const;
 
   // Frames that workers may forget: all before finished_before(), and cancelled(): of later ones that are over, the newest kMaxCancelled.
   FrameId finished_before() const { return frames_.empty() ? next_id() : frames_.front().id(); }

@@ -55,7 +55,10 @@ std::vector<OpenRequest> RequestQueue::Extract(const Predicate& wanted) {
   return extracted;
 }
 
-void RequestQueue::Forget(PeerToken client) { clients_.erase(client); }
+std::deque<OpenRequest> RequestQueue::Forget(PeerToken client) {
+  auto forgotten = clients_.extract(client);
+  return forgotten.empty() ? std::deque<OpenRequest>() : std::move(forgotten.mapped().requests);
+}
 
 void RequestQueue::ForEach(const std::function<void(OpenRequest&)>& visit) {
   for (auto& [client, queue] : clients_) {

@@ -12,33 +12,55 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
+#include <variant>
 #include <vector>
 
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
-#include "coordinator/look_counter.h"
+#include "coordinator/machines.h"
 #include "coordinator/peer_token.h"
 #include "coordinator/plan_request.h"
 
 namespace slabstream {
 
+// Plans for the workers of a LiveRoster::version().
+struct PlanAsked {
+  PlanId plan = 0;
+  std::uint64_t version = 0;
+};
+struct PlanMade {
+  std::shared_ptr<const PlannedFrame> frame;
+  int fit = 1;  // such frames fit the workers' memory at a time (FramesThatFit), >= 1
+  std::uint64_t version = 0;
+};
+
 struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
-  bool needs_occupancy = false;                 // of its policy (NeedsOccupancy)
-  std::optional<ClassifiedVolume> volume;       // none: its dataset is not loaded yet
-  LookId look = 0;                              // at its dataset's files, which must be over before the frame begins; 0: none
-  PlanId plan = 0;                              // the requested plan; 0: none
-  std::uint64_t planned_for = 0;                // LiveRoster::version() when it was
-  std::shared_ptr<const PlannedFrame> planned;  // null: not yet
-  int fit = 1;                                  // such frames fit the workers' memory at a time (FramesThatFit), >= 1; once planned
+  UseId use = 0;                 // of its dataset
+  bool needs_occupancy = false;  // of its policy (NeedsOccupancy)
+
+  struct Submitted {};  // it has sought its dataset
+  struct AwaitsDataset {};
+  struct HasDataset {
+    ClassifiedVolume volume;
+    std::shared_ptr<const VolumeSummary> summary;  // of it
+    bool seen = false;                             // DatasetReady::seen: its frame may begin
+    std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
+  };
+  std::variant<Submitted, AwaitsDataset, HasDataset> state = {};
 
   Duration charged{};  // for it, until it is settled; once taken
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
   bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
+  HasDataset* dataset() { return std::get_if<HasDataset>(&state); }  // null: not yet
+  const HasDataset* dataset() const { return std::get_if<HasDataset>(&state); }
+  template <class Plan>
+  const Plan* plan() const {  // PlanAsked or PlanMade; null: not at this stage
+    return dataset() == nullptr ? nullptr : std::get_if<Plan>(&dataset()->plan);
+  }
 };
 
 class RequestQueue {
@@ -52,7 +74,7 @@ class RequestQueue {
   // The frame of a request that was taken has ended. `cost`: the time that the service spent on it.
   void Settle(const OpenRequest& taken, Duration cost);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
-  void Forget(PeerToken client);                              // its requests, and what it has used
+  std::deque<OpenRequest> Forget(PeerToken client);           // takes its requests out, and what it has used
 
   void ForEach(const std::function<void(OpenRequest&)>& visit);  // client by client, then in order of arrival
   // In the order in which they are served if all are ready and cost what is expected of them, until `visit` returns false.

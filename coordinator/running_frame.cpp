@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"
+#include "common/planning/placement.h"
 
 namespace slabstream {
 
@@ -27,8 +28,10 @@ std::int64_t Nanoseconds(Time time) { return time.time_since_epoch().count(); }
 RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& limits, Time now)
     : id_(id),
       request_(std::move(request)),
-      plan_(request_.planned->plan),
-      roster_(request_.planned->asked.roster),
+      planned_(request_.plan<PlanMade>()->frame),
+      fit_(request_.plan<PlanMade>()->fit),
+      plan_(planned_->plan),
+      roster_(planned_->asked.roster),
       limits_(limits),
       begin_(now),
       attempt_begin_(now),
@@ -39,10 +42,10 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
 }
 
 std::uint32_t RunningFrame::unfinished_groups() const {
-  return attempt_due_ || next_group_ < groups_done_ ? 0 : next_group_ - groups_done_;
+  return between_attempts() || next_group_ < groups_done_ ? 0 : next_group_ - groups_done_;
 }
 
-bool RunningFrame::waiting() const { return !attempt_due_ && (next_group_ > groups_done_ || groups_done_ == group_count()); }
+bool RunningFrame::waiting() const { return !between_attempts() && (next_group_ > groups_done_ || groups_done_ == group_count()); }
 
 bool RunningFrame::HasPart(WorkerId worker) const { return worker == plan_.display || RendersFrom(groups_done_, worker); }
 
@@ -77,15 +80,21 @@ std::vector<WorkerId> RunningFrame::Participants() const {
   return workers;
 }
 
-bool RunningFrame::CanHandOut() const { return !attempt_due_ && !handing_over_ && next_group_ < group_count(); }
+bool RunningFrame::CanHandOut() const { return under_way() != nullptr && !under_way()->handing_over && next_group_ < group_count(); }
 
 bool RunningFrame::IsNextOf(WorkerId worker) const {
   return (next_group_ == 0 && worker == plan_.display) || RendersFrom(next_group_, worker);
 }
 
 void RunningFrame::HandOver(const Roster& roster) {
-  handing_over_ = std::ranges::any_of(roster.slots, [this](WorkerId worker) { return CanRender(worker); }) &&
-                  std::ranges::any_of(roster.leaving, [this](WorkerId worker) { return IsNextOf(worker); });
+  if (under_way() == nullptr) return;
+  under_way()->handing_over = std::ranges::any_of(roster.slots, [this](WorkerId worker) { return CanRender(worker); }) &&
+                              std::ranges::any_of(roster.leaving, [this](WorkerId worker) { return IsNextOf(worker); });
+}
+
+bool RunningFrame::AttemptDue(Time now) const {
+  if (const auto* between = std::get_if<BetweenAttempts>(&state_)) return now >= between->end;
+  return under_way()->handing_over && unfinished_groups() == 0;
 }
 
 RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
@@ -114,10 +123,10 @@ Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
     if (!CanRender(worker)) worker = 0;
   }
   // A display worker that is leaving stays one only for what it has accumulated.
-  if (groups_done_ == 0 || display_in_doubt_) able.leaving.clear();
+  if (groups_done_ == 0 || display_in_doubt()) able.leaving.clear();
   Result<FramePlan> plan = Replan(plan_, able);
   if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
-  const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt_;
+  const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt();
   plan_ = std::move(plan).value();
   roster_ = std::move(able);
   displays_.push_back(plan_.display);
@@ -130,10 +139,7 @@ Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
   // A display worker that has all groups is asked for the last one again: its answer is the picture that did not arrive.
   first_group_ = next_group_ = std::min(groups_done_, group_count() - 1);
   groups_done_ = first_group_;
-  attempt_due_.reset();
-  handing_over_ = false;
-  display_in_doubt_ = false;
-  suspicion_.reset();
+  state_ = UnderWay{};
   last_progress_ = attempt_begin_ = now;
   return Status::Ok();
 }
@@ -186,19 +192,22 @@ RunningFrame::Use RunningFrame::OnImage(const FrameImage& message, Time now) {
 
 void RunningFrame::OnHeartbeat(WorkerId worker, bool progressed, Time now) {
   if (progressed && unfinished_groups() > 0 && HasPart(worker) && !moved_on_.contains(worker)) last_progress_ = now;
-  if (suspicion_ && suspicion_->accused == worker && now > suspicion_->proof_after) suspicion_->until = now;
+  if (under_way() == nullptr) return;
+  std::optional<Suspicion>& suspicion = under_way()->suspicion;
+  if (suspicion && suspicion->accused == worker && now > suspicion->proof_after) suspicion->until = now;
 }
 
 void RunningFrame::OnOvertaken(const std::vector<WorkerId>& workers) { moved_on_.insert(workers.begin(), workers.end()); }
 
 Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_word, Time now) {
-  if (suspicion_ && suspicion_->accused == worker) suspicion_.reset();
-  if (!HasPart(worker)) return Status::Ok();
+  if (!HasPart(worker)) {
+    if (under_way() != nullptr && under_way()->suspicion && under_way()->suspicion->accused == worker) under_way()->suspicion.reset();
+    return Status::Ok();
+  }
   // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
   const bool died_of_it = last_word && *last_word > attempt_begin_;
   const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
-  if (worker == plan_.display) display_in_doubt_ = true;
-  attempt_due_ = now;
+  state_ = BetweenAttempts{now, worker == plan_.display || display_in_doubt()};
   return status;
 }
 
@@ -219,7 +228,7 @@ Status RunningFrame::NoteDeath(WorkerId worker) {
 
 // Messages on the old connection may be lost, so another attempt sends all of them again. A worker that has done its part answers at once.
 void RunningFrame::OnReconnection(WorkerId worker, Time now) {
-  if (HasPart(worker) && !attempt_due_) attempt_due_ = now;
+  if (HasPart(worker) && !between_attempts()) state_ = BetweenAttempts{now};
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
@@ -230,31 +239,31 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
     unable_.insert(message.worker);
     inability_ = reason;
   }
-  if (attempt_due_) return Status::Ok();
+  if (between_attempts()) return Status::Ok();
   if (message.unreachable != 0) {
-    if (!suspicion_) {
-      suspicion_ = {.accused = message.unreachable,
-                    .accuser = message.worker,
-                    .proof_after = now + limits_.proof_of_life,
-                    .until = now + limits_.suspicion};
+    if (!under_way()->suspicion) {
+      under_way()->suspicion = {.accused = message.unreachable,
+                                .accuser = message.worker,
+                                .proof_after = now + limits_.proof_of_life,
+                                .until = now + limits_.suspicion};
     }
     return Status::Ok();
   }
-  if (message.worker == plan_.display) display_in_doubt_ = true;
-  return CountStall(reason, message.elsewhere ? Duration::zero() : limits_.pause * stalls_, now);
+  const Duration pause = message.elsewhere ? Duration::zero() : limits_.pause * stalls_;
+  return CountStall(reason, {now + pause, message.worker == plan_.display});
 }
 
 Status RunningFrame::Expire(Time now) {
-  if (attempt_due_) return Status::Ok();
-  if (suspicion_ && now >= suspicion_->until) {
+  if (between_attempts()) return Status::Ok();
+  if (const std::optional<Suspicion> suspicion = under_way()->suspicion; suspicion && now >= suspicion->until) {
     inability_ =
-        Status::Unavailable(WorkerName(suspicion_->accuser) + " cannot reach " + WorkerName(suspicion_->accused) + ", which is alive");
-    unable_.insert(CulpritOf(*suspicion_));
-    return CountStall(inability_, Duration::zero(), now);
+        Status::Unavailable(WorkerName(suspicion->accuser) + " cannot reach " + WorkerName(suspicion->accused) + ", which is alive");
+    unable_.insert(CulpritOf(*suspicion));
+    return CountStall(inability_, {now});
   }
   if (waiting() && now >= last_progress_ + limits_.stall_timeout) {
     const auto seconds = std::chrono::duration_cast<std::chrono::seconds>(limits_.stall_timeout).count();
-    return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), Duration::zero(), now);
+    return CountStall(Status::Unavailable("no progress for " + std::to_string(seconds) + " s"), {now});
   }
   return Status::Ok();
 }
@@ -268,25 +277,25 @@ WorkerId RunningFrame::CulpritOf(const Suspicion& suspicion) {
 
 void RunningFrame::Postpone(Duration duration) {
   last_progress_ += duration;
-  if (!suspicion_) return;
-  suspicion_->proof_after += duration;
-  suspicion_->until += duration;
+  if (under_way() == nullptr || !under_way()->suspicion) return;
+  under_way()->suspicion->proof_after += duration;
+  under_way()->suspicion->until += duration;
 }
 
-Status RunningFrame::CountStall(const Status& reason, Duration pause, Time now) {
+Status RunningFrame::CountStall(const Status& reason, BetweenAttempts next) {
   if (++stalls_ >= limits_.max_stalls) {
     return Status(reason.code(), fmt::format("{} ({} of {} groups were done at attempt {}; {} failures in a row is the limit)",
                                              reason.message(), groups_done_, group_count(), attempt(), stalls_));
   }
-  attempt_due_ = now + pause;
+  state_ = next;
   return Status::Ok();
 }
 
 Time RunningFrame::NextWake() const {
-  if (attempt_due_) return *attempt_due_;
+  if (const auto* between = std::get_if<BetweenAttempts>(&state_)) return between->end;
   Time wake = Time::max();
   if (waiting()) wake = last_progress_ + limits_.stall_timeout;
-  if (suspicion_) wake = std::min(wake, suspicion_->until);
+  if (under_way()->suspicion) wake = std::min(wake, under_way()->suspicion->until);
   return wake;
 }
 
@@ -300,7 +309,7 @@ FrameProgress RunningFrame::Progress() const {
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {
-  const ResolvedPolicy& policy = request_.planned->policy;
+  const ResolvedPolicy& policy = planned_->policy;
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
@@ -316,7 +325,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = request_.planned->prediction};
+                             .predicted = planned_->prediction};
   const auto append = [&](const std::vector<RankReport>& reports) {
     std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };

@@ -29,6 +29,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <variant>
 #include <vector>
 
 #include "common/base/status.h"
@@ -56,8 +57,9 @@ class RunningFrame {
   const OpenRequest& request() const { return request_; }
   const FramePlan& plan() const { return plan_; }
   const Roster& roster() const { return roster_; }
-  int fit() const { return request_.fit; }  // FramesThatFit, of the present plan
-  void SetFit(int fit) { request_.fit = fit; }
+  const std::shared_ptr<const PlannedFrame>& planned() const { return planned_; }  // for the first attempt
+  int fit() const { return fit_; }                                                 // FramesThatFit, of the present plan
+  void SetFit(int fit) { fit_ = fit; }
   Time attempt_begin() const { return attempt_begin_; }
   std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
   WorkerId display() const { return plan_.display; }
@@ -82,8 +84,8 @@ class RunningFrame {
   // attempt begins as soon as nothing is out. Call it again whenever the roster has changed.
   void HandOver(const Roster& roster);
 
-  bool AttemptDue(Time now) const { return attempt_due_ ? now >= *attempt_due_ : handing_over_ && unfinished_groups() == 0; }
-  bool between_attempts() const { return attempt_due_.has_value(); }
+  bool AttemptDue(Time now) const;
+  bool between_attempts() const { return std::holds_alternative<BetweenAttempts>(state_); }
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
   // changes; the Status is the last such worker's reason, or Unavailable if there is none.
   Status BeginAttempt(const Roster& roster, Time now);
@@ -117,6 +119,17 @@ class RunningFrame {
     Time proof_after;  // a heartbeat later than this proves that the accused is alive
     Time until;        // then it is alive, since it is not lost
   };
+  struct UnderWay {
+    bool handing_over;  // what is not handed out yet is left to the next attempt
+    std::optional<Suspicion> suspicion;
+  };
+  struct BetweenAttempts {
+    Time end;
+    bool display_in_doubt;  // the next attempt begins with group 0
+  };
+  UnderWay* under_way() { return std::get_if<UnderWay>(&state_); }  // null: between attempts
+  const UnderWay* under_way() const { return std::get_if<UnderWay>(&state_); }
+  bool display_in_doubt() const { return between_attempts() && std::get<BetweenAttempts>(state_).display_in_doubt; }
   bool Accept(std::uint32_t attempt, WorkerId sender) const;
   bool Finish(std::uint32_t groups, Time now);
   void KeepHidden(const GroupDone& message);
@@ -125,11 +138,13 @@ class RunningFrame {
   bool IsNextOf(WorkerId worker) const;                          // it has a part in what is not handed out yet
   Status NoteDeath(WorkerId worker);
   bool waiting() const;  // for groups that are out, or for the finished picture
-  Status CountStall(const Status& reason, Duration pause, Time now);
+  Status CountStall(const Status& reason, BetweenAttempts next);
   WorkerId CulpritOf(const Suspicion& suspicion);
 
   FrameId id_;
   OpenRequest request_;
+  std::shared_ptr<const PlannedFrame> planned_;
+  int fit_;
   FramePlan plan_;
   Roster roster_;
   FrameLimits limits_;
@@ -144,10 +159,7 @@ class RunningFrame {
   std::uint32_t groups_shown_ = 0;        // in the last preview
   OcclusionMask hidden_;                  // by the groups [0, hidden_by_), as the present display worker accumulated them
   std::uint32_t hidden_by_ = 0;
-  std::optional<Time> attempt_due_;
-  bool handing_over_ = false;
-  bool display_in_doubt_ = false;  // the next attempt begins with group 0
-  std::optional<Suspicion> suspicion_;
+  std::variant<UnderWay, BetweenAttempts> state_ = UnderWay{};
   std::map<WorkerId, int> complaints_;  // proved suspicions that each worker had a part in
   std::set<WorkerId> unable_;           // workers that cannot do their part of this frame
   Status inability_;                    // reason of the last one of them

@@ -26,10 +26,10 @@
 namespace slabstream {
 namespace {
 
-constexpr Duration kForgetAfter = std::chrono::minutes(10);  // silent connections; well above every timeout of the machine
+constexpr Duration kForgetAfter = std::chrono::minutes(10);  // silent connections; well above every timeout of the machines
 constexpr Duration kForgetInterval = std::chrono::minutes(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
-constexpr Duration kStopGrace = std::chrono::seconds(5);  // for the machine to end in order
+constexpr Duration kStopGrace = std::chrono::seconds(5);  // for the machines to end in order
 constexpr std::int64_t kNotesAtOnce = 100;                // lines of the log that peers can provoke
 constexpr Duration kEachNote = std::chrono::milliseconds(200);
 constexpr int kReceiveBatch = 64;  // messages of one socket before the other one has its turn
@@ -59,7 +59,11 @@ struct CoordinatorService::Impl {
   Impl(CoordinatorOptions service_options, std::optional<ServiceKeys> service_keys, Socket client_socket, Socket control_socket,
        std::unique_ptr<SlabServer> slab_server)
       : keys(std::move(service_keys)),
-        machine(std::move(service_options.machine)),
+        frames(service_options.machine),
+        datasets({.datasets = std::move(service_options.catalogue),
+                  .folders = std::move(service_options.folders),
+                  .memory_bytes = service_options.machine.memory_bytes,
+                  .log_level = service_options.machine.log_level}),
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
         slabs(std::move(slab_server)),
@@ -75,7 +79,18 @@ struct CoordinatorService::Impl {
   bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
   void Send(Socket& socket, PeerTable& peers, PeerToken to, MessageView message, const Bytes& payload, const CoordinatorEvent& gone);
 
+  template <class Event>
+  auto& MachineOf(const Event&) {
+    if constexpr (std::constructible_from<FrameEvent, Event>) {
+      return frames;
+    } else {
+      return datasets;
+    }
+  }
+  void Step(auto& machine, auto&& event);
   // One for each kind of action.
+  void Perform(ToDatasets& action) { Step(datasets, action); }
+  void Perform(DatasetNews& action) { Step(frames, action); }
   void Perform(ToWorker& action) { Send(control, worker_peers, action.to, action.message, {}, WorkerGone{action.to}); }
   void Perform(ToClient& action) { Send(clients, client_peers, action.to, action.message, action.payload, ClientGone{action.to}); }
   void Perform(DropClient& action) {
@@ -91,7 +106,8 @@ struct CoordinatorService::Impl {
   std::string client_endpoint, worker_endpoint;
   Endpoint images_sockets;  // how the files of workers' images planes begin, if they are files
   std::optional<ServiceKeys> keys;
-  FrameMachine machine;
+  FrameMachine frames;
+  DatasetMachine datasets;
   Socket clients, control;
   PeerTable client_peers, worker_peers;
   std::unique_ptr<SlabServer> slabs;
@@ -99,13 +115,13 @@ struct CoordinatorService::Impl {
   BackgroundActions background;            // its wakeup also signals stop_requested
   std::atomic<bool> stop_requested = false;
   std::atomic<bool> stopped = false;
-  bool stop_now = false;  // the machine said so
+  bool stop_now = false;  // a machine said so
   LimitedLog complaints;  // about messages
   // By NoteAbout: each has its own limit, so that no client's frames keep a worker's loss out of the log.
   std::array<LimitedLog, 3> notes = {LimitedLog(kNotesAtOnce, kEachNote), LimitedLog(kNotesAtOnce, kEachNote),
                                      LimitedLog(kNotesAtOnce, kEachNote)};
   Time next_forget;
-  std::jthread thread;  // owns the sockets and the machine; last member: ends first
+  std::jthread thread;  // owns the sockets and the machines; last member: ends first
 };
 
 void CoordinatorService::Impl::Run() {
@@ -127,14 +143,17 @@ void CoordinatorService::Impl::Loop() {
   const std::array<Socket*, 2> sockets = {&clients, &control};
   Time stop_deadline = Time::max();
   HandleEvent(CoordinatorTick{});
+  HandleEvent(DatasetTick{});
   next_forget = MonotonicNow() + kForgetInterval;
   while (!stop_now && MonotonicNow() < stop_deadline) {
-    Wait(sockets, &background.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
+    Wait(sockets, &background.wakeup(),
+         std::clamp(std::min(frames.NextWake(), datasets.NextWake()) - MonotonicNow(), Duration::zero(), kLongestWait));
     for (CoordinatorEvent& event : background.TakeEvents()) HandleEvent(std::move(event));
     ReceiveFromWorkers();
     ReceiveFromClients();
     const Time now = MonotonicNow();
-    if (machine.NextWake() <= now) HandleEvent(CoordinatorTick{});
+    if (frames.NextWake() <= now) HandleEvent(CoordinatorTick{});
+    if (datasets.NextWake() <= now) HandleEvent(DatasetTick{});
     if (stop_requested && stop_deadline == Time::max()) {
       stop_deadline = now + kStopGrace;
       HandleEvent(CoordinatorStopRequested{});
@@ -151,11 +170,15 @@ void CoordinatorService::Impl::Loop() {
 void CoordinatorService::Impl::HandleEvent(CoordinatorEvent event) {
   following.push_back(std::move(event));
   while (!following.empty()) {
-    const CoordinatorEvent next = std::move(following.front());
+    CoordinatorEvent next = std::move(following.front());
     following.pop_front();
-    for (CoordinatorAction& action : machine.Step(next, MonotonicNow())) {
-      std::visit([this](auto& each) { Perform(each); }, action);
-    }
+    std::visit([this](auto& each) { Step(MachineOf(each), std::move(each)); }, next);
+  }
+}
+
+void CoordinatorService::Impl::Step(auto& machine, auto&& event) {
+  for (auto& action : machine.Step(std::forward<decltype(event)>(event), MonotonicNow())) {
+    std::visit([this](auto& each) { Perform(each); }, action);
   }
 }
 
@@ -205,7 +228,16 @@ void CoordinatorService::Impl::ReceiveFromClients() {
       continue;
     }
     if (CarryOut(*incoming, *message, *role)) continue;
-    HandleEvent(FromClient{client_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), incoming->payload()});
+    std::visit(
+        [&, from = client_peers.Heard(incoming->identity, MonotonicNow())]<class Message>(Message& each) {
+          if constexpr (std::constructible_from<ClientToFrames, Message>) {
+            HandleEvent(FromClient{from, std::move(each)});
+          } else if constexpr (std::constructible_from<ClientToDatasets, Message>) {
+            HandleEvent(ClientHeard{from, std::is_same_v<Message, AddVolume>});
+            HandleEvent(ClientAsked{from, std::move(each), incoming->payload()});
+          }
+        },
+        *message);
   }
 }
 
@@ -288,8 +320,6 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   options.surroundings.memory_scope = SharedMemoryScope();
   options.surroundings.encrypted = keys.has_value();
   options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
-  options.machine.datasets = std::move(options.catalogue);
-  options.machine.folders = std::move(options.folders);
   auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*slabs));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);

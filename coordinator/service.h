@@ -1,7 +1,8 @@
-// CoordinatorService: runs a FrameMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets, serves voxels.
+// CoordinatorService: runs a FrameMachine and a DatasetMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets,
+// serves voxels.
 //
-// Threads: one owns the client and control sockets and runs the machine; one owns the slabs socket, cuts and packs chunks; and those of
-// BackgroundActions. If the machine's own thread throws, open requests fail with the reason and the service stops.
+// Threads: one owns the client and control sockets and runs the machines; one owns the slabs socket, cuts and packs chunks; and those of
+// BackgroundActions. If the machines' own thread throws, open requests fail with the reason and the service stops.
 #pragma once
 
 #include <memory>
@@ -25,7 +26,7 @@ struct CoordinatorOptions {
   Catalogue catalogue;               // datasets
   std::set<std::string> folders;     // that are watched (FoundData)
   Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint, datasets, folders
+  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint
   ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;

@@ -60,19 +60,9 @@ class Conditions {
   virtual Arrivals ToPeer(Node to, Job& sends) = 0;  // its SendPartial
 
   // ---- the coordinator
-  virtual void BeforeStep(const CoordinatorEvent&) {}
+  virtual void BeforeStep(const FrameEvent&) {}
   virtual void Perform(ToClient& action) = 0;
-  virtual void Perform(const LoadDataset& action) = 0;
-  // Of datasets whose files may change, and of watched folders. Without them there is nothing to look at.
-  virtual void Perform(const UnloadDataset&) {}
-  virtual void Perform(const LookAtDataset&) {}
-  virtual void Perform(const LookAtFolders&) {}
-  virtual void Perform(const FindDatasets&) {}
-  virtual void Perform(const AnswerQuestion&) {}
-  virtual void Perform(const BeginUpload&) {}
-  virtual void Perform(const StoreUpload&) {}
-  virtual void Perform(const FinishUpload&) {}
-  virtual void Perform(const DropUpload&) {}
+  virtual void Perform(const ToDatasets& action) = 0;
   virtual void Perform(const CountDataset& action) = 0;
   virtual void Perform(const PlanRequest& action) = 0;
   virtual void Perform(const FrameMeasured&) {}

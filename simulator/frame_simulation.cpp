@@ -32,7 +32,6 @@ std::vector<WorkerId> WorkersOf(std::span<const FrameInput> frames) {
 CoordinatorConfig MakeCoordinatorConfig() {
   CoordinatorConfig config;
   config.epoch = kEpoch;
-  config.datasets[kDataset] = {};
   config.heartbeat = config.worker_timeout = config.client_timeout = config.worker_wait = kNever;
   config.vacancy_grace = config.stall_timeout = kNever;
   return config;
@@ -159,8 +158,11 @@ void FrameSimulation::OnPicture(std::uint32_t frame) {
 
 // ---------------------------------------------------------------- the coordinator
 
-void FrameSimulation::Perform(const LoadDataset& action) {
-  service_.TellCoordinator(service_.now(), DatasetLoaded{action.name, action.load, action.load, std::make_shared<const VolumeSummary>()});
+// Every dataset is there.
+void FrameSimulation::Perform(const ToDatasets& action) {
+  if (const auto* seek = std::get_if<SeekDataset>(&action)) {
+    service_.StepCoordinator(DatasetNews{.uses = {{seek->use, DatasetReady{1, std::make_shared<const VolumeSummary>()}}}});
+  }
 }
 
 void FrameSimulation::Perform(const PlanRequest& action) {
@@ -179,7 +181,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
                            Planned{action.plan, std::shared_ptr<const PlannedFrame>(std::move(planned))});
 }
 
-void FrameSimulation::BeforeStep(const CoordinatorEvent& event) {
+void FrameSimulation::BeforeStep(const FrameEvent& event) {
   const auto* heard = std::get_if<FromWorker>(&event);
   const auto* done = heard == nullptr ? nullptr : std::get_if<GroupDone>(&heard->message);
   if (done == nullptr) return;

@@ -56,9 +56,9 @@ class FrameSimulation : private Conditions {
   Arrivals ToWorker(Node to, CoordinatorToWorker& message, double sent) override;
   Arrivals ToCoordinator(Node from, WorkerToCoordinator& message) override;
   Arrivals ToPeer(Node to, Job& sends) override;
-  void BeforeStep(const CoordinatorEvent& event) override;
+  void BeforeStep(const FrameEvent& event) override;
   void Perform(ToClient& action) override;
-  void Perform(const LoadDataset& action) override;
+  void Perform(const ToDatasets& action) override;
   void Perform(const CountDataset&) override {}
   void Perform(const PlanRequest& action) override;
 

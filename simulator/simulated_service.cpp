@@ -74,19 +74,19 @@ std::optional<Node> SimulatedService::NodeOf(PeerToken token) const {
   return token >> 32U == generation_ ? std::optional(Node(token)) : std::nullopt;
 }
 
-void SimulatedService::TellCoordinator(double when, CoordinatorEvent event) {
+void SimulatedService::TellCoordinator(double when, FrameEvent event) {
   queue_.At(when, [this, generation = generation_, event = std::move(event)] {
     if (generation == generation_) StepCoordinator(event);
   });
 }
 
-void SimulatedService::StepCoordinator(const CoordinatorEvent& event) {
+void SimulatedService::StepCoordinator(const FrameEvent& event) {
   if (!coordinator_runs_) return;
   if (now() < coordinator_held_) return TellCoordinator(coordinator_held_, event);
   const bool message = std::holds_alternative<FromWorker>(event) || std::holds_alternative<FromClient>(event);
   coordinator_free_ = std::max(coordinator_free_, now()) + (message ? machine_.message_seconds : 0);
   conditions_.BeforeStep(event);
-  for (CoordinatorAction& action : coordinator_->Step(event, coordinator_time())) {
+  for (FrameAction& action : coordinator_->Step(event, coordinator_time())) {
     std::visit([this](auto& a) { Perform(a); }, action);
   }
   threads_.Active(Threads::kCoordinator, coordinator_free_);

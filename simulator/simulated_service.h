@@ -41,9 +41,11 @@ class SimulatedService {
   bool coordinator_runs() const { return coordinator_runs_; }
   const FrameMachine& coordinator() const { return *coordinator_; }
   double coordinator_free() const { return coordinator_free_; }  // its thread has done what it has heard of
+  double coordinator_held() const { return coordinator_held_; }  // until then it stands still
+  Time coordinator_time() const { return time() + coordinator_ahead_; }
   // At `when`, if it is still the same coordinator.
-  void TellCoordinator(double when, CoordinatorEvent event);
-  void StepCoordinator(const CoordinatorEvent& event);
+  void TellCoordinator(double when, FrameEvent event);
+  void StepCoordinator(const FrameEvent& event);
   // Names of connections of the coordinator at hand.
   PeerToken TokenOf(Node node) const { return generation_ << 32U | node; }
   std::optional<Node> NodeOf(PeerToken token) const;
@@ -82,7 +84,6 @@ class SimulatedService {
   void SetAlarm(double& alarm, Time wake, auto&& ring);
   // Events of jobs, by number: 2 * place, or more by one if its message arrives rather than its thread is done.
   void OnNumber(std::uint32_t number) { number % 2 == 0 ? Finish(number / 2) : Deliver(number / 2); }
-  Time coordinator_time() const { return time() + coordinator_ahead_; }
   Time CoordinatorWake() const;  // as others see time
   void SetCoordinatorAlarm();
   void WakeCoordinator(std::uint64_t generation);
@@ -95,7 +96,7 @@ class SimulatedService {
   void Perform(auto& action) { conditions_.Perform(action); }
 
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
-  void Perform(Node, ConnectSlabs&) {}
+  void Perform(Node, AnyOf<ConnectSlabs, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups> auto&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
   void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) { Order(node, action); }
@@ -122,7 +123,7 @@ class SimulatedService {
   bool coordinator_runs_ = false;
   std::uint64_t generation_ = 0;  // of the coordinator
   double coordinator_free_ = 0, coordinator_alarm_ = kNever;
-  double coordinator_held_ = 0;              // until then it stands still
+  double coordinator_held_ = 0;
   Duration coordinator_ahead_{};             // its clock's
   std::deque<Worker> workers_;               // by node
   WorkerActions actions_;                    // memory for those of a step

@@ -344,8 +344,8 @@ void Executor::Perform(FindHidden&& action) {
   });
 }
 
-std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send) {
-  if (delivery.lend) {
+std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send) {
+  if (send.delivery.lend) {
     if (std::optional<Bytes> spans = lent_.Lend(image, view, *send.to, send.message)) return spans;
   }
   return send.color == ColorCoding::kFloat32 ? PixelsInPlace(image, view, send.message) : std::nullopt;
@@ -354,10 +354,11 @@ std::optional<Bytes> Executor::PayloadInPlace(const LocalImage& image, const Ima
 void Executor::Post(SendPartial& send, Bytes payload, std::int64_t begin_ns) {
   sent_.Add(send.message.key, send.rank, payload.size(), begin_ns, NowNs());
   sent_.MoveInto(send.message.key, send.message.reports);
-  outbox_.Post(OutgoingPartial{*send.to, Encode(send.message), std::move(payload), send.message.acknowledge, send.message.key});
+  outbox_.Post(
+      OutgoingPartial{*send.to, Encode(send.message), std::move(payload), send.delivery.timed, send.message.acknowledge, send.message.key});
 }
 
-void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
+void Executor::Perform(SendPartial&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const auto view_of = [](const LocalImage& of, const SendPartial& send) { return ViewOf(of, send.message.pixels, send.frame.width()); };
   std::optional<ImageView> view;
@@ -368,8 +369,8 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
     const bool tried = TrySend("encode", action.message.key, [&] {
       const std::int64_t begin = NowNs();
       view = view_of(*image, action);
-      payload = PayloadInPlace(*image, *view, delivery, action);
-      posted = payload && !MayPack(delivery.bytes_per_second);
+      payload = PayloadInPlace(*image, *view, action);
+      posted = payload && !MayPack(action.delivery.bytes_per_second);
       if (posted) Post(action, *std::move(payload), begin);
     });
     if (posted || !tried) return;
@@ -380,23 +381,29 @@ void Executor::Perform(SendPartial&& action, const Delivery& delivery) {
           const std::int64_t begin = NowNs();
           if (!view) {
             view = view_of(*image, send);
-            payload = PayloadInPlace(*image, *view, delivery, send);
+            payload = PayloadInPlace(*image, *view, send);
           }
           if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(*view, send.color, send.message); });
-          Post(send, PackForLink(*std::move(payload), delivery.bytes_per_second, send.message.packed), begin);
+          Post(send, PackForLink(*std::move(payload), send.delivery.bytes_per_second, send.message.packed), begin);
         });
       });
 }
 
-void Executor::Resend(const ImageRefused& refused) {
-  std::shared_ptr<const LentImage> lent = lent_.Find(refused.key, refused.step, refused.pixels);
+void Executor::Perform(const ForgetGroups& action) {
+  const auto over = [&](const GroupKey& key) { return action.Over(key); };
+  lent_.Forget(over);
+  sent_.Forget(over);
+}
+
+void Executor::Perform(const ResendImage& action) {
+  std::shared_ptr<const LentImage> lent = lent_.Find(action.refused.key, action.refused.step, action.refused.pixels);
   if (lent == nullptr) return;
   combine_thread_.Post([this, lent = std::move(lent)] {
     TrySend("encode", lent->message.key, [&] {
       PartialImage message = lent->message;
       message.shared.reset();
       Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
-      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), 0, message.key});
+      outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), false, 0, message.key});
     });
   });
 }

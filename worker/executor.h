@@ -25,7 +25,6 @@
 #include "common/transport/mailbox.h"
 #include "worker/image_packing.h"
 #include "worker/lent_images.h"
-#include "worker/link_rates.h"
 #include "worker/peer_memory.h"
 #include "worker/renderers/renderer.h"
 #include "worker/sent_tallies.h"
@@ -39,6 +38,7 @@ struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
   Bytes payload;
+  bool timed = false;             // as in the delivery
   std::uint64_t acknowledge = 0;  // as in the message
   GroupKey key;                   // likewise
 };
@@ -51,12 +51,6 @@ using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>
 
 // Called with the name of each task when the task begins, on its thread. If it throws, the task fails. For tests; may be empty.
 using TaskHook = std::function<void(std::string_view task)>;
-
-// How pixels reach another worker.
-struct Delivery {
-  bool lend = false;                              // the receiver can read this process' memory, so pixels may stay where they are
-  double bytes_per_second = LinkRates::kUnknown;  // of the link; pixels that are not lent are packed if that pays
-};
 
 class Executor {
  public:
@@ -72,7 +66,9 @@ class Executor {
   void Perform(const CancelRender& action);
   void Perform(StartCombine&& action);
   void Perform(FindHidden&& action);
-  void Perform(SendPartial&& action, const Delivery& delivery);
+  void Perform(SendPartial&& action);
+  void Perform(const ResendImage& action);
+  void Perform(const ForgetGroups& action);
   void Perform(SendFrame&& action);
   void Perform(const ReleaseImage& action);
 
@@ -81,14 +77,6 @@ class Executor {
   PeerMemory& peer_memory() { return peer_memory_; }
   // For reports that leave without a PartialImage: adds the bytes and times of their ranks' messages.
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
-  // Releases the lent images and forgets the tallies of the groups for which `over(key)` is true.
-  template <class Predicate>
-  void Forget(Predicate over) {
-    lent_.Forget(over);
-    sent_.Forget(over);
-  }
-  // Sends a lent image as runs, if it is still lent.
-  void Resend(const ImageRefused& refused);
 
  private:
   struct Slab;
@@ -109,7 +97,7 @@ class Executor {
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
-  std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, const Delivery& delivery, SendPartial& send);
+  std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
   RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
 

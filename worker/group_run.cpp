@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
+#include <ranges>
 #include <string>
 #include <utility>
 
@@ -97,31 +98,12 @@ void GroupRun::OnPartial(PartialImage&& message, const Bytes& payload, WorkerAct
   const Step& step = runner_.order().schedule().steps()[message.step];
   const bool inside = message.pixels.begin >= step.pixels.begin && message.pixels.end <= step.pixels.end;
   if (WorkerOf(step.from) != message.from_worker || !inside) return;
-  if (HasArrived(*turn, message.pixels)) return;
+  const auto [begin, end] = arrivals_.equal_range(*turn);
+  if (std::any_of(begin, end, [&](const auto& known) { return Overlap(known.second.piece.pixels, message.pixels); })) return;
   runner_.order().OnArrived(*turn, PixelCount(message.pixels));
-  Keep(*turn, PieceOf(message, payload));
+  arrivals_.emplace_hint(end, *turn, Arrival{PieceOf(message, payload)});
   if (!message.reports.empty()) Append(ranks_.at(step.to).reports, std::move(message.reports));
   Advance(actions);
-}
-
-bool GroupRun::HasArrived(std::uint32_t turn, const PixelRange& pixels) {
-  for (std::uint32_t place = runner_.order().note(turn); place != kNone; place = arrivals_[place].next) {
-    if (Overlap(arrivals_[place].piece.pixels, pixels)) return true;
-  }
-  return false;
-}
-
-// Behind the step's other pieces.
-void GroupRun::Keep(std::uint32_t turn, ImagePiece&& piece) {
-  if (unused_arrival_ == kNone) {
-    unused_arrival_ = std::uint32_t(arrivals_.size());
-    arrivals_.emplace_back();
-  }
-  const std::uint32_t place = std::exchange(unused_arrival_, arrivals_[unused_arrival_].next);
-  arrivals_[place] = {.piece = std::move(piece)};
-  std::uint32_t* link = &runner_.order().note(turn);
-  while (*link != kNone) link = &arrivals_[*link].next;
-  *link = place;
 }
 
 bool GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
@@ -201,13 +183,11 @@ void GroupRun::MoveLocally(const Runner::Taken& taken, WorkerActions& actions) {
 }
 
 void GroupRun::Receive(const Runner::Taken& taken, WorkerActions& actions) {
-  std::uint32_t& first = runner_.order().note(taken.turn);
-  std::uint32_t last = kNone;
-  for (std::uint32_t place = first; place != kNone; place = arrivals_[place].next) {
-    Arrival& arrival = arrivals_[last = place];
+  const auto [begin, end] = arrivals_.equal_range(taken.turn);
+  for (Arrival& arrival : std::ranges::subrange(begin, end) | std::views::values) {
     if (!std::exchange(arrival.taken, true)) Merge(taken.rank, std::move(arrival.piece), actions);
   }
-  if (taken.last) arrivals_[last].next = std::exchange(unused_arrival_, std::exchange(first, kNone));
+  if (taken.last) arrivals_.erase(begin, end);
 }
 
 void GroupRun::Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions) {

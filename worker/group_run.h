@@ -72,11 +72,9 @@ class GroupRun {
     ImageHandle own = 0;              // its picture, once rendered
     std::vector<RankReport> reports;  // on their way with this rank: its own, then those that have come
   };
-  static constexpr std::uint32_t kNone = StepOrder::kNoNote;
-  struct Arrival {  // a place in arrivals_. The first one of a step is noted for its turn
+  struct Arrival {
     ImagePiece piece;
-    bool taken = false;          // the piece has given its image away
-    std::uint32_t next = kNone;  // the next piece of the step, or the next unused place
+    bool taken = false;  // the piece has given its image away
   };
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
@@ -87,8 +85,6 @@ class GroupRun {
   void Advance(WorkerActions& actions);
   void MoveLocally(const Runner::Taken& taken, WorkerActions& actions);
   void Receive(const Runner::Taken& taken, WorkerActions& actions);
-  void Keep(std::uint32_t turn, ImagePiece&& piece);
-  bool HasArrived(std::uint32_t turn, const PixelRange& pixels);  // some of them
   void Merge(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Passes on `incoming`, what has come of the piece.
   void Combine(Rank rank, const Held& held, const ImagePiece& piece, Rare<IncomingImage>&& incoming, WorkerActions& actions);
@@ -116,8 +112,7 @@ class GroupRun {
   Status failure_;
   Runner runner_;
   std::map<Rank, RankState> ranks_;                      // of this worker
-  std::vector<Arrival> arrivals_;                        // of all steps; at most one piece of any pixel
-  std::uint32_t unused_arrival_ = kNone;                 // the first unused place
+  std::multimap<std::uint32_t, Arrival> arrivals_;       // by the turn that waits for more of them; of a turn, at most one of any pixel
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   bool root_done_ = false;
   GroupImage group_image_;          // display worker: what has come of it

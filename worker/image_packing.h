@@ -13,12 +13,9 @@
 
 #include "common/base/bytes.h"
 #include "common/wire/image_messages.h"
+#include "worker/worker_machine.h"
 
 namespace slabstream {
-
-// The user's choice. kAuto: pack partial images if it pays. kOn: pack all partial images between processes, and pictures for clients. kOff:
-// pack nothing.
-enum class Compression : std::uint8_t { kAuto, kOn, kOff };
 
 // "auto", "on" or "off"; none for any other text.
 std::optional<Compression> ParseCompression(std::string_view text);

@@ -83,7 +83,7 @@ int Run(int argc, char** argv) {
       options.coordinator_endpoint = file->endpoint;
       options.keys = file->keys();
     }
-    options.compression = *ParseCompression(compress);
+    options.machine.compression = *ParseCompression(compress);
     options.share_memory = !frames_only;
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;
     return Serve(std::move(options));

@@ -5,10 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <map>
 #include <optional>
 #include <random>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -26,7 +24,6 @@
 #include "common/transport/mailbox.h"
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
-#include "worker/known_peers.h"
 #include "worker/peer_sockets.h"
 
 namespace slabstream {
@@ -35,7 +32,6 @@ namespace {
 constexpr Duration kLongestWait = std::chrono::seconds(1);       // between checks for idle connections
 constexpr Duration kLookRound = std::chrono::milliseconds(100);  // between looks at what became of connections
 constexpr Duration kStopGrace = std::chrono::seconds(5);         // for the machine to leave in an orderly way
-constexpr std::size_t kMostRefused = 4096;                       // images that wait for an endpoint
 constexpr int kReceiveBatch = 64;                                // messages of one socket before the other sockets' turn
 
 Incarnation RandomIncarnation() {
@@ -79,9 +75,8 @@ struct WorkerService::Impl {
         images(std::move(images_socket)),
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
-        others(keys ? &service_context.authenticator() : nullptr, keys ? keys->plane : ""),
-        executor(std::in_place, outbox, options.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw, int(options.machine.threads),
-                 options.make_renderer, options.task_hook) {}
+        executor(std::in_place, outbox, options.machine.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw,
+                 int(options.machine.threads), options.make_renderer, options.task_hook) {}
 
   void Run();
   Status Loop();  // not ok: why the worker leaves though nobody told it to
@@ -93,21 +88,14 @@ struct WorkerService::Impl {
   void HandleOutput(ExecutorOutput& output);
   void SetRegistered();
   void LookAtConnections();
-  void Remember(const MessageToWorker& message);
-  bool OpenShared(const MessageToWorker& message);
-  void Refuse(const PartialImage& partial);
-  void Acknowledge(const MessageToWorker& message, std::size_t payload_bytes);
-  bool Answer(WorkerId sender, MessageView message);
-  // Workers with the same scope are on this host; 0: unknown.
-  bool OnThisHost(const Peer& peer) const { return options.machine.memory_scope != 0 && peer.memory_scope == options.machine.memory_scope; }
-  bool IsTimed(const Peer& peer) const;
-  Delivery DeliveryTo(const Peer& peer) const;
 
   // One for each kind of action.
   void Perform(SendControl& action);
   void Perform(SendChunkRequest& action);
   void Perform(ConnectSlabs& action);
-  void Perform(SendPartial& action);
+  void Perform(ResendImage& action);
+  void Perform(AnswerPeer& action);
+  void Perform(AdmitKeys& action);
   void Perform(StopProcess& action);
   template <class Action>
   void Perform(Action& action) {
@@ -125,11 +113,6 @@ struct WorkerService::Impl {
   std::optional<Socket> slabs;  // once the coordinator has named its endpoint
   std::string slabs_endpoint;
   PeerSockets peers;
-  Epoch epoch = 0;
-  LinkRates links;                       // while compression is automatic
-  KnownPeers others;                     // of this registration
-  std::set<WorkerId> takes_frames_only;  // workers that cannot map memory though they have the same scope
-  std::vector<PartialImage> to_refuse;   // from workers whose endpoint is not known yet
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
@@ -216,85 +199,21 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message of another worker than it says");
       continue;
     }
-    Remember(message);
-    Acknowledge(message, payload.size());
-    if (OpenShared(message)) HandleEvent(MessageReceived{std::move(message), std::move(payload)});
+    if (auto* partial = std::get_if<PartialImage>(&message); partial != nullptr && partial->shared) {
+      if (const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow()).status(); !opened.ok()) {
+        LogInfo("an image of worker " + std::to_string(partial->from_worker) + " cannot be read in its memory: " + opened.message());
+        HandleEvent(ImageUnreadable{std::move(*partial)});
+        continue;
+      }
+    }
+    HandleEvent(MessageReceived{std::move(message), std::move(payload)});
   }
 }
 
 bool WorkerService::Impl::ComesFromItsSender(const Incoming& incoming, const MessageToWorker& message) const {
   if (incoming.user.empty()) return true;
-  const Peer* const sender = others.Find(SenderOf(message));
+  const Peer* const sender = machine.FindPeer(SenderOf(message));
   return sender == nullptr || sender->images_key == incoming.user;
-}
-
-// Handles memory shared between workers, and the links between them: the machine knows nothing of either.
-void WorkerService::Impl::Remember(const MessageToWorker& message) {
-  if (const auto* welcome = std::get_if<Welcome>(&message)) {
-    if (welcome->epoch != epoch || welcome->worker != machine.worker()) {
-      LogInfo("registered as worker " + std::to_string(welcome->worker) + " at " + options.coordinator_endpoint);
-      others.ForgetAll();
-    }
-    if (std::exchange(epoch, welcome->epoch) == welcome->epoch) return;
-    executor->Forget([](const GroupKey&) { return true; });
-    takes_frames_only.clear();
-    links.ForgetAll();
-  } else if (const auto* ping = std::get_if<Ping>(&message); ping != nullptr && ping->epoch == epoch) {
-    executor->Forget([&](const GroupKey& key) {
-      return key.frame < ping->finished_before || std::ranges::find(ping->cancelled, key.frame) != ping->cancelled.end();
-    });
-    others.Gone(ping->gone, images);
-  } else if (const auto* assignment = std::get_if<GroupAssignment>(&message); assignment != nullptr && assignment->epoch == epoch) {
-    const GroupKey& now = assignment->key;
-    executor->Forget([&](const GroupKey& key) {
-      const bool read = key.frame == now.frame && (key.attempt < now.attempt || key.group < assignment->groups_done);
-      return read || key.frame < assignment->finished_before;
-    });
-    for (const Peer& peer : assignment->peers) others.Name(peer);
-    for (const PartialImage& refused : std::exchange(to_refuse, {})) Refuse(refused);
-  } else if (const auto* received = std::get_if<ImageReceived>(&message); received != nullptr && received->epoch == epoch) {
-    links.Received(received->from_worker, received->number, MonotonicNow());
-  }
-}
-
-void WorkerService::Impl::Acknowledge(const MessageToWorker& message, std::size_t payload_bytes) {
-  const auto* partial = std::get_if<PartialImage>(&message);
-  if (partial == nullptr || partial->acknowledge == 0 || payload_bytes < kLeastAcknowledgedBytes || partial->epoch != epoch) return;
-  Answer(partial->from_worker, ImageReceived{epoch, machine.worker(), partial->acknowledge});  // without it, the sender asks again
-}
-
-// False: the sender is not known yet.
-bool WorkerService::Impl::Answer(WorkerId sender, MessageView message) {
-  const Peer* const peer = others.Find(sender);
-  if (peer == nullptr) return false;
-  const Status sent = peers.Send(*peer, Encode(message), {}, MonotonicNow());
-  if (!sent.ok()) LogWarning("worker " + std::to_string(sender) + " is not reached: " + sent.message());
-  return true;
-}
-
-// True if the message is for the machine. A shared image is, only if it can be read here.
-bool WorkerService::Impl::OpenShared(const MessageToWorker& message) {
-  if (const auto* refused = std::get_if<ImageRefused>(&message)) {
-    if (refused->epoch == epoch && takes_frames_only.insert(refused->from_worker).second) {
-      LogWarning("worker " + std::to_string(refused->from_worker) + " cannot read this worker's memory: its images travel in frames");
-    }
-    if (refused->epoch == epoch) executor->Resend(*refused);
-    return false;
-  }
-  const auto* partial = std::get_if<PartialImage>(&message);
-  if (partial == nullptr || !partial->shared) return true;
-  const Status opened = executor->peer_memory().Open(partial->shared->arena, MonotonicNow()).status();
-  if (opened.ok()) return true;
-  if (epoch != 0 && partial->epoch != epoch) return false;  // 0: it may have overtaken the first Welcome
-  LogInfo("an image of worker " + std::to_string(partial->from_worker) + " is asked for in frames: " + opened.message());
-  Refuse(*partial);
-  return false;
-}
-
-void WorkerService::Impl::Refuse(const PartialImage& partial) {
-  if (Answer(partial.from_worker, ImageRefused{partial.epoch, machine.worker(), partial.key, partial.step, partial.pixels})) return;
-  // The group's assignment with the endpoint has not arrived yet.
-  if (to_refuse.size() < kMostRefused) to_refuse.push_back(partial);
 }
 
 void WorkerService::Impl::HandleEvent(WorkerEvent event) {
@@ -303,7 +222,9 @@ void WorkerService::Impl::HandleEvent(WorkerEvent event) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
   if (was_registered && !machine.registered() && !stop_now) LogInfo("has lost its coordinator, and registers again");
-  if (machine.registered()) SetRegistered();
+  if (was_registered || !machine.registered()) return;
+  LogInfo("registered as worker " + std::to_string(machine.worker()) + " at " + options.coordinator_endpoint);
+  SetRegistered();
 }
 
 void WorkerService::Impl::SetRegistered() {
@@ -321,7 +242,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     if (!sent.ok()) HandleEvent(SendFailed{frame->key, sent});
   } else {
     auto& partial = std::get<OutgoingPartial>(output);
-    if (IsTimed(partial.to)) links.Sent(partial.to.worker, partial.acknowledge, partial.payload.size(), MonotonicNow());
+    if (partial.timed) HandleEvent(PartialSent{partial.to.worker, partial.acknowledge, partial.payload.size()});
     Status sent;
     const Status tried = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
@@ -367,21 +288,21 @@ void WorkerService::Impl::Perform(ConnectSlabs& action) {
   slabs_endpoint = action.endpoint;
 }
 
-Delivery WorkerService::Impl::DeliveryTo(const Peer& peer) const {
-  if (options.machine.lends_memory && OnThisHost(peer) && takes_frames_only.count(peer.worker) == 0) return {.lend = true};
-  if (options.compression == Compression::kOn) return {.bytes_per_second = 0};
-  return IsTimed(peer) ? Delivery{.bytes_per_second = links.Of(peer.worker)} : Delivery{};
+void WorkerService::Impl::Perform(ResendImage& action) {
+  if (action.first) {
+    LogWarning("worker " + std::to_string(action.refused.from_worker) + " cannot read this worker's memory: its images travel in frames");
+  }
+  executor->Perform(action);
 }
 
-// Links within a host are not timed: a lack of processor time would look like a slow link, and packing would worsen it.
-bool WorkerService::Impl::IsTimed(const Peer& peer) const {
-  return options.compression == Compression::kAuto && !OnThisHost(peer) && peer.images_endpoint.starts_with("tcp://");
+void WorkerService::Impl::Perform(AnswerPeer& action) {
+  if (const Status sent = peers.Send(action.to, Encode(action.message), {}, MonotonicNow()); !sent.ok())
+    LogWarning("worker " + std::to_string(action.to.worker) + " is not reached: " + sent.message());
 }
 
-void WorkerService::Impl::Perform(SendPartial& action) {
-  const Delivery delivery = DeliveryTo(*action.to);
-  if (IsTimed(*action.to)) action.message.acknowledge = links.Ask(action.to->worker, MonotonicNow());
-  executor->Perform(std::move(action), delivery);
+void WorkerService::Impl::Perform(AdmitKeys& action) {
+  context.authenticator().AdmitOnly(keys->plane, std::move(action.keys));
+  for (const std::string& key : action.ended) images.EndConnections(key);
 }
 
 Result<std::unique_ptr<WorkerService>> WorkerService::Start(Context& context, WorkerOptions options) {

@@ -12,7 +12,6 @@
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "worker/executor.h"
-#include "worker/image_packing.h"
 #include "worker/renderers/renderer.h"
 #include "worker/worker_machine.h"
 
@@ -21,8 +20,7 @@ namespace slabstream {
 struct WorkerOptions {
   std::string coordinator_endpoint;  // its worker endpoint
   std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
-  Compression compression = Compression::kAuto;
-  bool share_memory = true;  // lend images to workers of this host
+  bool share_memory = true;          // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
   TaskHook task_hook;                             // of the executor, and for "send"
   std::optional<ClientKeys> keys = std::nullopt;  // of role worker; none: the service has no keys

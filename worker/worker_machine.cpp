@@ -8,13 +8,13 @@
 #include <set>
 #include <utility>
 
-#include "common/base/any_of.h"
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/worker_memory.h"
 #include "common/volume/memory_budget.h"
 #include "worker/early_images.h"
 #include "worker/frame_accumulator.h"
 #include "worker/group_run.h"
+#include "worker/peer_links.h"
 #include "worker/render_queue.h"
 #include "worker/slab_fetcher.h"
 
@@ -22,7 +22,12 @@ namespace slabstream {
 
 struct WorkerMachine::State {
   explicit State(WorkerConfig c)
-      : config(std::move(c)), incarnation(config.incarnation), slabs(config), renders(slabs, names), early(EarlyImageBytes(config)) {}
+      : config(std::move(c)),
+        incarnation(config.incarnation),
+        slabs(config),
+        renders(slabs, names),
+        early(EarlyImageBytes(config)),
+        links(config) {}
 
   // They are images of groups, which have room.
   static std::uint64_t EarlyImageBytes(const WorkerConfig& config) {
@@ -43,11 +48,15 @@ struct WorkerMachine::State {
   void On(MessageReceived&& event) {
     std::visit([&](auto& message) { On(std::move(message), event.payload); }, event.message);
   }
+  void On(const ImageUnreadable& unreadable) {
+    if (worker == 0 || unreadable.image.epoch == epoch) links.Refuse(unreadable.image, actions);  // it may have overtaken the Welcome
+  }
   void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
   void On(const RenderDone& done);
   void On(const CombineDone& done);
   void On(const HiddenFound& found);
   void On(const SendFailed& failed);
+  void On(const PartialSent& sent) { links.On(sent, now); }
   void On(const PeerUnreachable& peer);
   void On(const Moved& moved);
   void On(const LeaveRequested&);
@@ -62,7 +71,12 @@ struct WorkerMachine::State {
   void On(const Chunk& chunk, const Bytes& payload);
   void On(const ChunkRefused& refused, const Bytes&);
   void On(PartialImage&& partial, const Bytes& payload);
-  void On(const AnyOf<ImageRefused, ImageReceived> auto&, const Bytes&) {}  // its service handles them
+  void On(const ImageReceived& received, const Bytes&) {
+    if (received.epoch == epoch) links.On(received, now);
+  }
+  void On(const ImageRefused& refused, const Bytes&) {
+    if (refused.epoch == epoch) links.On(refused, actions);
+  }
 
   // ---- registration
   bool Heard(Epoch from);  // false: not from the coordinator that this worker is registered with
@@ -100,6 +114,7 @@ struct WorkerMachine::State {
   SlabFetcher slabs;
   RenderQueue renders;
   EarlyImages early;
+  PeerLinks links;
 
   // All that most steps need.
   Epoch epoch = 0;                 // while registered
@@ -132,6 +147,7 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   last_heard = now;
   next_heartbeat = now;
   early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
+  links.Begin(epoch, worker, actions);
   actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
 }
 
@@ -200,6 +216,8 @@ void WorkerMachine::State::KeepTime() {
 void WorkerMachine::State::On(const Ping& ping, const Bytes&) {
   if (!Heard(ping.epoch)) return;
   place = ping.place;
+  links.Gone(ping.gone, actions);
+  actions.push_back(ForgetGroups{.finished_before = ping.finished_before, .cancelled = ping.cancelled});
   for (const FrameId frame : ping.cancelled) {
     if (frame < finished_before) continue;
     cancelled.insert(frame);
@@ -227,12 +245,14 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (!Heard(assignment.epoch)) return;
   FinishBefore(assignment.finished_before);
   const GroupKey key = assignment.key;
+  links.Name(assignment.peers, actions);
   if (Over(key.frame)) return;
   Frame& frame = frames[key.frame];
   if (key.attempt < frame.attempt) return;
   if (key.attempt > frame.attempt) BeginAttempt(key.frame, frame, assignment);
   const auto [entry, added] = frame.groups.try_emplace(key.group);
   if (!added) return;
+  actions.push_back(ForgetGroups{.finished_before = assignment.finished_before, .next = {key.frame, key.attempt, assignment.groups_done}});
   if (config.memory_bytes != 0) {
     frame.group_bytes = std::max(frame.group_bytes, GroupImageBytes(assignment.setup, assignment.group.placements));
     frame.picture_bytes = PictureBytes(assignment.setup);
@@ -283,6 +303,7 @@ void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
   // Once the coordinator has admitted this worker, others send it images, and these may overtake the Welcome.
   if (worker == 0) return (void)early.Keep(std::move(partial), payload, now);
   if (partial.epoch != epoch) return;
+  links.Acknowledge(partial, payload.size(), actions);
   if (GroupRun* run = FindRun(partial.key)) {
     run->OnPartial(std::move(partial), payload, actions);
     return AfterRun(*run);
@@ -425,10 +446,13 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
   s.now = now;
   if (s.worker != 0 && now > s.wake) s.last_heard += now - s.wake;
   const auto* message = std::get_if<MessageReceived>(&event);
-  s.brief = now < s.wake &&
-            (message != nullptr ? std::holds_alternative<PartialImage>(message->message) : std::holds_alternative<CombineDone>(event));
+  s.brief = now < s.wake && (message != nullptr ? std::holds_alternative<PartialImage>(message->message)
+                                                : std::holds_alternative<CombineDone>(event) || std::holds_alternative<PartialSent>(event));
   std::visit([&](auto& e) { s.On(std::move(e)); }, event);
   if (!s.brief) s.Tend();
+  for (WorkerAction& action : s.actions) {
+    if (auto* send = std::get_if<SendPartial>(&action)) s.links.Deliver(*send, now);
+  }
   return std::exchange(s.actions, {});
 }
 
@@ -466,6 +490,7 @@ Time WorkerMachine::NextWake() const { return state_->wake; }
 
 bool WorkerMachine::registered() const { return state_->worker != 0; }
 WorkerId WorkerMachine::worker() const { return state_->worker; }
+const Peer* WorkerMachine::FindPeer(WorkerId worker) const { return state_->links.Find(worker); }
 WorkerSizes WorkerMachine::sizes() const {
   const State& state = *state_;
   return {.frames = state.frames.size(),

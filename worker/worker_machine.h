@@ -21,14 +21,17 @@
 // finished frames and older attempts are dropped. A second copy of any message changes nothing.
 //
 // The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
-// StartCombine, FindHidden, SendPartial and SendFrame in the order given; call Step(Tick) no later than NextWake(). If it calls late, the
-// machine assumes that its own process was held up (stopped), and gives the coordinator as much more time: messages not read meanwhile do
-// not mean that the coordinator was silent.
+// StartCombine, FindHidden, SendPartial and SendFrame in the order given; drop messages of the images plane that come with another key than
+// their sender's (FindPeer); call Step(Tick) no later than NextWake(). If it calls late, the machine assumes that its own process was held
+// up (stopped), and gives the coordinator as much more time: messages not read meanwhile do not mean that the coordinator was silent.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <variant>
@@ -39,6 +42,7 @@
 #include "common/base/time.h"
 #include "common/kernels/combine.h"
 #include "common/wire/any_message.h"
+#include "worker/link_rates.h"
 
 namespace slabstream {
 
@@ -61,14 +65,19 @@ struct SlabKey {
   friend auto operator<=>(const SlabKey&, const SlabKey&) = default;
 };
 
+// The user's choice. kAuto: pack partial images if it pays. kOn: pack all partial images between processes, and pictures for clients. kOff:
+// pack nothing.
+enum class Compression : std::uint8_t { kAuto, kOn, kOff };
+
 struct WorkerConfig {
   Incarnation incarnation = 0;  // random, not 0: of the first registration; later registrations count up from it
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
-  std::string images_key;                                // as in Register
-  std::uint64_t memory_scope = 0;                        // as in Register
-  bool lends_memory = false;                             // as in Register
+  std::string images_key;          // as in Register
+  std::uint64_t memory_scope = 0;  // as in Register
+  bool lends_memory = false;       // as in Register
+  Compression compression = Compression::kAuto;
   std::uint32_t threads = 1;                             // render threads, reported to the coordinator
   std::uint64_t memory_bytes = 0;                        // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
   std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this, and
@@ -96,6 +105,10 @@ struct MessageReceived {
   MessageToWorker message;
   Bytes payload;
 };  // from any plane; payload lengths are already checked, runs are checked when they are combined
+// Instead of it: of a shared image whose memory cannot be opened here.
+struct ImageUnreadable {
+  PartialImage image;
+};
 struct ChunkStored {
   SlabKey slab;
   Box box;                  // as in the chunk
@@ -126,6 +139,12 @@ struct SendFailed {
   GroupKey key;
   Status status;
 };
+// A SendPartial whose delivery is timed is about to be sent.
+struct PartialSent {
+  WorkerId to = 0;
+  std::uint64_t acknowledge = 0;  // as in the message
+  std::size_t bytes = 0;          // of the payload
+};
 // Images cannot be sent to this worker, or the connection broke, so that those that were sent may be lost.
 struct PeerUnreachable {
   WorkerId worker = 0;
@@ -137,8 +156,8 @@ struct Moved {
 struct LeaveRequested {};  // SIGTERM: take no new work, end when the old is done
 struct StopRequested {};   // end now
 struct Tick {};
-using WorkerEvent = std::variant<MessageReceived, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed, PeerUnreachable, Moved,
-                                 LeaveRequested, StopRequested, Tick>;
+using WorkerEvent = std::variant<MessageReceived, ImageUnreadable, ChunkStored, RenderDone, CombineDone, HiddenFound, SendFailed,
+                                 PartialSent, PeerUnreachable, Moved, LeaveRequested, StopRequested, Tick>;
 
 // ---- actions
 struct SendControl {
@@ -202,6 +221,12 @@ struct FindHidden {
   std::shared_ptr<const FrameSetup> setup;
   OcclusionMask known;
 };
+// How pixels reach another worker.
+struct Delivery {
+  bool lend = false;                              // the receiver can read this process' memory, so pixels may stay where they are
+  bool timed = false;                             // -> PartialSent
+  double bytes_per_second = LinkRates::kUnknown;  // of the link; pixels that are not lent are packed if that pays
+};
 // Sends message.pixels of `image`. Fills in how they travel, and adds bytes and times of messages to the reports of this worker's ranks. ->
 // SendFailed, or nothing.
 struct SendPartial {
@@ -211,6 +236,32 @@ struct SendPartial {
   PixelBounds frame;
   ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
   Rank rank = 0;                              // that sends
+  Delivery delivery;
+};
+// Sends an image that was lent for this message as runs, if it is still lent.
+struct ResendImage {
+  ImageRefused refused;
+  bool first = false;  // that this worker refuses: for the log
+};
+// To another worker's images plane.
+struct AnswerPeer {
+  Peer to;
+  std::variant<ImageReceived, ImageRefused> message;
+};
+// The images plane admits these keys and no others. Connections of those that have `ended` end.
+struct AdmitKeys {
+  std::set<std::string> keys, ended;
+};
+// Release what was lent and counted for groups that are over.
+struct ForgetGroups {
+  FrameId finished_before = 0;
+  std::vector<FrameId> cancelled;
+  GroupKey next;  // of its frame: earlier groups and older attempts
+
+  bool Over(const GroupKey& key) const {
+    return key.frame < finished_before || std::ranges::find(cancelled, key.frame) != cancelled.end() ||
+           (key.frame == next.frame && (key.attempt < next.attempt || key.group < next.group));
+  }
 };
 // Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator. -> SendFailed, or
 // nothing.
@@ -227,8 +278,9 @@ struct ReleaseImage {
 struct StopProcess {
   std::uint32_t rendered_ranks = 0;  // since the process began: for the log
 };
-using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender,
-                                  StartCombine, FindHidden, SendPartial, SendFrame, ReleaseImage, StopProcess>;
+using WorkerAction =
+    std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, CancelRender, StartCombine,
+                 FindHidden, SendPartial, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;
 
 // Entries in the machine's tables. At rest, all but those of cached slabs are 0.
@@ -251,7 +303,8 @@ class WorkerMachine {
   Time NextWake() const;
 
   bool registered() const;
-  WorkerId worker() const;  // 0 while unregistered
+  WorkerId worker() const;                      // 0 while unregistered
+  const Peer* FindPeer(WorkerId worker) const;  // another worker, as the coordinator has named it; null: it has not, or it has gone
   WorkerSizes sizes() const;
 
  private:

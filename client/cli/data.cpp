@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/commands.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/report/dataset_text.h"
 #include "coordinator/catalogue.h"
 
@@ -41,9 +41,9 @@ Status RunData(const DataOptions& options) {
   for (const std::string& item : order.items) {
     if (Status status = CheckItem(order.action, item); !status.ok()) return status;
   }
-  Result<Session> session = Session::OpenService(options.service);
-  if (!session.ok()) return session.status();
-  const Result<std::vector<DatasetStatus>> datasets = session->client().OrderData(order);
+  Result<ServiceConnection> connection = ServiceConnection::OpenService(options.service);
+  if (!connection.ok()) return connection.status();
+  const Result<std::vector<DatasetStatus>> datasets = connection->client().OrderData(order);
   if (!datasets.ok()) return datasets.status();
   if (options.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();

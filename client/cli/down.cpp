@@ -5,7 +5,7 @@
 #include <iostream>
 
 #include "client/cli/commands.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/service/service_state.h"
 
 namespace slabstream {
@@ -34,8 +34,8 @@ Status RunDown(const DownOptions& options) {
   const std::optional<ServiceState> state = FindState(service->endpoint);
   Status asked;
   {
-    Result<Session> session = Session::OpenService(*service);
-    asked = session.ok() ? session->client().ShutDownService() : session.status();
+    Result<ServiceConnection> connection = ServiceConnection::OpenService(*service);
+    asked = connection.ok() ? connection->client().ShutDownService() : connection.status();
   }
   if (!state) {
     if (asked.code() == StatusCode::kInvalidArgument) return asked;  // it refuses

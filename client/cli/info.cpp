@@ -18,6 +18,7 @@
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/resolve_look.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
 

@@ -15,7 +15,7 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/movie.h"
 #include "client/cli/picture_files.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "client/movie/turntable.h"
@@ -45,16 +45,16 @@ Status CheckPaths(const FrameOptions& options, const std::string& output) {
 }
 
 // Connects to the service for the volumes of all jobs, and fills in their datasets.
-Result<Session> OpenSession(const FrameOptions& options, std::vector<FrameJob>& jobs) {
+Result<ServiceConnection> Connect(const FrameOptions& options, std::vector<FrameJob>& jobs) {
   std::vector<std::string> sources;
   std::map<std::string, std::size_t> numbers;
   for (const FrameJob& job : jobs) {
     if (numbers.emplace(job.source, sources.size()).second) sources.push_back(job.source);
   }
-  Result<Session> session = Session::Open(options.connection, sources, options.layers);
-  if (!session.ok()) return session;
-  for (FrameJob& job : jobs) job.request.dataset = session->dataset(numbers[job.source]);
-  return session;
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, sources, options.layers);
+  if (!connection.ok()) return connection;
+  for (FrameJob& job : jobs) job.request.dataset = connection->dataset(numbers[job.source]);
+  return connection;
 }
 
 // A preset and shares of values depend on the volume. Over time they are those of the first one, so that a colour means the same value in
@@ -76,10 +76,10 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
                                                 int in_flight) {
-  Result<Session> session = OpenSession(options, jobs);
-  if (!session.ok()) return session.status();
+  Result<ServiceConnection> connection = Connect(options, jobs);
+  if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
-  if (Status status = SettleTransfer(session->client(), jobs); !status.ok()) return status;
+  if (Status status = SettleTransfer(connection->client(), jobs); !status.ok()) return status;
   const Result<std::unique_ptr<PictureSink>> pictures = open_pictures();
   if (!pictures.ok()) return pictures.status();
 
@@ -88,7 +88,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.pictures = pictures->get();
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
   loop.progress = options.progress;
-  Result<std::vector<FrameRecord>> frames = RenderFrames(session->client(), jobs, loop);
+  Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
   if (!options.camera_path.empty()) {
     const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";

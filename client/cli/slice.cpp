@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "client/cli/commands.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/image_io/image_writer.h"
 #include "common/base/files.h"
 
@@ -17,14 +17,14 @@ Status RunSlice(const SliceOptions& options) {
   SliceRequest slice = options.slice;
   slice.frame.dataset = "-";  // not known yet, and the rest is checked before anything is connected
   if (const auto frames = FramesOf(slice); !frames.ok()) return frames.status();
-  Result<Session> session = Session::Open(options.connection, options.source, options.layers);
-  if (!session.ok()) return session.status();
-  slice.frame.dataset = session->dataset();
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
+  if (!connection.ok()) return connection.status();
+  slice.frame.dataset = connection->dataset();
   const Result<std::vector<FrameRequest>> frames = FramesOf(slice);
   if (!frames.ok()) return frames.status();
   std::vector<LocalImage> images;
   for (const FrameRequest& frame : *frames) {
-    Result<Picture> picture = session->client().Render(frame);
+    Result<Picture> picture = connection->client().Render(frame);
     if (!picture.ok()) return picture.status();
     images.push_back(std::move(picture->image));
   }

@@ -4,14 +4,14 @@
 #include <nlohmann/json.hpp>
 
 #include "client/cli/commands.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 
 namespace slabstream {
 
 Status RunStatus(const StatusOptions& options) {
-  Result<Session> session = Session::OpenService(options.service);
-  if (!session.ok()) return session.status();
-  const Result<StatusReply> reply = session->client().QueryStatus();
+  Result<ServiceConnection> connection = ServiceConnection::OpenService(options.service);
+  if (!connection.ok()) return connection.status();
+  const Result<StatusReply> reply = connection->client().QueryStatus();
   if (!reply.ok()) return reply.status();
   std::cout << (options.json ? StatusJson(*reply).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n"
                              : StatusText(*reply));

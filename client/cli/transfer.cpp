@@ -5,6 +5,7 @@
 #include "client/cli/input_volume.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/resolve_look.h"
 
 namespace slabstream {
 

@@ -20,11 +20,12 @@
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
 #include "client/cli/restart_pause.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/service/process.h"
 #include "client/service/service_state.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "common/cli/program.h"
 #include "common/keys/role.h"
@@ -75,10 +76,10 @@ class LocalService {
   Status Start(const BlockedSignals& signals) {
     if (Status status = StartCoordinator(); !status.ok()) return status;
     if (Status status = StartWorkers(); !status.ok()) return status;
-    Result<Session> session = OpenSession();
-    if (!session.ok()) return session.status();
+    Result<ServiceConnection> connection = Connect();
+    if (!connection.ok()) return connection.status();
     for (const Time deadline = MonotonicNow() + kStartTimeout;;) {
-      const Result<StatusReply> reply = session->client().QueryStatus();
+      const Result<StatusReply> reply = connection->client().QueryStatus();
       if (!reply.ok()) return reply.status();
       if (int(reply->workers.size()) >= options_.workers) return SaveState(state_);
       for (std::size_t i = 0; i < children_.size(); ++i) {
@@ -108,7 +109,7 @@ class LocalService {
   // Asks the coordinator to end all processes, ends those that remain, and forgets the service, except its logs if they are to be kept.
   void Stop(bool keep_logs) {
     if (!children_.empty() && !children_.front().process->Ended() && !state_.endpoint.empty()) {
-      if (Result<Session> session = OpenSession(); session.ok() && session->client().ShutDownService().ok()) {
+      if (Result<ServiceConnection> connection = Connect(); connection.ok() && connection->client().ShutDownService().ok()) {
         for (const Time deadline = MonotonicNow() + kPatience; !AllEnded() && MonotonicNow() < deadline;) {
           ::usleep(20000);
         }
@@ -130,9 +131,9 @@ class LocalService {
 
   std::string ServiceFileOf(Role role) const { return fmt::format("{}/{}.json", state_.keys_folder, NameOf(role)); }
 
-  Result<Session> OpenSession() const {
-    return Session::OpenService(state_.keys_folder.empty() ? ServiceChoice{.endpoint = state_.endpoint, .file = {}}
-                                                           : ServiceChoice{.endpoint = {}, .file = ServiceFileOf(Role::kAdmin)});
+  Result<ServiceConnection> Connect() const {
+    return ServiceConnection::OpenService(state_.keys_folder.empty() ? ServiceChoice{.endpoint = state_.endpoint, .file = {}}
+                                                                     : ServiceChoice{.endpoint = {}, .file = ServiceFileOf(Role::kAdmin)});
   }
 
   std::string LogOf(std::size_t child) const {

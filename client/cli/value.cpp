@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/report/volume_text.h"
 #include "client/request/values.h"
 
@@ -22,9 +22,9 @@ Status RunValue(const ValueOptions& options) {
     if (!point.ok()) return point.status();
     points.push_back(*point);
   }
-  Result<Session> session = Session::Open(options.connection, options.source, options.layers);
-  if (!session.ok()) return session.status();
-  const Result<std::vector<VolumeSample>> samples = session->client().SampleAt(session->dataset(), std::move(points));
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
+  if (!connection.ok()) return connection.status();
+  const Result<std::vector<VolumeSample>> samples = connection->client().SampleAt(connection->dataset(), std::move(points));
   if (!samples.ok()) return samples.status();
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const VolumeSample& sample : *samples) {

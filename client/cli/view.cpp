@@ -13,9 +13,10 @@
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
 #include "client/cli/input_volume.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "client/service/process.h"
 #include "client/service/service_state.h"
+#include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "data/volume_io/read_options.h"
 
@@ -114,18 +115,18 @@ Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
 
 // The dataset that the service has for the file. With keys it takes an admin's.
 Status AddToService(const ServiceChoice& choice, const std::string& source) {
-  Result<Session> session = Session::OpenService(choice);
-  if (!session.ok()) return session.status();
-  return session->client().OrderData({.action = DataAction::kAdd, .items = {CatalogueEntry(source)}}).status();
+  Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
+  if (!connection.ok()) return connection.status();
+  return connection->client().OrderData({.action = DataAction::kAdd, .items = {CatalogueEntry(source)}}).status();
 }
 
 // NotFound: the service has no dataset of this name; Unavailable: there is no service.
 Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
-  Result<Session> session = Session::OpenService(choice);
-  if (!session.ok()) {
-    return Status(session.status().code(), fmt::format("SOURCE '{}' is no file, and {}", source, session.status().message()));
+  Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
+  if (!connection.ok()) {
+    return Status(connection.status().code(), fmt::format("SOURCE '{}' is no file, and {}", source, connection.status().message()));
   }
-  const Result<StatusReply> status = session->client().QueryStatus();
+  const Result<StatusReply> status = connection->client().QueryStatus();
   if (!status.ok()) return status.status();
   if (std::ranges::find(status->datasets, source, &DatasetStatus::name) != status->datasets.end()) return Status::Ok();
   return Status::NotFound(fmt::format("SOURCE '{}' is neither a file nor a dataset of the service", source));

@@ -41,7 +41,7 @@ std::string StatusText(const StatusReply& reply) {
 }
 
 Json StatusJson(const StatusReply& reply) {
-  Json workers = Json::array(), datasets = Json::array();
+  Json workers = Json::array(), datasets = Json::array(), renderers = Json::array();
   for (const WorkerStatus& worker : reply.workers) {
     workers.push_back({{"worker", worker.worker},
                        {"pid", worker.pid},
@@ -56,6 +56,9 @@ Json StatusJson(const StatusReply& reply) {
                        {"memory_bytes", worker.memory_bytes}});
   }
   for (const DatasetStatus& dataset : reply.datasets) datasets.push_back(DatasetJson(dataset));
+  for (const auto& [name, title, abilities, parameters] : reply.renderers) {
+    renderers.push_back({{"name", name}, {"title", title}, {"abilities", abilities}, {"parameters", parameters}});
+  }
   return {{"pid", reply.pid},
           {"uptime_ms", reply.uptime_ms},
           {"clients", reply.clients},
@@ -71,7 +74,8 @@ Json StatusJson(const StatusReply& reply) {
           {"workers_lost", reply.workers_lost},
           {"memory_bytes", reply.memory_bytes},
           {"workers", std::move(workers)},
-          {"datasets", std::move(datasets)}};
+          {"datasets", std::move(datasets)},
+          {"renderers", std::move(renderers)}};
 }
 
 }  // namespace slabstream

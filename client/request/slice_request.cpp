@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 
+#include "common/base/check.h"
+#include "common/renderers/registry.h"
 #include "common/view/named_view.h"
 #include "common/wire/validate_request.h"
 
@@ -21,12 +24,25 @@ FrameRequest FrameOf(const SliceRequest& slice, const SlicePlane& plane) {
   return frame;
 }
 
+std::string RendererThat(bool (*suits)(const RendererKind&)) {
+  const auto found = std::ranges::find_if(Renderers(), [&](const RendererKind* kind) { return suits(*kind); });
+  CHECK(found != Renderers().end());
+  return std::string((*found)->name());
+}
+
 // Values from level - window / 2 to level + window / 2 are black to white; all are opaque.
 TransferFunction Window(double window, double level) {
   return {.colors = {{level - window / 2, {0, 0, 0}}, {level + window / 2, {1, 1, 1}}}, .opacities = {{level, 1}}};
 }
 
 }  // namespace
+
+SliceRequest::SliceRequest() {
+  frame.renderer = RendererThat([](const RendererKind& kind) {
+    return std::ranges::find(kind.parameters(), "projection-mode", &RendererParameter::name) != kind.parameters().end();
+  });
+  frame.transfer.choice = "window";
+}
 
 Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   if (Status status = Validate(slice.size()); !status.ok()) return status;
@@ -42,7 +58,7 @@ Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   for (const SlicePlane& plane : slice.planes) {
     FrameRequest& frame = frames.emplace_back(FrameOf(slice, plane));
     if (layers) {
-      frame.renderer = "raycast";
+      frame.renderer = RendererThat([](const RendererKind& kind) { return kind.Can(Ability::kLabels) && kind.Can(Ability::kOverlay); });
       frame.shading.model = ShadingModel::kNone;
     }
     if (slice.window) frame.transfer.choice = Window(*slice.window, slice.level.value_or(*slice.window / 2));

@@ -17,10 +17,7 @@
 namespace slabstream {
 
 struct SliceRequest {
-  SliceRequest() {
-    frame.renderer = "mip";
-    frame.transfer.choice = "window";
-  }
+  SliceRequest();
 
   std::span<const SlicePlane> planes = kSliceChoices.back().planes;
   std::optional<Vec3> at;               // a point of the world

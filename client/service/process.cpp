@@ -44,14 +44,6 @@ constexpr Duration kPollInterval = std::chrono::milliseconds(20);
 
 }  // namespace
 
-Result<std::string> ProgramBeside(const std::string& name) {
-  std::error_code error;
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe", error);
-  const std::filesystem::path program = self.parent_path() / name;
-  if (!error && ::access(program.c_str(), X_OK) == 0) return program.string();
-  return Status::NotFound(fmt::format("the program '{}' is missing", program.string()));
-}
-
 std::string ProgramInPath(const std::string& name) {
   const char* const path = std::getenv("PATH");
   std::istringstream folders(path == nullptr ? "" : path);

@@ -25,8 +25,6 @@ constexpr std::array<EndStep, 3> EndSteps(Duration patience) {
   return {{{SIGTERM, std::chrono::milliseconds(200)}, {SIGTERM, patience}, {SIGKILL, patience}}};
 }
 
-// Path of a program that lies beside this one. NotFound if it does not.
-Result<std::string> ProgramBeside(const std::string& name);
 // Path of a program in one of the folders of $PATH; empty: there is none.
 std::string ProgramInPath(const std::string& name);
 

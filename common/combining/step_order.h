@@ -29,9 +29,6 @@ class StepOrder {
   void OnCombined(Rank rank);
   // A turn is the part of a rank that is here in a step: [0, turn_count()).
   std::uint32_t turn_count() const { return std::uint32_t(turns_.size()); }
-  // The caller may note any number for a turn.
-  static constexpr std::uint32_t kNoNote = ~std::uint32_t{0};
-  std::uint32_t& note(std::uint32_t turn) { return turns_[turn].note; }
   // The receiver's turn if the step goes from a rank elsewhere to one here, and not all of its pixels have been taken.
   std::optional<std::uint32_t> Awaited(std::uint32_t step) const;
   // `pixels` have come from a rank that is not here. The turn is that of an Awaited step, which has not had these pixels yet.
@@ -62,11 +59,10 @@ class StepOrder {
     std::uint32_t rank = 0;                   // index into ranks_
     std::uint32_t partner = kElsewhere;       // the other rank's turn, if that rank is here too
     std::uint32_t first_waiter = kElsewhere;  // the only turn that waits for this one; of many, their place in waiters_
-    std::uint32_t note = kNoNote;
-    std::uint32_t waits : 28 = 0;   // number of earlier turns of the rank to wait for
-    bool many_waiters : 1 = false;  // wait for this one
-    bool sends : 1 = false;         // or it receives
-    bool untaken : 1 = false;       // some pixels have arrived and are not taken
+    std::uint32_t waits : 28 = 0;             // number of earlier turns of the rank to wait for
+    bool many_waiters : 1 = false;            // wait for this one
+    bool sends : 1 = false;                   // or it receives
+    bool untaken : 1 = false;                 // some pixels have arrived and are not taken
     bool taken : 1 = false;
     std::uint64_t missing = 0;  // pixels of a step from elsewhere that have not arrived
   };

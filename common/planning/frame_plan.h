@@ -84,30 +84,4 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                             std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {},
                             std::int64_t slab_bytes_target = kSlabBytesTarget);
 
-// The function that a request names or holds, for this volume. NotFound: no such preset.
-Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
-
-// InvalidArgument: the renderer draws cells, and the dataset has none.
-Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary);
-
-// How a request shows a dataset, in any view.
-struct VolumeLook {
-  TransferFunction transfer;
-  ClipRegion clip;
-  LayerLooks layers;
-};
-// InvalidArgument: as CheckHasWhatIsDrawn; the volume has no slice with the slab's index, or no such layer, or there is no such label;
-// NotFound: no such preset.
-Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary);
-
-// Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules
-// and display change. The display worker stays if it is still in the roster: it holds the accumulated image. Unavailable: no worker.
-Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
-
-// The plan of another frame of the same request, for a roster of the same size with a worker in it. Only who does what changes.
-FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);
-
-// The worker of each box: its slot's, or the one that it is lent to; 0 if the box belongs to nobody, or if the roster has no worker.
-std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
-
 }  // namespace slabstream

@@ -16,6 +16,16 @@ void PlaceBoxes(FramePlan& plan);
 // worker in the roster; the plan is then unchanged.
 Status AssignWorkers(const Roster& roster, FramePlan& plan);
 
+// Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules
+// and display change. The display worker stays if it is still in the roster: it holds the accumulated image. Unavailable: no worker.
+Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
+
+// The plan of another frame of the same request, for a roster of the same size with a worker in it. Only who does what changes.
+FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);
+
+// The worker of each box: its slot's, or the one that it is lent to; 0 if the box belongs to nobody, or if the roster has no worker.
+std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
+
 // The rank where the group's image should end: the display worker's, so that it need not travel; 0 if it has none.
 Rank RootOf(const GroupPlan& group, WorkerId display);
 

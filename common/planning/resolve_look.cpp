@@ -1,10 +1,11 @@
+#include "common/planning/resolve_look.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <string>
 #include <utility>
 
-#include "common/planning/frame_plan.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {

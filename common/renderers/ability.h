@@ -1,5 +1,5 @@
-// Ability: what some renderers can do and others cannot. A request for what its renderer cannot do is refused, except that lights have no
-// effect without kLights.
+// Ability: what some renderers can do and others cannot. A request for what its renderer cannot do is refused, except that lights and
+// transfer functions have no effect without kLights and kTransfer.
 #pragma once
 
 #include <array>
@@ -17,11 +17,12 @@ enum class Ability : std::uint8_t {
   kCells = 5,            // draws the cells of unstructured grids; other datasets are refused
   kLights = 6,           // lights surfaces (Shading)
   kDepthShading = 7,     // lights them by ShadingModel::kDepthGradient, too
+  kTransfer = 8,         // shows values by the transfer function
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 8> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
-                                                                  "overlay",     "cells",       "lights",           "depth-shading"};
+inline constexpr std::array<std::string_view, 9> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",  "overlay",
+                                                                  "cells",       "lights",      "depth-shading",    "transfer"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

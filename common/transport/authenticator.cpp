@@ -14,7 +14,7 @@
 #include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/transport/context_impl.h"
-#include "common/transport/sealed_sessions.h"
+#include "common/transport/latest_seals.h"
 #include "common/transport/socket.h"
 
 namespace slabstream {
@@ -29,7 +29,7 @@ constexpr std::chrono::milliseconds kBetweenLooks{50}, kUntilAsked{-1};
 struct Request {
   std::vector<zmq::message_t> route;  // to where the answer goes, with the empty frame behind it
   std::string id, plane, public_key;
-  std::optional<Session> session;  // of a sealed connection
+  std::optional<Seal> seal;  // of a sealed connection
   Time asked;
 };
 
@@ -50,7 +50,7 @@ struct Authenticator::Impl {
   struct Plane {
     std::set<std::string> admitted;
     Duration patience{};
-    std::shared_ptr<SealedSessions> sessions;  // null: CURVE
+    std::shared_ptr<LatestSeals> seals;  // null: CURVE
   };
   enum class Verdict { kAdmit, kWait, kNotYet, kRefuse };
 
@@ -59,7 +59,7 @@ struct Authenticator::Impl {
     const auto plane = planes.find(request.plane);
     if (plane == planes.end() || request.public_key.empty()) return Verdict::kRefuse;
     if (plane->second.admitted.contains(request.public_key)) {
-      const bool enters = !request.session || plane->second.sessions->Enter(request.public_key, *request.session);
+      const bool enters = !request.seal || plane->second.seals->Enter(request.public_key, *request.seal);
       return enters ? Verdict::kAdmit : Verdict::kRefuse;
     }
     if (plane->second.patience == Duration::zero()) return Verdict::kRefuse;
@@ -78,15 +78,15 @@ struct Authenticator::Impl {
     if (verdict == Verdict::kRefuse) complaints.Warning("refused a connection to the " + request.plane + " plane: unknown key");
   }
 
-  // Names the sender and the session if the ticket is the sender's.
+  // Names the sender and the seal if the ticket is the sender's.
   void ReadTicket(const std::string& public_key, std::string_view ticket, Request& request) {
-    std::shared_ptr<SealedSessions> sessions;
+    std::shared_ptr<LatestSeals> seals;
     {
       const std::lock_guard lock(mutex);
-      if (const auto plane = planes.find(request.plane); plane != planes.end()) sessions = plane->second.sessions;
+      if (const auto plane = planes.find(request.plane); plane != planes.end()) seals = plane->second.seals;
     }
-    if (sessions != nullptr) request.session = sessions->Read(ticket, public_key);
-    if (request.session) request.public_key = public_key;
+    if (seals != nullptr) request.seal = seals->Read(ticket, public_key);
+    if (request.seal) request.public_key = public_key;
   }
 
   // False: nothing is there.
@@ -158,17 +158,9 @@ void Authenticator::AdmitOnly(const std::string& plane, std::set<std::string> pu
   impl_->wakeup.Notify();
 }
 
-void Authenticator::Admit(const std::string& plane, const std::string& public_key) {
-  {
-    const std::lock_guard lock(impl_->mutex);
-    if (!impl_->planes[plane].admitted.insert(public_key).second) return;
-  }
-  impl_->wakeup.Notify();
-}
-
-void Authenticator::SetSealed(const std::string& plane, std::shared_ptr<SealedSessions> sessions) {
+void Authenticator::SetSealed(const std::string& plane, std::shared_ptr<LatestSeals> seals) {
   const std::lock_guard lock(impl_->mutex);
-  impl_->planes[plane].sessions = std::move(sessions);
+  impl_->planes[plane].seals = std::move(seals);
 }
 
 void Authenticator::SetPatience(const std::string& plane, Duration patience) {

@@ -13,7 +13,7 @@
 namespace slabstream {
 
 class Context;
-class SealedSessions;
+class LatestSeals;
 
 class Authenticator {
  public:
@@ -22,14 +22,13 @@ class Authenticator {
 
   // Replaces the public keys that may connect to `plane`. Connections that are there stay (Socket::EndConnections ends them).
   void AdmitOnly(const std::string& plane, std::set<std::string> public_keys);
-  void Admit(const std::string& plane, const std::string& public_key);
 
   // An unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long to be admitted, and
   // tries again after that. This is for planes that learn keys from messages, which the key's holder may have heard earlier.
   void SetPatience(const std::string& plane, Duration patience);
 
-  // From now on whoever connects to this plane brings a ticket of a sealed session, and who is admitted enters it there.
-  void SetSealed(const std::string& plane, std::shared_ptr<SealedSessions> sessions);
+  // From now on whoever connects to this plane brings the ticket of a seal, and who is admitted enters it there.
+  void SetSealed(const std::string& plane, std::shared_ptr<LatestSeals> seals);
 
  private:
   struct Impl;

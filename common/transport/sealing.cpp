@@ -60,7 +60,7 @@ std::optional<RawKey> SharedSecret(const RawKey& own_secret, const RawKey& other
 }
 
 struct Secrets {
-  Session::Secret key;
+  Seal::Secret key;
   std::array<std::uint8_t, kProofBytes> proof;
 };
 
@@ -92,7 +92,7 @@ Secrets Derive(const RawKey& shared, const std::array<std::uint8_t, kNameBytes>&
   return secrets;
 }
 
-std::array<std::uint8_t, kNameBytes> BytesOf(const SessionName& name) {
+std::array<std::uint8_t, kNameBytes> BytesOf(const SealName& name) {
   std::array<std::uint8_t, kNameBytes> bytes{};
   StoreLittle(name.made, bytes.data());
   std::ranges::copy(name.chance, bytes.begin() + 8);
@@ -101,47 +101,47 @@ std::array<std::uint8_t, kNameBytes> BytesOf(const SessionName& name) {
 
 }  // namespace
 
-std::optional<Session> Session::Make(const KeyPair& own, const std::string& to) {
+std::optional<Seal> Seal::Make(const KeyPair& own, const std::string& to) {
   const std::optional<RawKey> secret = RawOf(own.secret_key), from = RawOf(own.public_key), receiver = RawOf(to);
   if (!secret || !from || !receiver) return std::nullopt;
   const std::optional<RawKey> shared = SharedSecret(*secret, *receiver);
   if (!shared) return std::nullopt;
-  Session session;
-  session.name.made = std::uint64_t(std::chrono::nanoseconds(MonotonicNow().time_since_epoch()).count());
-  CHECK_EQ(RAND_bytes(session.name.chance.data(), int(session.name.chance.size())), 1);
-  const std::array<std::uint8_t, kNameBytes> name = BytesOf(session.name);
+  Seal seal;
+  seal.name.made = std::uint64_t(std::chrono::nanoseconds(MonotonicNow().time_since_epoch()).count());
+  CHECK_EQ(RAND_bytes(seal.name.chance.data(), int(seal.name.chance.size())), 1);
+  const std::array<std::uint8_t, kNameBytes> name = BytesOf(seal.name);
   const Secrets secrets = Derive(*shared, name, *from, *receiver);
-  session.key = secrets.key;
+  seal.key = secrets.key;
   std::array<std::uint8_t, kTicketBytes> ticket{};
   std::ranges::copy(name, ticket.begin());
   std::ranges::copy(secrets.proof, ticket.begin() + kNameBytes);
-  session.ticket.resize(kTicketTextBytes + 1);
-  zmq_z85_encode(session.ticket.data(), ticket.data(), ticket.size());
-  session.ticket.pop_back();  // the closing zero
-  return session;
+  seal.ticket.resize(kTicketTextBytes + 1);
+  zmq_z85_encode(seal.ticket.data(), ticket.data(), ticket.size());
+  seal.ticket.pop_back();  // the closing zero
+  return seal;
 }
 
-std::optional<Session> Session::Read(std::string_view text, const std::string& from, const KeyPair& own) {
+std::optional<Seal> Seal::Read(std::string_view text, const std::string& from, const KeyPair& own) {
   std::array<std::uint8_t, kTicketBytes> ticket{};
   if (text.size() != kTicketTextBytes || zmq_z85_decode(ticket.data(), std::string(text).c_str()) == nullptr) return std::nullopt;
   const std::optional<RawKey> secret = RawOf(own.secret_key), sender = RawOf(from), to = RawOf(own.public_key);
   if (!secret || !sender || !to) return std::nullopt;
   const std::optional<RawKey> shared = SharedSecret(*secret, *sender);
   if (!shared) return std::nullopt;
-  Session session;
-  session.ticket = text;
-  session.name.made = LoadLittle<std::uint64_t>(ticket.data());
-  std::copy_n(ticket.begin() + 8, session.name.chance.size(), session.name.chance.begin());
-  const Secrets secrets = Derive(*shared, BytesOf(session.name), *sender, *to);
-  session.key = secrets.key;
+  Seal seal;
+  seal.ticket = text;
+  seal.name.made = LoadLittle<std::uint64_t>(ticket.data());
+  std::copy_n(ticket.begin() + 8, seal.name.chance.size(), seal.name.chance.begin());
+  const Secrets secrets = Derive(*shared, BytesOf(seal.name), *sender, *to);
+  seal.key = secrets.key;
   if (CRYPTO_memcmp(secrets.proof.data(), ticket.data() + kNameBytes, kProofBytes) != 0) return std::nullopt;
-  return session;
+  return seal;
 }
 
-// One direction of one session.
+// One direction of one seal.
 class FrameCipher {
  public:
-  FrameCipher(const Session& session, bool seals) : secret_(session.key), seals_(seals) { CHECK(context_ != nullptr); }
+  FrameCipher(const Seal& seal, bool seals) : secret_(seal.key), seals_(seals) { CHECK(context_ != nullptr); }
 
   // Of the next frame. Its `to` has room for as many bytes as will pass.
   void Begin(std::uint64_t message, const std::byte* place, std::byte* to) {
@@ -185,14 +185,14 @@ class FrameCipher {
   struct Free {
     void operator()(EVP_CIPHER_CTX* context) const { EVP_CIPHER_CTX_free(context); }
   };
-  const Session::Secret secret_;
+  const Seal::Secret secret_;
   const bool seals_;
   const std::unique_ptr<EVP_CIPHER_CTX, Free> context_{EVP_CIPHER_CTX_new()};
   std::optional<std::uint64_t> key_number_;
   std::byte* to_ = nullptr;
 };
 
-Sealer::Sealer(const Session& session) : cipher_(std::make_unique<FrameCipher>(session, true)) {}
+Sealer::Sealer(const Seal& seal) : cipher_(std::make_unique<FrameCipher>(seal, true)) {}
 Sealer::~Sealer() = default;
 
 void Sealer::Begin(std::span<const std::byte> header, std::span<const std::byte> payload) {
@@ -226,8 +226,8 @@ PooledVector<std::byte> Sealer::Next() {
   return sealed;
 }
 
-Unsealer::Unsealer(const Session& session, std::uint64_t max_payload_bytes)
-    : cipher_(std::make_unique<FrameCipher>(session, false)), max_payload_bytes_(max_payload_bytes) {}
+Unsealer::Unsealer(const Seal& seal, std::uint64_t max_payload_bytes)
+    : cipher_(std::make_unique<FrameCipher>(seal, false)), max_payload_bytes_(max_payload_bytes) {}
 Unsealer::~Unsealer() = default;
 
 std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open(std::span<const std::byte> frame) {

@@ -2,11 +2,11 @@
 // cut into frames, each sealed by AES-128-OCB (RFC 7253), so that frames are sealed, sent and opened at the same time. Messages go one way
 // only: from whoever connects to whoever listens. Private to this folder.
 //
-//   1. Both have Curve25519 keys, and each knows the other's public one. Whoever connects makes a Session: a name for it, and from the two
-//      keys and the name the session's secrets (X25519, then HKDF-SHA256). Its Ticket, the name and a proof, goes with the handshake.
-//   2. Whoever listens derives the same secrets from the ticket, and believes it if the proof is the same (SealedSessions).
+//   1. Both have Curve25519 keys, and each knows the other's public one. Whoever connects makes a Seal: a name for it, and from the two
+//      keys and the name the seal's secrets (X25519, then HKDF-SHA256). Its Ticket, the name and a proof, goes with the handshake.
+//   2. Whoever listens derives the same secrets from the ticket, and believes it if the proof is the same (LatestSeals).
 //   3. Sealer makes frames of messages, Unsealer makes messages of frames.
-// Nothing but the keys' holders can make or read any of it. Nothing is accepted twice: names of sessions grow, and so do numbers of frames.
+// Nothing but the keys' holders can make or read any of it. Nothing is accepted twice: names of seals grow, and so do numbers of frames.
 #pragma once
 
 #include <array>
@@ -29,7 +29,7 @@ struct evp_cipher_ctx_st;
 namespace slabstream {
 
 // A frame has four parts. All numbers are little endian.
-//   8 bytes   number of the message in its session, from 1
+//   8 bytes   number of the message in its seal, from 1
 //   4 bytes   number of the frame in its message, from 0; both numbers together are the nonce
 //   ...       ciphertext
 //   16 bytes  tag
@@ -46,22 +46,22 @@ inline constexpr std::size_t kMaxSealedHeaderBytes = kSealedPartBytes - kSealedS
 // The frames of the largest message.
 constexpr std::size_t SealedFrames(std::uint64_t payload_bytes) { return std::size_t(payload_bytes / kSealedPartBytes) + 2; }
 
-struct SessionName {
-  std::uint64_t made = 0;                 // nanoseconds of the maker's monotonic clock: later sessions of one process have greater ones
-  std::array<std::uint8_t, 16> chance{};  // random: no two sessions have the same name
-  friend bool operator==(const SessionName&, const SessionName&) = default;
+struct SealName {
+  std::uint64_t made = 0;                 // nanoseconds of the maker's monotonic clock: later seals of one process have greater ones
+  std::array<std::uint8_t, 16> chance{};  // random: no two seals have the same name
+  friend bool operator==(const SealName&, const SealName&) = default;
 };
 
-struct Session {
+struct Seal {
   using Secret = std::array<std::uint8_t, 32>;  // keys of frames are derived from it
-  SessionName name;
+  SealName name;
   Secret key{};
   std::string ticket;  // 70 printable characters
 
   // A new one, from the holder of `own` to the holder of the public key `to`. None: `to` is no key, or one that fits every secret.
-  static std::optional<Session> Make(const KeyPair& own, const std::string& to);
+  static std::optional<Seal> Make(const KeyPair& own, const std::string& to);
   // The one that `ticket` is of, as the holder of `own` sees it. None: the holder of `from` did not make it for `own`.
-  static std::optional<Session> Read(std::string_view ticket, const std::string& from, const KeyPair& own);
+  static std::optional<Seal> Read(std::string_view ticket, const std::string& from, const KeyPair& own);
 };
 
 class FrameCipher;
@@ -69,7 +69,7 @@ class FrameCipher;
 // Seals one message after the other.
 class Sealer {
  public:
-  explicit Sealer(const Session& session);
+  explicit Sealer(const Seal& seal);
   ~Sealer();
 
   // Then Next() until it is empty. `header` is at most kMaxSealedHeaderBytes; both stay until then. What was left of the last message is
@@ -90,7 +90,7 @@ class Sealer {
 class Unsealer {
  public:
   // Messages with a larger payload are dropped.
-  Unsealer(const Session& session, std::uint64_t max_payload_bytes);
+  Unsealer(const Seal& seal, std::uint64_t max_payload_bytes);
   ~Unsealer();
 
   struct Forged {};                    // altered, cut, sealed by somebody else, or seen before

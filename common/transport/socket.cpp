@@ -15,8 +15,8 @@
 #include "common/transport/context_impl.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/ipc_listener.h"
+#include "common/transport/latest_seals.h"
 #include "common/transport/message_parts.h"
-#include "common/transport/sealed_sessions.h"
 #include "common/transport/sealing.h"
 
 namespace slabstream {
@@ -34,14 +34,14 @@ struct Socket::Impl {
   const bool router;
   bool encrypted = false;  // all of its connections
   bool knows_connections = options.ends_connections;
-  ConnectionTable connections;               // of users
-  std::unique_ptr<ConnectionTuner> tuner;    // of the tcp connections made here
-  std::unique_ptr<ConnectionLimit> limit;    // of the connections accepted here
-  std::shared_ptr<SealedSessions> sessions;  // if it listens for sealed connections
-  std::optional<Sealer> sealer;              // if it has a sealed connection
-  LimitedLog complaints;                     // about forged frames
-  std::vector<std::string> names;            // inproc endpoints bound here
-  std::vector<IpcListener> listeners;        // ipc files bound here
+  ConnectionTable connections;             // of users
+  std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
+  std::unique_ptr<ConnectionLimit> limit;  // of the connections accepted here
+  std::shared_ptr<LatestSeals> seals;      // if it listens for sealed connections
+  std::optional<Sealer> sealer;            // if it has a sealed connection
+  LimitedLog complaints;                   // about forged frames
+  std::vector<std::string> names;          // inproc endpoints bound here
+  std::vector<IpcListener> listeners;      // ipc files bound here
 
   // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.
   ~Impl() {
@@ -130,9 +130,9 @@ void UseClientKeys(zmq::socket_t& socket, const ClientKeys& keys) {
 Status UseSealedServerKeys(Socket::Impl& impl, const ServerKeys& keys) {
   const std::optional<std::string> public_key = PublicKeyOf(keys.secret_key);
   if (!public_key) return Status::InvalidArgument("the secret key of the plane " + keys.plane + " is no key");
-  impl.sessions = std::make_shared<SealedSessions>(KeyPair{*public_key, keys.secret_key},
-                                                   std::uint64_t(std::max<std::int64_t>(impl.options.max_message_bytes, 0)));
-  impl.context.authenticator().SetSealed(keys.plane, impl.sessions);
+  impl.seals = std::make_shared<LatestSeals>(KeyPair{*public_key, keys.secret_key},
+                                             std::uint64_t(std::max<std::int64_t>(impl.options.max_message_bytes, 0)));
+  impl.context.authenticator().SetSealed(keys.plane, impl.seals);
   impl.socket.set(zmq::sockopt::plain_server, true);
   impl.socket.set(zmq::sockopt::zap_domain, keys.plane);
   impl.socket.set(zmq::sockopt::maxmsgsize, std::int64_t{kSealedFrameBytes});
@@ -141,11 +141,11 @@ Status UseSealedServerKeys(Socket::Impl& impl, const ServerKeys& keys) {
 }
 Status UseSealedClientKeys(Socket::Impl& impl, const ClientKeys& keys) {
   CHECK(!impl.sealer) << "a sealed socket connects once";
-  const std::optional<Session> session = Session::Make(keys.own, keys.server_key);
-  if (!session) return Status::InvalidArgument("the key of whoever listens, or the own one, is no key");
-  impl.sealer.emplace(*session);
+  const std::optional<Seal> seal = Seal::Make(keys.own, keys.server_key);
+  if (!seal) return Status::InvalidArgument("the key of whoever listens, or the own one, is no key");
+  impl.sealer.emplace(*seal);
   impl.socket.set(zmq::sockopt::plain_username, keys.own.public_key);
-  impl.socket.set(zmq::sockopt::plain_password, session->ticket);
+  impl.socket.set(zmq::sockopt::plain_password, seal->ticket);
   // One message of any size goes through an empty queue.
   const auto largest = std::uint64_t(std::max<std::int64_t>(impl.options.max_message_bytes, 0));
   impl.socket.set(zmq::sockopt::sndhwm, impl.options.send_high_water_mark + int(SealedFrames(largest)));
@@ -227,7 +227,7 @@ std::optional<Incoming> TryReceiveSealed(Socket::Impl& impl) {
       if (frames.empty()) incoming.user = impl.connections.Heard(incoming.identity, part);
       frames.push_back(Adopt(std::move(part)));
     }
-    const std::shared_ptr<Unsealer> unsealer = impl.sessions->Of(incoming.user);
+    const std::shared_ptr<Unsealer> unsealer = impl.seals->Of(incoming.user);
     if (unsealer != nullptr && frames.size() == 1) {
       auto opened = unsealer->Open(frames[0].span());
       if (std::holds_alternative<Unsealer::More>(opened)) continue;
@@ -325,7 +325,7 @@ Status Socket::Connect(const std::string& text) {
 Status Socket::Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload) {
   zmq::socket_t& socket = impl_->socket;
   if (impl_->tuner != nullptr) impl_->tuner->HandleEvents();
-  if (impl_->sessions != nullptr) return Status::InvalidArgument("send: sealed connections go one way, to this socket");
+  if (impl_->seals != nullptr) return Status::InvalidArgument("send: sealed connections go one way, to this socket");
   if (impl_->sealer) return SendSealed(*impl_, header, payload);
   // Make all parts before sending the first one: running out of memory between them would leave half a message.
   zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header))), body = Share(payload);
@@ -355,14 +355,14 @@ std::string Socket::local_host() const {
 
 void Socket::EndConnections(const std::string& user) {
   impl_->connections.End(user);
-  const std::shared_ptr<Unsealer> unsealer = impl_->sessions == nullptr ? nullptr : impl_->sessions->Of(user);
+  const std::shared_ptr<Unsealer> unsealer = impl_->seals == nullptr ? nullptr : impl_->seals->Of(user);
   if (unsealer != nullptr) unsealer->DropPartial();
 }
 void Socket::EndConnection(const std::string& identity) { impl_->connections.EndOne(identity); }
 
 std::optional<Incoming> Socket::TryReceive() {
   std::optional<Incoming> incoming;
-  if (impl_->sessions != nullptr) {
+  if (impl_->seals != nullptr) {
     incoming = TryReceiveSealed(*impl_);
   } else if (!impl_->sealer) {  // whose socket expects nothing, and nothing that comes is authenticated
     incoming = TryReceivePlain(*impl_);

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/merged.h"
 #include "common/base/status.h"
 #include "common/wire/client_messages.h"
 #include "common/wire/control_messages.h"
@@ -24,24 +25,6 @@ namespace slabstream {
 
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
-
-template <class... Variants>
-struct Merge;
-template <class Variant>
-struct Merge<Variant> {
-  using Type = Variant;
-};
-template <class... A, class... B, class... Variants>
-struct Merge<std::variant<A...>, std::variant<B...>, Variants...> : Merge<std::variant<A..., B...>, Variants...> {};
-// One variant of all that these variants may hold.
-template <class... Variants>
-using Merged = typename Merge<Variants...>::Type;
-
-// The same message in a variant of more.
-template <class Wider>
-Wider Widen(auto variant) {
-  return std::visit([](auto& message) { return Wider(std::move(message)); }, variant);
-}
 
 using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToSlabs, SlabsToWorker, WorkerToWorker, ClientToCoordinator,
                           CoordinatorToClient>;

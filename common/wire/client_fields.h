@@ -164,6 +164,15 @@ void Fields(auto& io, Is<RefusedRequests> auto& m) {
 }
 
 v1::StatusReply ProtoOf(const StatusReply&);
+void Fields(auto& io, Is<RendererStatus> auto& m) {
+  using P = v1::RendererStatus;
+  constexpr std::size_t kMost = 64;
+  io.Text("name", m.name, &P::name, &P::mutable_name, 1, kMaxNameBytes);
+  io.Text("title", m.title, &P::title, &P::mutable_title, 0, kMaxNameBytes);
+  io.ByteStrings("abilities", m.abilities, &P::abilities, &P::mutable_abilities, kMost, kMaxNameBytes);
+  io.ByteStrings("parameters", m.parameters, &P::parameters, &P::mutable_parameters, kMost, kMaxNameBytes);
+}
+
 void Fields(auto& io, Is<StatusReply> auto& m) {
   using P = v1::StatusReply;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
@@ -180,6 +189,7 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
   io.Messages("datasets", m.datasets, &P::datasets, &P::mutable_datasets, kMaxListed);
   io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
   io.Message("refused", m.refused, &P::refused, &P::mutable_refused);
+  io.Messages("renderers", m.renderers, &P::renderers, &P::mutable_renderers, 256);
 }
 
 v1::ShutDown ProtoOf(const ShutDown&);

@@ -26,6 +26,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/merged.h"
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
@@ -149,6 +150,17 @@ struct RefusedRequests {
   std::uint64_t too_large = 0;        // more than the memory of a worker or of the coordinator
   std::uint64_t over_quota = 0;       // too many open requests of the client, or of all clients
   friend bool operator==(const RefusedRequests&, const RefusedRequests&) = default;
+  RefusedRequests& operator+=(const RefusedRequests& more) {
+    return *this = {bad_request + more.bad_request, unknown_dataset + more.unknown_dataset, too_large + more.too_large,
+                    over_quota + more.over_quota};
+  }
+};
+
+// A renderer of the service: what requests may ask of it.
+struct RendererStatus {
+  std::string name, title;
+  std::vector<std::string> abilities, parameters;  // names
+  friend bool operator==(const RendererStatus&, const RendererStatus&) = default;
 };
 
 struct StatusReply {
@@ -162,6 +174,7 @@ struct StatusReply {
   std::vector<DatasetStatus> datasets;
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   RefusedRequests refused;
+  std::vector<RendererStatus> renderers = {};
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 
@@ -276,8 +289,9 @@ struct PickReply {
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
 
-using ClientToCoordinator = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown, KeysOrder, DataOrder, SummaryQuery,
-                                         SampleQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
+using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
 using CoordinatorToClient = std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply,
                                          DataReply, OrderRefused, SummaryReply, SampleReply, PickReply, VolumeCredit>;
 

@@ -8,14 +8,12 @@
 #include <sys/types.h>
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
-#include "data/volume_io/dicom_elements.h"
-#include "data/volume_io/dicom_image.h"
+#include "data/volume_io/compressed_frame.h"
 
 namespace slabstream {
 
@@ -24,24 +22,16 @@ bool CanDecompress(const std::string& transfer_syntax);
 // Their names, for messages.
 inline constexpr const char* kCompressions = "JPEG, JPEG Lossless, JPEG-LS, JPEG 2000 and RLE";
 
-struct CompressedFrame {
-  std::string path, transfer_syntax;
-  std::vector<DicomFragment> fragments;  // its bytes in the file, one after the other
-  std::int32_t columns = 0, rows = 0;
-  DicomPixelFormat format;
-
-  std::int64_t bytes() const { return std::int64_t{columns} * rows * (format.bits_allocated / 8); }
-};
-
 // Processes that decompress frames ahead of the caller. One thread at a time.
 class DicomDecoder {
  public:
+  // Unavailable: the program is missing, or a process cannot be started.
   static Result<DicomDecoder> Start(std::vector<CompressedFrame> frames);
   DicomDecoder(DicomDecoder&&) = default;
   DicomDecoder& operator=(DicomDecoder&&) = delete;
   ~DicomDecoder();  // ends the processes
 
-  // The next frame: its pixels in this machine's byte order, format.bits_allocated each. DataLoss: damaged; the message names the file.
+  // The next frame: its pixels in this machine's byte order, bits_allocated each. DataLoss: damaged; the message names the file.
   Status Read(std::span<std::byte> out);
 
  private:

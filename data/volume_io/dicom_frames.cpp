@@ -172,7 +172,8 @@ Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& 
       if (!of_frames.ok()) return of_frames.status();
       fragments[image] = *std::move(of_frames);
     }
-    compressed.push_back({image->path, image->transfer_syntax, fragments[image][frame], image->columns, image->rows, image->format});
+    compressed.push_back(
+        {image->path, image->transfer_syntax, fragments[image][frame], image->columns, image->rows, image->format.bits_allocated});
   }
   Result<DicomDecoder> decoder = DicomDecoder::Start(std::move(compressed));
   if (!decoder.ok()) return decoder.status();

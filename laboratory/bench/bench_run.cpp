@@ -8,21 +8,21 @@
 #include <utility>
 
 #include "client/cli/picture_files.h"
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 
 namespace slabstream {
 namespace {
 
-Result<Session> OpenSession(const BenchCase& c, const ConnectionOptions& connection) {
-  if (connection.local_workers == 0) return Session::Open(connection, c.dataset);
-  if (const auto* path = std::get_if<std::string>(&c.volume)) return Session::Open(connection, *path);
+Result<ServiceConnection> Connect(const BenchCase& c, const ConnectionOptions& connection) {
+  if (connection.local_workers == 0) return ServiceConnection::Open(connection, c.dataset);
+  if (const auto* path = std::get_if<std::string>(&c.volume)) return ServiceConnection::Open(connection, *path);
   // A sphere is made beforehand, so that the first frame's time is the service's own. Only the service keeps it.
   Result<std::shared_ptr<const Volume>> sphere = LoadBenchVolume(c);
   if (!sphere.ok()) return sphere.status();
-  return Session::OpenLocal(connection, {[c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
-                              if (made == nullptr) return LoadBenchVolume(c);
-                              return std::exchange(made, nullptr);
-                            }});
+  return ServiceConnection::OpenLocal(connection, {[c, made = *std::move(sphere)]() mutable -> Result<std::shared_ptr<const Volume>> {
+                                        if (made == nullptr) return LoadBenchVolume(c);
+                                        return std::exchange(made, nullptr);
+                                      }});
 }
 
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
@@ -63,15 +63,15 @@ Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& opt
 
 Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions& options) {
   ResetPeakMemory();
-  Result<Session> session = OpenSession(bench_case, options.connection);
-  if (!session.ok()) return session.status();
-  const std::vector<FrameJob> jobs = MeasuredJobs(bench_case, options, session->dataset());
+  Result<ServiceConnection> connection = Connect(bench_case, options.connection);
+  if (!connection.ok()) return connection.status();
+  const std::vector<FrameJob> jobs = MeasuredJobs(bench_case, options, connection->dataset());
 
   FrameLoopOptions loop;
   loop.keep_reports = true;
   loop.progress = ::isatty(STDERR_FILENO) == 1;  // else the rows of the table show the progress
   loop.label = bench_case.name;
-  const Result<std::vector<FrameRecord>> records = RenderFrames(session->client(), jobs, loop);
+  const Result<std::vector<FrameRecord>> records = RenderFrames(connection->client(), jobs, loop);
   if (!records.ok()) return records.status();
 
   BenchResult result;
@@ -80,13 +80,13 @@ Result<BenchResult> RunBenchCase(const BenchCase& bench_case, const BenchOptions
   result.first_frame_ms = double(records->front().latency.count()) / 1e6;
   const std::size_t warm_up = bench_case.renderer->projections().size();
   SetFrames(result, std::span(jobs).subspan(warm_up), std::span(*records).subspan(warm_up));
-  const Result<StatusReply> status = session->client().QueryStatus();
+  const Result<StatusReply> status = connection->client().QueryStatus();
   if (!status.ok()) return status.status();
   for (const DatasetStatus& dataset : status->datasets) {
-    if (dataset.name == session->dataset()) result.description = dataset.description;
+    if (dataset.name == connection->dataset()) result.description = dataset.description;
   }
   if (!options.pictures_directory.empty()) {
-    if (Status written = WritePictures(session->client(), bench_case, options, session->dataset()); !written.ok()) return written;
+    if (Status written = WritePictures(connection->client(), bench_case, options, connection->dataset()); !written.ok()) return written;
   }
   return result;
 }

@@ -6,11 +6,12 @@
 #include <cmath>
 #include <utility>
 
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "common/base/check.h"
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/resolve_look.h"
 #include "common/planning/team.h"
 #include "common/renderers/registry.h"
 #include "common/wire/validate_request.h"
@@ -154,11 +155,12 @@ Json MeasureFinish(ExperimentContext& context, const FrameCase& frame) {
 
 Json MeasureService(ExperimentContext& context, const FrameCase& frame, int frames) {
   const VolumeInUse volume = context.volumes().Get(frame.volume);
-  Session session = OrThrow(Session::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
-                                               {[held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }}));
+  ServiceConnection connection =
+      OrThrow(ServiceConnection::OpenLocal({.local_workers = frame.workers, .local_threads = 1},
+                                           {[held = volume.volume]() -> Result<std::shared_ptr<const Volume>> { return held; }}));
   FrameRequest request = RequestOf(frame);
-  request.dataset = session.dataset();
-  return MeasureLatency(session.client(), request, WarmUpFrames(frame.policy), frames);
+  request.dataset = connection.dataset();
+  return MeasureLatency(connection.client(), request, WarmUpFrames(frame.policy), frames);
 }
 
 // Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 #include "common/planning/frame_window.h"
 #include "laboratory/experiments/client_frames.h"
 #include "laboratory/experiments/frame_keys.h"
@@ -55,8 +55,8 @@ Trial FramesTrial(Client& client, const StatusReply& begin, const FrameCase& fra
 }  // namespace
 
 Json DescribeService(const ServiceChoice& service, const Sweep& sweep) {
-  Session session = OrThrow(Session::OpenService(service));
-  const StatusReply status = OrThrow(session.client().QueryStatus());
+  ServiceConnection connection = OrThrow(ServiceConnection::OpenService(service));
+  const StatusReply status = OrThrow(connection.client().QueryStatus());
   if (status.workers.empty()) throw Failure(Status::Unavailable("the service has no workers"));
   Json datasets = Json::array();
   for (const BenchCase& volume : sweep.volumes) {
@@ -70,13 +70,13 @@ Json DescribeService(const ServiceChoice& service, const Sweep& sweep) {
 }
 
 void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& results) {
-  Session session = OrThrow(Session::OpenService(context.options().own.service));
-  const StatusReply begin = OrThrow(session.client().QueryStatus());
+  ServiceConnection connection = OrThrow(ServiceConnection::OpenService(context.options().own.service));
+  const StatusReply begin = OrThrow(connection.client().QueryStatus());
   const Json roster = RosterOf(begin);
   const std::vector<SweepFrame> frames = FramesOf(sweep);
   std::vector<Trial> trials;
   trials.reserve(frames.size());
-  for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(session.client(), begin, asked.frame));
+  for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(connection.client(), begin, asked.frame));
   context.Run(trials, {.full = 3, .quick = 1});
 
   constexpr struct {

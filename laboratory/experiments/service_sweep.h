@@ -7,8 +7,8 @@
 namespace slabstream {
 
 // What decides the numbers of a sweep at the service beside the file: its roster, as [{"host", "threads"}, ...] in the order of hosts, and
-// its datasets that the sweep names. Throws Failure: those of Session::OpenService and Client::QueryStatus; Unavailable: no workers;
-// NotFound: a dataset that the service does not have.
+// its datasets that the sweep names. Throws Failure: those of ServiceConnection::OpenService and Client::QueryStatus; Unavailable: no
+// workers; NotFound: a dataset that the service does not have.
 Json DescribeService(const ServiceChoice& service, const Sweep& sweep);
 
 // Adds measured latency, period, render_time, longest_render_time, imbalance, idle_share and image_bytes of each frame, and attaches the

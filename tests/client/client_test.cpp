@@ -248,6 +248,73 @@ TEST_F(ClientTest, CancelAsksTheServiceAndItsAnswerEndsTheRequest) {
   EXPECT_FALSE(client.Next(Duration::zero()).has_value()) << "the late picture of an ended request is dropped";
 }
 
+// Answers pings, and questions and orders by `handler`.
+FakeService::Handler Answering(FakeService::Handler handler) {
+  return [handler = std::move(handler)](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    return handler(message);
+  };
+}
+
+TEST_F(ClientTest, AnAnswerLeavesTheEventsOfOthers) {
+  FakeService service(context_, "inproc://client-test", Answering([](const AnyMessage& message) -> std::vector<Answer> {
+                        if (const auto* query = std::get_if<StatusQuery>(&message)) return {{StatusReply{.nonce = query->nonce}, {}}};
+                        if (const auto* query = std::get_if<SampleQuery>(&message))
+                          return {{SampleReply{.nonce = query->nonce, .samples = {VolumeSample{}}}, {}}};
+                        const auto* submit = std::get_if<SubmitFrame>(&message);
+                        if (submit == nullptr) return {};
+                        return {{FrameProgress{.request = submit->request}, {}}, ReplyTo(submit->request)};
+                      }));
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  const RequestId frame = client.Submit(SmallRequest());
+  const RequestId question = client.Submit(SampleQuery{.dataset = "ball", .points = {{}}});
+  EXPECT_TRUE(client.QueryStatus(seconds(30)).ok());
+  EXPECT_EQ(client.SampleAt("ball", {{}}, seconds(30)).value().size(), 1U);
+  EXPECT_TRUE(client.Render(SmallRequest()).ok());
+  std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<FrameProgress>(event->what));
+  event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Picture>(event->what));
+  EXPECT_EQ(event->request, frame);
+  event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<QuestionReply>(event->what));
+  EXPECT_EQ(event->request, question);
+  EXPECT_FALSE(client.Next(Duration::zero()).has_value());
+}
+
+TEST_F(ClientTest, QuestionsAndOrdersThatAreNotAnsweredFail) {
+  FakeService service(context_, "inproc://client-test", Answering([](const AnyMessage& message) -> std::vector<Answer> {
+                        const auto* query = std::get_if<SummaryQuery>(&message);
+                        if (query == nullptr || query->dataset != "confused") return {};
+                        return {{StatusReply{.nonce = query->nonce}, {}}, {SummaryReply{.nonce = query->nonce}, {}}};
+                      }));
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  const Status order = client.OrderData({}, milliseconds(30)).status();
+  EXPECT_EQ(order.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(order.message(), testing::AllOf(HasSubstr(service.endpoint()), HasSubstr("30 ms")));
+  const Status question = client.Summarize("ball", {}, milliseconds(30)).status();
+  EXPECT_EQ(question.code(), StatusCode::kDeadlineExceeded);
+  EXPECT_THAT(question.message(), testing::AllOf(HasSubstr(service.endpoint()), HasSubstr("30 ms")));
+  EXPECT_EQ(client.Summarize("confused", {}, seconds(30)).status().code(), StatusCode::kInternal);
+
+  client.Submit(SummaryQuery{.dataset = "confused"}, seconds(30));
+  const std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Status>(event->what));
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kInternal);
+  EXPECT_FALSE(client.Next(Duration::zero()).has_value());
+}
+
+TEST_F(ClientTest, WakeupGivesUpAnOrder) {
+  std::atomic<Client*> notified = nullptr;
+  FakeService service(context_, "inproc://client-test", Answering([&](const AnyMessage& message) -> std::vector<Answer> {
+                        if (std::holds_alternative<StatusQuery>(message)) notified.load()->wakeup().Notify();
+                        return {};
+                      }));
+  Client client = Client::Connect(context_, service.endpoint()).value();
+  notified = &client;
+  EXPECT_EQ(client.QueryStatus(std::chrono::hours(1)).status().code(), StatusCode::kUnavailable);
+}
+
 TEST_F(ClientTest, WakeupEndsNext) {
   FakeService service(context_, "inproc://client-test", [](const AnyMessage& message) -> std::vector<Answer> {
     const auto* ping = std::get_if<ClientPing>(&message);

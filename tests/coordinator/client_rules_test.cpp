@@ -157,7 +157,7 @@ TEST(CoordinatorClients, OpenRequestsOfAClientAreLimited) {
 }
 
 TEST(CoordinatorClients, FramesOfAllClientsAreLimited) {
-  CoordinatorConfig config = TestConfig();
+  ScriptConfig config = TestConfig();
   config.max_queued = 3;
   CoordinatorScript script(config);
   for (PeerToken client = 1; client <= 3; ++client) EXPECT_TRUE(ToClients<FrameFailed>(script.Client(client, Frame(1))).empty());
@@ -297,7 +297,7 @@ TEST(CoordinatorClients, ShutDownTellsEverybodyAndEnds) {
   EXPECT_EQ(failed[0].message.status, Status::Unavailable("the service was shut down"));
   EXPECT_EQ(ToWorkers<Stop>(actions).size(), 1U);
   ASSERT_FALSE(actions.empty());
-  EXPECT_TRUE(std::holds_alternative<StopService>(actions.back()));
+  EXPECT_NE(Get<StopService>(actions.back()), nullptr);
   EXPECT_EQ(script.machine.NextWake(), Time::max());
   EXPECT_TRUE(script.Client(kClient, Frame(2)).empty());
 }

@@ -1,5 +1,5 @@
-// CoordinatorScript: a FrameMachine with a virtual clock, for tests that are told as scripts: join, submit, answer, let time pass, look at
-// what it said.
+// CoordinatorScript: the machines of a coordinator with a virtual clock, for tests that are told as scripts: join, submit, answer, let time
+// pass, look at what they said.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -10,23 +10,34 @@
 #include <map>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/renderers/renderer_kind.h"
+#include "coordinator/dataset_machine.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 
 namespace slabstream {
 
+using CoordinatorAction = std::variant<FrameAction, DatasetAction>;
 using Actions = std::vector<CoordinatorAction>;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 inline constexpr PeerToken kClient = 21, kOther = 22;  // connections of two clients
 
-inline CoordinatorConfig TestConfig() {
-  CoordinatorConfig config;
+struct ScriptConfig : CoordinatorConfig {
+  Catalogue datasets;
+  std::set<std::string> folders;
+  Duration look_interval = DatasetConfig().look_interval;
+  std::size_t max_datasets = DatasetConfig().max_datasets;
+};
+
+inline ScriptConfig TestConfig() {
+  ScriptConfig config;
   config.epoch = 77;
   config.pid = 4321;
   config.slabs_endpoint = "inproc://slabs";
@@ -56,6 +67,16 @@ inline SubmitFrame Frame(RequestId request, int groups = 1, const std::string& d
   return submit;
 }
 
+// The action, if it is an A.
+template <class A>
+const A* Get(const CoordinatorAction& action) {
+  const auto get = []<class Held>(const Held& held) -> const A* {
+    if constexpr (std::is_same_v<Held, A>) return &held;
+    return nullptr;
+  };
+  return std::visit([&](const auto& of_machine) { return std::visit(get, of_machine); }, action);
+}
+
 template <class M>
 struct Sent {
   PeerToken to = 0;
@@ -67,7 +88,7 @@ template <class M>
 std::vector<Sent<M>> ToWorkers(const Actions& actions) {
   std::vector<Sent<M>> sent;
   for (const CoordinatorAction& action : actions) {
-    const auto* send = std::get_if<ToWorker>(&action);
+    const auto* send = Get<ToWorker>(action);
     if (send != nullptr && std::holds_alternative<M>(send->message)) sent.push_back({send->to, std::get<M>(send->message), {}});
   }
   return sent;
@@ -77,7 +98,7 @@ template <class M>
 std::vector<Sent<M>> ToClients(const Actions& actions) {
   std::vector<Sent<M>> sent;
   for (const CoordinatorAction& action : actions) {
-    const auto* send = std::get_if<ToClient>(&action);
+    const auto* send = Get<ToClient>(action);
     if (send != nullptr && std::holds_alternative<M>(send->message)) {
       sent.push_back({send->to, std::get<M>(send->message), send->payload});
     }
@@ -89,7 +110,7 @@ template <class A>
 std::vector<A> Of(const Actions& actions) {
   std::vector<A> wanted;
   for (const CoordinatorAction& action : actions) {
-    if (const A* match = std::get_if<A>(&action)) wanted.push_back(*match);
+    if (const A* match = Get<A>(action)) wanted.push_back(*match);
   }
   return wanted;
 }
@@ -125,12 +146,53 @@ struct FakeWorker {
   bool leaving = false;
 };
 
+struct Machines {
+  explicit Machines(const ScriptConfig& config)
+      : frames(config),
+        datasets({.datasets = config.datasets,
+                  .folders = config.folders,
+                  .memory_bytes = config.memory_bytes,
+                  .max_questions = config.max_queued,
+                  .look_interval = config.look_interval,
+                  .max_datasets = config.max_datasets,
+                  .log_level = config.log_level}) {}
+
+  struct Sizes : FrameSizes, DatasetSizes {};
+  Sizes sizes() const { return {frames.sizes(), datasets.sizes()}; }
+  Time NextWake() const { return std::min(frames.NextWake(), datasets.NextWake()); }
+
+  // All that comes of the event, but for what the machines tell each other.
+  template <class Event>
+  void Step(const Event& event, Time now, Actions& actions) {
+    if constexpr (std::constructible_from<FrameEvent, Event>) {
+      for (FrameAction& action : frames.Step(event, now)) {
+        if (const auto* told = std::get_if<ToDatasets>(&action)) {
+          Step(*told, now, actions);
+        } else {
+          actions.emplace_back(std::move(action));
+        }
+      }
+    } else {
+      for (DatasetAction& action : datasets.Step(event, now)) {
+        if (const auto* news = std::get_if<DatasetNews>(&action)) {
+          Step(*news, now, actions);
+        } else {
+          actions.emplace_back(std::move(action));
+        }
+      }
+    }
+  }
+
+  FrameMachine frames;
+  DatasetMachine datasets;
+};
+
 class CoordinatorScript {
  public:
-  explicit CoordinatorScript(CoordinatorConfig c = TestConfig()) : config(std::move(c)), machine(config) {}
+  explicit CoordinatorScript(ScriptConfig c = TestConfig()) : config(std::move(c)), machine(config) {}
 
-  const CoordinatorConfig config;
-  FrameMachine machine;
+  const ScriptConfig config;
+  Machines machine;
   Time now{seconds(1000)};
   std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
   std::map<WorkerId, PeerToken> tokens;  // of all that have joined
@@ -142,8 +204,10 @@ class CoordinatorScript {
   std::vector<PlanRequest> plans;  // that were not made yet
 
   // All that comes of the event, of the plans that are made at once, too.
-  Actions Step(const CoordinatorEvent& event) {
-    Actions actions = machine.Step(event, now);
+  Actions Step(const auto& event) {
+    Actions actions;
+    machine.Step(event, now, actions);
+    if constexpr (std::is_same_v<decltype(event), const CoordinatorTick&>) machine.Step(DatasetTick{}, now, actions);
     for (FrameMeasured& measured : Of<FrameMeasured>(actions)) planner.Learn(measured);
     for (PlanRequest& request : Of<PlanRequest>(actions)) plans.push_back(std::move(request));
     for (const DropPlan& drop : Of<DropPlan>(actions)) {
@@ -163,7 +227,12 @@ class CoordinatorScript {
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {
     return Step(FromWorker{from.token, std::move(message), std::move(payload)});
   }
-  Actions Client(PeerToken from, ClientToCoordinator message) { return Step(FromClient{from, std::move(message)}); }
+  Actions Client(PeerToken from, const ClientToFrames& message) { return Step(FromClient{from, message}); }
+  Actions Client(PeerToken from, const ClientToDatasets& message, const Bytes& payload = {}) {
+    Actions actions = Step(ClientHeard{from, std::holds_alternative<AddVolume>(message)});
+    Append(actions, Step(ClientAsked{from, message, payload}));
+    return actions;
+  }
 
   static Register RegisterOf(const FakeWorker& worker) {
     return {.incarnation = worker.incarnation,

@@ -12,8 +12,8 @@ using testing::SizeIs;
 constexpr PeerToken kAdmin = 31;
 
 // Two datasets that are files, and a folder.
-CoordinatorConfig FilesConfig() {
-  CoordinatorConfig config = TestConfig();
+ScriptConfig FilesConfig() {
+  ScriptConfig config = TestConfig();
   config.datasets = {{"block", DataSource("/named/block.nrrd", "")}, {"other", DataSource("/named/other.nrrd", "")}};
   return config;
 }
@@ -26,7 +26,7 @@ std::vector<std::string> NamesOf(const std::vector<DatasetStatus>& datasets) {
 
 class DataRules : public testing::Test {
  protected:
-  explicit DataRules(const CoordinatorConfig& config = FilesConfig()) : script(config) { script.Join(11, 1); }
+  explicit DataRules(const ScriptConfig& config = FilesConfig()) : script(config) { script.Join(11, 1); }
 
   // The end of the load that was begun last: the file holds these voxels.
   Actions Loaded(DatasetId voxels, std::uint64_t bytes = 0) {
@@ -258,7 +258,7 @@ TEST_F(DataOrders, OrdersAreCarriedOutAsAWholeOrNotAtAll) {
 }
 
 TEST_F(DataOrders, TheCatalogueHasALimit) {
-  CoordinatorConfig config = FilesConfig();
+  ScriptConfig config = FilesConfig();
   config.max_datasets = 2;
   CoordinatorScript full(config);
   const Actions order = full.Client(kAdmin, DataOrder{.nonce = 5, .action = DataAction::kAdd, .items = {"more=/data/more"}});
@@ -400,7 +400,7 @@ TEST_F(DataRules, RefusedRequestsAreCountedByTheirReason) {
   script.Client(kClient, bad);
   const Status bad_field = Status::InvalidArgument("SubmitFrame.frame.size.width: 0");
   script.Step(BadRequest{kOther, FrameFailed{.request = 9, .status = bad_field}, bad_field});
-  CoordinatorConfig config = FilesConfig();
+  ScriptConfig config = FilesConfig();
   config.max_queued = 1;
   CoordinatorScript busy(config);
   busy.Client(kClient, Frame(1));
@@ -423,7 +423,7 @@ std::vector<std::string> NotesOf(const Actions& actions) {
 }
 
 TEST(CoordinatorNotes, TellWhatHappensOnceEach) {
-  CoordinatorConfig config = FilesConfig();
+  ScriptConfig config = FilesConfig();
   config.log_level = LogLevel::kInfo;
   CoordinatorScript script(config);
   Actions all;
@@ -445,7 +445,7 @@ TEST(CoordinatorNotes, TellWhatHappensOnceEach) {
 }
 
 TEST(CoordinatorNotes, AreNotMadeBelowTheLevelThatIsWanted) {
-  CoordinatorConfig config = FilesConfig();
+  ScriptConfig config = FilesConfig();
   config.log_level = LogLevel::kWarning;
   CoordinatorScript script(config);
   const FakeWorker worker = script.Join(11, 1);

@@ -157,8 +157,8 @@ TEST_F(MemoryRules, WorkersThatLeaveFailNoFrame) {
 
 class DatasetRules : public MemoryRules {
  protected:
-  static CoordinatorConfig Config() {
-    CoordinatorConfig config = TestConfig();
+  static ScriptConfig Config() {
+    ScriptConfig config = TestConfig();
     config.datasets = {{"a", {}}, {"b", {}}, {"c", {}}};
     config.memory_bytes = 400 * kMebi;  // 300 for datasets
     return config;

@@ -126,7 +126,7 @@ TEST(CoordinatorPeers, WaitForTheFirstWorkerEndsThoughEveryWakeUpIsALittleLate) 
 }
 
 TEST(CoordinatorPeers, WaitForTheFirstWorkerBeginsAnewWhenTheCoordinatorStoodStill) {
-  CoordinatorConfig config = TestConfig();
+  ScriptConfig config = TestConfig();
   config.client_timeout = seconds(1000);
   CoordinatorScript script(config);
   script.Submit(kClient, Frame(1, 1));

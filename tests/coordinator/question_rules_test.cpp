@@ -37,7 +37,7 @@ TEST_F(QuestionRules, AQuestionLoadsItsDatasetAndIsAskedOfTheExecutorThen) {
   ASSERT_THAT(asked, SizeIs(1));
   EXPECT_EQ(asked[0].dataset, script.loads[0].load);
   EXPECT_EQ(script.machine.sizes().questions, 1U);
-  const auto answers = ToClients<SampleReply>(script.Step(QuestionAnswered{asked[0].id, SampleReply{.nonce = 5}}));
+  const auto answers = ToClients<SampleReply>(script.Step(QuestionAnswered{asked[0].id, QuestionReply(SampleReply{.nonce = 5})}));
   ASSERT_THAT(answers, SizeIs(1));
   EXPECT_EQ(answers[0].to, kClient);
   EXPECT_EQ(script.machine.sizes().questions, 0U);
@@ -82,7 +82,7 @@ TEST_F(QuestionRules, AClientHasOnlySoManyAndNoneAfterItHasGone) {
 }
 
 TEST_F(QuestionRules, ADatasetThatDoesNotFitIsRefused) {
-  CoordinatorConfig config = TestConfig();
+  ScriptConfig config = TestConfig();
   config.memory_bytes = 400;
   CoordinatorScript small(config);
   small.Client(kClient, Question(1));
@@ -106,7 +106,7 @@ class UploadRules : public testing::Test {
     return {.nonce = nonce, .begin = begin, .bytes = bytes};
   }
   Actions Send(const VolumePart& part, PeerToken from = kClient) {
-    return script.Step(FromClient{from, part, Bytes(std::vector<std::byte>(part.bytes))});
+    return script.Client(from, part, Bytes(std::vector<std::byte>(part.bytes)));
   }
   UploadId Begin(PeerToken from = kClient, const AddVolume& order = Order(1)) {
     const auto begun = Of<BeginUpload>(script.Client(from, order));
@@ -218,7 +218,7 @@ TEST_F(UploadRules, NamesAreOfOneDatasetOnly) {
 }
 
 TEST_F(UploadRules, MemoryAdmitsThem) {
-  CoordinatorConfig config = TestConfig();
+  ScriptConfig config = TestConfig();
   config.memory_bytes = 64 * kMebi;  // 48 of them for datasets
   CoordinatorScript tight(config);
   tight.Client(kClient, Frame(1));

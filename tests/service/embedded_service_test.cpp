@@ -282,6 +282,7 @@ TEST_F(EmbeddedServiceTest, NothingVisibleIsAnEmptyPicture) {
   Start(2);
   Client client = Connect();
   for (const RendererKind* renderer : Renderers()) {
+    if (!renderer->Can(Ability::kTransfer)) continue;
     FrameRequest request = TestRequest(renderer, 0);
     std::get<TransferFunction>(request.transfer.choice).opacities = {{0, 0, 0.5, 0}};
     const Result<Picture> picture = client.Render(request, seconds(60));

@@ -45,8 +45,7 @@ class ExecutorTest : public testing::Test {
         SendPartial{.to = std::make_shared<Peer>(),
                     .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
-                    .frame = kFrame},
-        {});
+                    .frame = kFrame});
     const auto sent = std::get<OutgoingPartial>(outputs_.Next());
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
@@ -81,14 +80,12 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
 TEST_F(ExecutorTest, ReportsTellOfAllMessagesOfTheirRank) {
   ASSERT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   const auto send = [&](Rank rank, PixelRange pixels, std::vector<RankReport> reports) {
-    executor_.Perform(
-        SendPartial{
-            .to = std::make_shared<Peer>(),
-            .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = std::move(reports)},
-            .image = 1,
-            .frame = kFrame,
-            .rank = rank},
-        {});
+    executor_.Perform(SendPartial{
+        .to = std::make_shared<Peer>(),
+        .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = std::move(reports)},
+        .image = 1,
+        .frame = kFrame,
+        .rank = rank});
     return std::get<OutgoingPartial>(outputs_.Next());
   };
   const std::size_t bytes = send(3, {0, 16}, {}).payload.size() + send(3, {16, 32}, {}).payload.size();

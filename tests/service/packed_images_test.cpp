@@ -7,7 +7,7 @@ namespace {
 WorkerOptions Frames(Compression compression) {
   WorkerOptions options;
   options.share_memory = false;
-  options.compression = compression;
+  options.machine.compression = compression;
   return options;
 }
 

@@ -191,8 +191,10 @@ class TwoExecutors : public testing::Test {
       executor.Perform(SendPartial{std::make_shared<Peer>(Peer{2, "inproc://two", 7}),
                                    {.epoch = 1, .from_worker = 1, .key = kKey, .step = 4, .interval = {0, 1}, .pixels = kWhole},
                                    image,
-                                   kFrame},
-                       Delivery{.lend = lend});
+                                   kFrame,
+                                   ColorCoding::kFloat32,
+                                   0,
+                                   {.lend = lend}});
       return TakeSent();
     }
     std::pair<PartialImage, Bytes> TakeSent() {
@@ -264,14 +266,16 @@ TEST_F(TwoExecutors, WhatIsRefusedComesAsRuns) {
   const auto [lent, spans] = one_.Send(1, true);
   ASSERT_TRUE(lent.shared.has_value());
   one_.executor.Perform(ReleaseImage{1});
-  one_.executor.Resend({.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step + 1, .pixels = lent.pixels});  // no such one
-  one_.executor.Resend({.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step, .pixels = lent.pixels});
+  one_.executor.Perform(
+      ResendImage{{.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step + 1, .pixels = lent.pixels}});  // no such one
+  one_.executor.Perform(ResendImage{{.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step, .pixels = lent.pixels}});
   const auto [message, payload] = one_.TakeSent();
   EXPECT_FALSE(message.shared.has_value());
   EXPECT_EQ(message.step, lent.step);
   EXPECT_TRUE(std::ranges::equal(payload.span(), expected));
-  one_.executor.Forget([](const GroupKey&) { return true; });
-  one_.executor.Resend({.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step, .pixels = lent.pixels});  // too late: nothing
+  one_.executor.Perform(ForgetGroups{.finished_before = kKey.frame + 1});
+  one_.executor.Perform(
+      ResendImage{{.epoch = 1, .from_worker = 2, .key = lent.key, .step = lent.step, .pixels = lent.pixels}});  // too late: nothing
 }
 
 TEST_F(TwoExecutors, AnImageThatWasTakenBackFailsTheStep) {
@@ -280,7 +284,7 @@ TEST_F(TwoExecutors, AnImageThatWasTakenBackFailsTheStep) {
   const auto [lent, spans] = one_.Send(1, true);
   ASSERT_TRUE(two_.executor.peer_memory().Open(lent.shared->arena, kNow).ok());
   one_.executor.Perform(ReleaseImage{1});
-  one_.executor.Forget([](const GroupKey&) { return true; });
+  one_.executor.Perform(ForgetGroups{.finished_before = kKey.frame + 1});
   Give(one_, 2, RandomImage(random_, PixelFormat::kRgba, kFrame));  // its combining thread has let go of the image before this
   EXPECT_EQ(two_.Combine(1, lent, spans).code(), StatusCode::kDataLoss);
 }

@@ -14,7 +14,7 @@ namespace slabstream {
 
 class ModelClient {
  public:
-  using Send = std::function<void(ClientToCoordinator)>;
+  using Send = std::function<void(ClientToFrames)>;
 
   ModelClient(SimulatedService& service, Send send) : service_(service), send_(std::move(send)) {}
 

@@ -27,6 +27,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/dataset_machine.h"
 #include "coordinator/planner.h"
 #include "simulator/conditions.h"
 #include "simulator/simulated_service.h"
@@ -101,7 +102,8 @@ class Simulation : private Conditions {
   // In any variant of messages: what the other end would decode.
   template <class Messages>
   Messages OnTheWay(const Messages& message) const;
-  void FromClientNode(std::size_t client, const ClientToCoordinator& message);
+  void FromClientNode(std::size_t client, const ClientToFrames& message);
+  void AskDatasets(PeerToken client, const ClientToDatasets& message, const Bytes& payload = {});
   SlabsToWorker AnswerOf(const ChunkRequest& request);
 
   // ---- Conditions
@@ -118,21 +120,28 @@ class Simulation : private Conditions {
   Arrivals ToWorker(Node to, CoordinatorToWorker& message, double sent) override;
   Arrivals ToCoordinator(Node from, WorkerToCoordinator& message) override;
   Arrivals ToPeer(Node to, Job& sends) override;
-  void BeforeStep(const CoordinatorEvent& event) override { cause_ = &event; }
+  void BeforeStep(const FrameEvent& event) override { cause_ = &event; }
   void Perform(ToClient& action) override;
-  void Perform(const LoadDataset& action) override;
-  void Perform(const UnloadDataset& action) override { published_.erase(action.dataset); }
-  void Perform(const LookAtDataset& action) override;
-  void Perform(const LookAtFolders& action) override;
-  void Perform(const FindDatasets& action) override;
-  void Perform(const AnswerQuestion& action) override;
-  void Perform(const BeginUpload& action) override;
-  void Perform(const StoreUpload& action) override;
-  void Perform(const DropUpload& action) override { stored_.erase(action.upload); }
-  void Perform(const FinishUpload& action) override;
+  void Perform(const ToDatasets& action) override { StepDatasets(action); }
   void Perform(const CountDataset& action) override;
   void Perform(const PlanRequest& action) override;
   void Perform(const FrameMeasured& action) override { planner_->Learn(action); }
+
+  // ---- datasets
+  void StepDatasets(const DatasetEvent& event);
+  void TellDatasets(double when, DatasetEvent event);  // at `when`, if it is still the same coordinator
+  void Perform(const DatasetNews& action) { service_.StepCoordinator(action); }
+  void Perform(const Note&) {}
+  void Perform(const LoadDataset& action);
+  void Perform(const UnloadDataset& action) { published_.erase(action.dataset); }
+  void Perform(const LookAtDataset& action);
+  void Perform(const LookAtFolders& action);
+  void Perform(const FindDatasets& action);
+  void Perform(const AnswerQuestion& action);
+  void Perform(const BeginUpload& action);
+  void Perform(const StoreUpload& action);
+  void Perform(const DropUpload& action) { stored_.erase(action.upload); }
+  void Perform(const FinishUpload& action);
 
   Random random_;
   Tally& tally_;
@@ -147,9 +156,11 @@ class Simulation : private Conditions {
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;
-  std::optional<Planner> planner_;   // of the coordinator
-  Epoch epoch_ = 0;                  // of the coordinator
-  std::deque<ModelWorker> workers_;  // by node
+  std::optional<Planner> planner_;          // of the coordinator
+  std::optional<DatasetMachine> datasets_;  // likewise
+  Time datasets_wake_;                      // that was planned last
+  Epoch epoch_ = 0;                         // of the coordinator
+  std::deque<ModelWorker> workers_;         // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
   std::set<Node> told_dead_;                      // workers whose death the sockets notice
   std::set<Node> leaving_;                        // workers that were told to leave
@@ -157,7 +168,7 @@ class Simulation : private Conditions {
   std::map<Node, HostilePeer> hostile_peers_;
   HostileWords words_;
   std::size_t requests_planned_ = 0, requests_made_ = 0;
-  const CoordinatorEvent* cause_ = nullptr;  // what the coordinator deals with
+  const FrameEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
   DatasetId voxels_ = 1;  // that the volume's file holds now
   // The volume that the admin sends, and what the executor has stored of volumes.

@@ -153,7 +153,7 @@ void Simulation::OrderData() {
     order.items = {random_.Chance(0.5) ? "more" : random_.Chance(0.5) ? "other" : random_.Chance(0.5) ? "sent" : "nothing"};
   if (order.action == DataAction::kReload) order.items = {"volume"};
   tally_.Add(Count::kDataOrders);
-  service_.StepCoordinator(FromClient{Admin(), order});
+  AskDatasets(Admin(), order);
 }
 
 // Another one may be on its way: it ends that.
@@ -161,7 +161,7 @@ void Simulation::SendVolume() {
   AddVolume order{.nonce = sending_.nonce + 1, .name = random_.Chance(0.9) ? "sent" : "volume"};
   order.description.geometry.size = {512, 512, random_.Integer(1, 60)};
   sending_ = {.nonce = order.nonce, .sent = 0, .bytes = order.bytes()};
-  service_.StepCoordinator(FromClient{Admin(), order});
+  AskDatasets(Admin(), order);
 }
 
 // As far as the credit goes; sometimes too far, sometimes it stops for good.
@@ -171,7 +171,7 @@ void Simulation::SendParts(const VolumeCredit& credit) {
     const auto bytes = std::uint32_t(std::min<std::uint64_t>(kMaxVolumePartBytes, credit.allowed - sending_.sent));
     const VolumePart part{.nonce = sending_.nonce, .begin = random_.Chance(0.01) ? 7 : sending_.sent, .bytes = bytes};
     sending_.sent += bytes;
-    service_.StepCoordinator(FromClient{Admin(), part, Bytes(std::vector<std::byte>(bytes))});
+    AskDatasets(Admin(), part, Bytes(std::vector<std::byte>(bytes)));
   }
 }
 
@@ -249,7 +249,16 @@ void Simulation::SpeakAsClient(std::size_t hostile) {
   ClientToCoordinator words = words_.OfClient(world_.policy);
   const auto* const submit = std::get_if<SubmitFrame>(&words);
   if (submit != nullptr && submit->frame.policy.teams <= kMaxTeams) most_teams_ = std::max(most_teams_, submit->frame.policy.teams);
-  service_.StepCoordinator(FromClient{service_.TokenOf(Node(kHostileClientEnds + int(hostile))), std::move(words)});
+  const PeerToken client = service_.TokenOf(Node(kHostileClientEnds + int(hostile)));
+  std::visit(
+      [&]<class Message>(Message& message) {
+        if constexpr (std::constructible_from<ClientToFrames, Message>) {
+          service_.StepCoordinator(FromClient{client, message});
+        } else if constexpr (std::constructible_from<ClientToDatasets, Message>) {
+          AskDatasets(client, message);
+        }
+      },
+      words);
 }
 
 }  // namespace slabstream

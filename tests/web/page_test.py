@@ -521,6 +521,7 @@ class PageTest(unittest.TestCase):
         viewer.final("o.at === '1.5,-2,3'", "axial")
 
     def test_known_values_are_picked(self):
+        self.assertEqual(self.gateway.request("/api/v1/pick?dataset=patient&x=1&y=1")[0], 200)
         viewer = self.viewer(layout="quad", transfer="opaque", renderer="mip")  # the largest value lies within the ball
         viewer.settled()
         viewer.until("document.querySelectorAll('.pane').length === 4")

@@ -15,12 +15,12 @@ namespace slabstream {
 namespace HWY_NAMESPACE {
 
 // Interpolated samples, clamped to the range of their voxels. Lanes not in `valid` are arbitrary.
-struct Samples {
+struct ProjectedSamples {
   Floats values;
   Mask valid;
 };
 template <class T, bool kNearest>
-HWY_INLINE Samples SamplesAt(const RayBox& box, SamplePlace place, Mask owned) {
+HWY_INLINE ProjectedSamples SamplesAt(const RayBox& box, SamplePlace place, Mask owned) {
   if constexpr (kNearest) {
     for (Floats& fraction : place.fraction) fraction = hn::IfThenElseZero(hn::Ge(fraction, Set(0.5F)), Set(1));
   }
@@ -86,7 +86,7 @@ HWY_INLINE bool Advance(const ProjectWork& work, const RayPacket& packet, const 
   }
   // If one ray takes its sample, all that are alive do: then its address need not wait for the bounds.
   if (!hn::AllFalse(df, sampled)) {
-    const Samples samples = SamplesAt<T, kNearest>(box, place, alive);
+    const ProjectedSamples samples = SamplesAt<T, kNearest>(box, place, alive);
     const auto candidate = hn::Mul(samples.values, Set(work.sign));
     const auto larger = hn::And(samples.valid, hn::Gt(candidate, found.best));
     found.best = hn::IfThenElse(larger, candidate, found.best);
@@ -158,7 +158,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
     for (float k = begin; k < end; k += 1) {
       const auto sample = Set(k);
       const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-      const Samples samples = SamplesAt<T, kNearest>(box, PlaceSample(packet, box, sample), active);
+      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceSample(packet, box, sample), active);
       const auto valid = hn::RebindMask(di, samples.valid);
       const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
       const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));

@@ -77,7 +77,7 @@ class RaycastKind : public RendererKind {
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
-                                    Ability::kOverlay, Ability::kLights},
+                                    Ability::kOverlay, Ability::kLights, Ability::kTransfer},
                       .footprint = 1,
                       .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}

@@ -25,7 +25,7 @@ class SplatKind : public RendererKind {
                       .format = PixelFormat::kRgba,
                       .reach = kHalo,
                       .along_slices = true,
-                      .abilities = {Ability::kPerspective, Ability::kLights},
+                      .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer},
                       .footprint = 4,
                       .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite}}) {}
 

@@ -1,16 +1,16 @@
 #include "laboratory/experiments/paper/render_alone.h"
 
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 
 namespace slabstream {
 
 Picture RenderAlone(ExperimentContext& context, const BenchCase& volume, const ViewParameters& view, int pixels) {
   const VolumeInUse held = context.volumes().Get(volume);
-  Session session = OrThrow(Session::OpenLocal({.local_workers = 1, .local_threads = 1},
-                                               {[voxels = held.volume]() -> Result<std::shared_ptr<const Volume>> { return voxels; }}));
+  ServiceConnection connection = OrThrow(ServiceConnection::OpenLocal(
+      {.local_workers = 1, .local_threads = 1}, {[voxels = held.volume]() -> Result<std::shared_ptr<const Volume>> { return voxels; }}));
   FrameRequest request = BenchRequest(volume, view, {pixels, pixels});
-  request.dataset = session.dataset();
-  return OrThrow(session.client().Render(request));
+  request.dataset = connection.dataset();
+  return OrThrow(connection.client().Render(request));
 }
 
 }  // namespace slabstream

@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "common/planning/placement.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/check_schedule.h"
 

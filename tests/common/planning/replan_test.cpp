@@ -8,6 +8,7 @@
 
 #include "common/combining/schemes.h"
 #include "common/planning/assignment.h"
+#include "common/planning/placement.h"
 #include "tests/common/planning/plan_support.h"
 
 namespace slabstream {

@@ -55,7 +55,7 @@ TEST_P(ConnectionLimitTest, MoreConnectionsAreClosedAndLeaveTheOthersAlone) {
     connects.client_keys = {.server_key = server.public_key, .own = own, .sealed = sealed};
   }
   Context context;
-  context.authenticator().Admit("test", own.public_key);
+  context.authenticator().AdmitOnly("test", {own.public_key});
   Socket router = Socket::Router(context, listens).value();
   const std::string endpoint = router.Bind("tcp://127.0.0.1:*").value();
   Socket dealer = Socket::Dealer(context, connects).value();

@@ -77,7 +77,7 @@ TEST_P(ConnectionsWithKeys, NobodyIsAdmittedToAPlaneThatNamesNobody) {
   Socket early = ConnectedAs(friend_);
   ASSERT_TRUE(early.Send({}, BytesOf("too early")).ok());
   EXPECT_FALSE(Receive(milliseconds(300)));
-  context_.authenticator().Admit(kPlane, friend_.public_key);
+  context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
   EXPECT_TRUE(early.refused());
   Socket again = ConnectedAs(friend_);
   ExpectHeard(again, "hello");
@@ -91,10 +91,10 @@ TEST_P(ConnectionsWithKeys, APatientPlaneAdmitsWhoeverBecomesKnown) {
     Socket early = Connected(endpoint_, {.handshake = 2 * patience, .client_keys = KeysOf(late)});
     ASSERT_TRUE(early.Send({}, BytesOf("hello")).ok());
     EXPECT_FALSE(Receive(milliseconds(300)));
-    context_.authenticator().Admit(kPlane, friend_.public_key);
+    context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
     Socket known = ConnectedAs(friend_);
     ExpectHeard(known, "I am known");
-    context_.authenticator().Admit(kPlane, late.public_key);
+    context_.authenticator().AdmitOnly(kPlane, {friend_.public_key, late.public_key});
     const std::optional<Incoming> incoming = Receive();
     ASSERT_TRUE(incoming);
     EXPECT_EQ(incoming->user, late.public_key);

@@ -29,7 +29,7 @@ class SealedSocketTest : public KeyedSocketTest {
 };
 
 TEST_F(SealedSocketTest, MessagesArriveInOrderWithTheirSendersKey) {
-  context_.authenticator().Admit(kPlane, stranger_.public_key);
+  context_.authenticator().AdmitOnly(kPlane, {friend_.public_key, stranger_.public_key});
   for (const KeyPair& keys : {friend_, stranger_}) {
     Socket socket = ConnectedAs(keys);
     const Bytes payload(std::vector<std::byte>(std::size_t{20} << 20, std::byte{7}));  // more frames than the router lets wait
@@ -63,7 +63,7 @@ TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgain) {
   Socket dealer = ConnectedTo(network);
   ExpectHeard(dealer, "once");
   const std::vector<std::string> once = network.Pieces();
-  // The ticket is still that of the session: the connection comes about, and ends at the first frame.
+  // The ticket is still that of the seal: the connection comes about, and ends at the first frame.
   std::atomic<bool> over = false;
   std::jthread again([&] {
     EXPECT_TRUE(network.Replay(once));
@@ -72,12 +72,12 @@ TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgain) {
   while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
   again.join();
   ExpectHeard(dealer, "and this");
-  // Later sessions make the ticket void.
+  // Later seals make the ticket void.
   Socket later = ConnectedAs(friend_);
   ExpectHeard(later, "later");
   std::jthread([&] { EXPECT_TRUE(network.Replay(once)); }).join();
   ExpectHeard(later, "and this");
-  ASSERT_TRUE(dealer.Send({}, BytesOf("of the earlier session")).ok());
+  ASSERT_TRUE(dealer.Send({}, BytesOf("of the earlier seal")).ok());
   EXPECT_FALSE(Receive(milliseconds(300)));
 }
 

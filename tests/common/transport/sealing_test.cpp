@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <string>
 
-#include "common/transport/sealed_sessions.h"
+#include "common/transport/latest_seals.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -25,7 +25,7 @@ std::vector<std::byte> Noise(Random& random, std::size_t bytes) {
   return noise;
 }
 
-Frames Seal(Sealer& sealer, std::span<const std::byte> header, std::span<const std::byte> payload) {
+Frames FramesOf(Sealer& sealer, std::span<const std::byte> header, std::span<const std::byte> payload) {
   Frames frames;
   sealer.Begin(header, payload);
   for (PooledVector<std::byte> frame = sealer.Next(); !frame.empty(); frame = sealer.Next())
@@ -50,7 +50,7 @@ std::optional<Unsealer::Message> OpenAll(Unsealer& unsealer, const Frames& frame
 class SealingTest : public testing::Test {
  protected:
   // A message of three frames, which the last message's number precedes.
-  Frames ThreeFrames() { return Seal(sealer_, header_, payload_); }
+  Frames ThreeFrames() { return FramesOf(sealer_, header_, payload_); }
   bool Arrives(const Frames& frames) {
     const std::optional<Unsealer::Message> message = OpenAll(unsealer_, frames);
     return message && message->size() == 2 && std::ranges::equal((*message)[0].span(), header_) &&
@@ -60,9 +60,9 @@ class SealingTest : public testing::Test {
   Random random_{13};
   const testing::ScopedTrace trace_{__FILE__, __LINE__, random_.trace()};
   const KeyPair worker_ = MakeKeyPair(), peer_ = MakeKeyPair(), stranger_ = MakeKeyPair();
-  const Session session_ = *Session::Make(worker_, peer_.public_key);
-  Sealer sealer_{session_};
-  Unsealer unsealer_{*Session::Read(session_.ticket, worker_.public_key, peer_), kMaxPayload};
+  const Seal seal_ = *Seal::Make(worker_, peer_.public_key);
+  Sealer sealer_{seal_};
+  Unsealer unsealer_{*Seal::Read(seal_.ticket, worker_.public_key, peer_), kMaxPayload};
   const std::vector<std::byte> header_ = Noise(random_, 100), payload_ = Noise(random_, 2 * kSealedPartBytes + 1000);
 };
 
@@ -73,7 +73,7 @@ TEST_F(SealingTest, MessagesOfAllSizesArriveAsTheyWere) {
     for (const std::size_t payload_bytes : {std::size_t{0}, std::size_t{1}, first, first + 1, first + kSealedPartBytes - 1,
                                             first + kSealedPartBytes, first + kSealedPartBytes + 1}) {
       const std::vector<std::byte> payload = Noise(random_, payload_bytes);
-      const Frames frames = Seal(sealer_, header, payload);
+      const Frames frames = FramesOf(sealer_, header, payload);
       EXPECT_LE(frames.size(), SealedFrames(payload_bytes));
       for (const Frame& frame : frames) EXPECT_LE(frame.size(), kSealedFrameBytes);
       const std::optional<Unsealer::Message> message = OpenAll(unsealer_, frames);
@@ -88,7 +88,7 @@ TEST_F(SealingTest, MessagesOfAllSizesArriveAsTheyWere) {
 TEST_F(SealingTest, FramesShowNothingOfTheMessage) {
   const std::string plain(1000, 'h');
   const auto bytes = std::as_bytes(std::span(plain));
-  const Frames one = Seal(sealer_, bytes, bytes), same = Seal(sealer_, bytes, bytes);
+  const Frames one = FramesOf(sealer_, bytes, bytes), same = FramesOf(sealer_, bytes, bytes);
   for (const Frame& frame : {one[0], same[0]}) EXPECT_EQ(std::ranges::search(frame, bytes.first(4)).size(), 0U);
   EXPECT_FALSE(std::equal(one[0].begin() + kSealedPlaceBytes, one[0].end(), same[0].begin() + kSealedPlaceBytes));
 }
@@ -138,7 +138,7 @@ TEST_F(SealingTest, FramesCountOnce) {
 
 // The cipher's key changes every 65536 messages.
 TEST_F(SealingTest, LongSessionsGoOn) {
-  for (int i = 0; i < 65600; ++i) ASSERT_TRUE(OpenAll(unsealer_, Seal(sealer_, {}, {}))) << i;
+  for (int i = 0; i < 65600; ++i) ASSERT_TRUE(OpenAll(unsealer_, FramesOf(sealer_, {}, {}))) << i;
   EXPECT_TRUE(Arrives(ThreeFrames()));
 }
 
@@ -161,59 +161,59 @@ TEST_F(SealingTest, MessagesWhoseFramesAreLostOrReorderedNeverArriveAndTheNextOn
 }
 
 TEST_F(SealingTest, PayloadsAboveTheLimitAreDropped) {
-  Unsealer strict(*Session::Read(session_.ticket, worker_.public_key, peer_), payload_.size() - 1);
+  Unsealer strict(*Seal::Read(seal_.ticket, worker_.public_key, peer_), payload_.size() - 1);
   const Frames frames = ThreeFrames();
   for (const Frame& frame : frames) EXPECT_TRUE(IsMore(strict, frame));
   const std::vector<std::byte> shorter(payload_.begin(), payload_.end() - 1);
-  EXPECT_TRUE(OpenAll(strict, Seal(sealer_, header_, shorter)));
+  EXPECT_TRUE(OpenAll(strict, FramesOf(sealer_, header_, shorter)));
 }
 
 TEST_F(SealingTest, FramesOfOtherKeysSessionsAndDirectionsAreForged) {
-  for (const Session& other : {*Session::Make(stranger_, peer_.public_key), *Session::Make(worker_, peer_.public_key),
-                               *Session::Make(peer_, worker_.public_key), *Session::Make(worker_, stranger_.public_key)}) {
+  for (const Seal& other : {*Seal::Make(stranger_, peer_.public_key), *Seal::Make(worker_, peer_.public_key),
+                            *Seal::Make(peer_, worker_.public_key), *Seal::Make(worker_, stranger_.public_key)}) {
     Sealer sealer(other);
-    EXPECT_TRUE(IsForged(unsealer_, Seal(sealer, header_, {}).at(0)));
+    EXPECT_TRUE(IsForged(unsealer_, FramesOf(sealer, header_, {}).at(0)));
   }
-  EXPECT_TRUE(OpenAll(unsealer_, Seal(sealer_, header_, {})));
+  EXPECT_TRUE(OpenAll(unsealer_, FramesOf(sealer_, header_, {})));
 }
 
 TEST_F(SealingTest, TicketsAreOfTwoKeys) {
-  EXPECT_EQ(Session::Read(session_.ticket, worker_.public_key, peer_)->key, session_.key);
-  EXPECT_FALSE(Session::Read(session_.ticket, stranger_.public_key, peer_)) << "another one's";
-  EXPECT_FALSE(Session::Read(session_.ticket, worker_.public_key, stranger_)) << "for another one";
-  EXPECT_FALSE(Session::Read(session_.ticket, peer_.public_key, worker_)) << "sent back";
-  for (std::size_t i = 0; i < session_.ticket.size(); ++i) {
-    std::string altered = session_.ticket;
+  EXPECT_EQ(Seal::Read(seal_.ticket, worker_.public_key, peer_)->key, seal_.key);
+  EXPECT_FALSE(Seal::Read(seal_.ticket, stranger_.public_key, peer_)) << "another one's";
+  EXPECT_FALSE(Seal::Read(seal_.ticket, worker_.public_key, stranger_)) << "for another one";
+  EXPECT_FALSE(Seal::Read(seal_.ticket, peer_.public_key, worker_)) << "sent back";
+  for (std::size_t i = 0; i < seal_.ticket.size(); ++i) {
+    std::string altered = seal_.ticket;
     altered[i] = altered[i] == 'a' ? 'b' : 'a';
-    EXPECT_FALSE(Session::Read(altered, worker_.public_key, peer_)) << i;
+    EXPECT_FALSE(Seal::Read(altered, worker_.public_key, peer_)) << i;
   }
-  for (const std::string& text : {std::string(), session_.ticket + "a", session_.ticket.substr(1), std::string(70, '"')})
-    EXPECT_FALSE(Session::Read(text, worker_.public_key, peer_)) << text;
-  EXPECT_FALSE(Session::Read(session_.ticket, "no key", peer_));
-  EXPECT_FALSE(Session::Make(worker_, "no key"));
+  for (const std::string& text : {std::string(), seal_.ticket + "a", seal_.ticket.substr(1), std::string(70, '"')})
+    EXPECT_FALSE(Seal::Read(text, worker_.public_key, peer_)) << text;
+  EXPECT_FALSE(Seal::Read(seal_.ticket, "no key", peer_));
+  EXPECT_FALSE(Seal::Make(worker_, "no key"));
   // With this key the secret would be the same for everybody.
-  EXPECT_FALSE(Session::Make(worker_, std::string(40, '0')));
-  EXPECT_FALSE(Session::Read(session_.ticket, std::string(40, '0'), peer_));
+  EXPECT_FALSE(Seal::Make(worker_, std::string(40, '0')));
+  EXPECT_FALSE(Seal::Read(seal_.ticket, std::string(40, '0'), peer_));
 }
 
 TEST_F(SealingTest, LaterSessionsReplaceEarlierOnesForGood) {
-  SealedSessions sessions(peer_, kMaxPayload);
-  const auto entered = [&](const Session& session) {
-    const std::optional<Session> read = sessions.Read(session.ticket, worker_.public_key);
-    return read && sessions.Enter(worker_.public_key, *read);
+  LatestSeals seals(peer_, kMaxPayload);
+  const auto entered = [&](const Seal& seal) {
+    const std::optional<Seal> read = seals.Read(seal.ticket, worker_.public_key);
+    return read && seals.Enter(worker_.public_key, *read);
   };
-  EXPECT_EQ(sessions.Of(worker_.public_key), nullptr);
-  ASSERT_TRUE(entered(session_));
-  const Frames frames = Seal(sealer_, header_, {});
-  ASSERT_TRUE(OpenAll(*sessions.Of(worker_.public_key), frames));
-  ASSERT_TRUE(entered(session_)) << "after another connection";
-  EXPECT_TRUE(IsForged(*sessions.Of(worker_.public_key), frames[0])) << "it is known that they were heard";
-  const Session later = *Session::Make(worker_, peer_.public_key);
+  EXPECT_EQ(seals.Of(worker_.public_key), nullptr);
+  ASSERT_TRUE(entered(seal_));
+  const Frames frames = FramesOf(sealer_, header_, {});
+  ASSERT_TRUE(OpenAll(*seals.Of(worker_.public_key), frames));
+  ASSERT_TRUE(entered(seal_)) << "after another connection";
+  EXPECT_TRUE(IsForged(*seals.Of(worker_.public_key), frames[0])) << "it is known that they were heard";
+  const Seal later = *Seal::Make(worker_, peer_.public_key);
   ASSERT_TRUE(entered(later));
-  EXPECT_FALSE(entered(session_));
-  EXPECT_TRUE(IsForged(*sessions.Of(worker_.public_key), Seal(sealer_, header_, {}).at(0)));
+  EXPECT_FALSE(entered(seal_));
+  EXPECT_TRUE(IsForged(*seals.Of(worker_.public_key), FramesOf(sealer_, header_, {}).at(0)));
   Sealer sealer(later);
-  EXPECT_TRUE(OpenAll(*sessions.Of(worker_.public_key), Seal(sealer, header_, {})));
+  EXPECT_TRUE(OpenAll(*seals.Of(worker_.public_key), FramesOf(sealer, header_, {})));
 }
 
 }  // namespace

@@ -286,7 +286,7 @@ std::vector<SubmitFrame> SamplesOf() {
   layers.renderer = "raycast";
   layers.labels = LabelChoice{
       .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMaxLabelValue, 0.25}}, .shown = {{1, kMaxLabelValue}, {7, 7}}};
-  layers.overlay = OverlayChoice{.transfer = {"grayscale", 1, ScalarRange{-1, 2}}, .weight = 0.5};
+  layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
   return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}};
 }
 
@@ -354,6 +354,7 @@ std::vector<StatusReply> SamplesOf() {
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
+  full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};
   return {{}, full};
 }
 

@@ -1,4 +1,5 @@
 // What is chosen where a policy leaves a choice.
+#include "common/planning/resolve_look.h"
 #include "coordinator/tuning/choose_policy.h"
 
 #include <gtest/gtest.h>

@@ -8,7 +8,9 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <sstream>
 
+#include "data/volume_io/compressed_frame.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/dicom_files.h"
 #include "tests/support/expect_near.h"
@@ -118,6 +120,22 @@ TEST(Dicom, GivesBackEveryTypeOfPixelsInEveryTransferSyntax) {
       EXPECT_EQ(DataValues(*loaded.volume), values);
     }
   }
+}
+
+TEST(Dicom, TellsTheDecoderOfFramesInAnyFile) {
+  const CompressedFrame frame = {.path = "a \"b\\\n c/1.dcm",
+                                 .transfer_syntax = "1.2.840.10008.1.2.5",
+                                 .fragments = {{1234, 99}, {std::int64_t{5} << 33, 1}},
+                                 .columns = 7,
+                                 .rows = 5,
+                                 .bits_allocated = 16};
+  std::stringstream text;
+  text << frame << CompressedFrame{};
+  CompressedFrame first, second, none;
+  ASSERT_TRUE(text >> first >> second);
+  EXPECT_EQ(first, frame);
+  EXPECT_EQ(second, CompressedFrame{});
+  EXPECT_FALSE(text >> none);
 }
 
 TEST(Dicom, TakesTheBitsThatAreStored) {

@@ -6,6 +6,8 @@
 #include <hwy/highway.h>
 
 #include <limits>
+#include <type_traits>
+#include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
 #include "worker/renderers/raycast/layer_samples-inl.h"
@@ -92,19 +94,105 @@ HWY_INLINE void AddLayered(const MarchWork& work, Mask rays, Floats opacity, Int
 // itself, so that a frame does not pay for what it does not use.
 enum class Samples { kPlain, kAll, kLayered };
 
+// How far the rays of a packet go on: the rays that take their next sample, and the samples from it to the one after.
+struct Stride {
+  Mask sampled;
+  Floats steps;
+};
+// Rays in empty space leap ahead; the others go on to their next sample.
+HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask alive) {
+  const FloatTag df;
+  const IntTag di;
+  const auto cell = CellOf<kCellShift>(place, work.box->cells, alive);
+  const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
+  const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
+  return {hn::AndNot(empty, alive),
+          hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
+}
+
+// Samples after classification. Lanes that are not visible mean nothing.
+template <Samples kSamples>
+struct Classified {
+  Ints entry;
+  Floats opacity;
+  Mask visible;
+  Gradient gradient;  // if opacities depend on it
+  std::conditional_t<kSamples == Samples::kLayered, LayeredSample, std::monostate> layered;
+};
+template <class T, Samples kSamples>
+HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const SamplePlace& place, const Neighbours<T>& neighbours,
+                                                Mask sampled) {
+  const FloatTag df;
+  const RayLook& look = *work.look;
+  const auto zero = hn::Zero(df);
+  Classified<kSamples> of;
+  const auto value = Interpolate(neighbours, place);
+  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+  of.entry = EntryOf(look, value, finite);
+  of.opacity = hn::GatherIndex(df, look.entries.data() + 3, of.entry);
+  of.visible = hn::And(hn::And(sampled, finite), hn::Gt(of.opacity, zero));
+  of.gradient = {zero, zero, zero};
+  if (kSamples != Samples::kPlain && !look.gradient_factors.empty() && !hn::AllFalse(df, of.visible)) {
+    of.gradient = GradientAt(neighbours, place);
+    of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
+    of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
+  }
+  if constexpr (kSamples == Samples::kLayered) {
+    of.layered = WithLayers(*work.layers, *work.box, place, neighbours.at, hn::IfThenElseZero(finite, of.opacity));
+    of.opacity = of.layered.opacity;
+    of.visible = hn::And(sampled, hn::Gt(of.opacity, zero));
+  }
+  return of;
+}
+
+// The opacity of samples k if the first and the last one of a ray stand for more or less than a step.
+HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, Floats opacity) {
+  const auto one = Set(1);
+  const auto is_first = hn::Eq(k, ends.first), is_last = hn::Eq(k, ends.last);
+  if (hn::AllFalse(FloatTag(), hn::And(visible, hn::Or(is_first, is_last)))) return opacity;
+  const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
+  const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
+  return hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
+}
+
+// Lights samples k and adds those that are visible.
+template <class T, Samples kSamples>
+HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floats k, const PacketPart* part,
+                           const Neighbours<T>& neighbours, const Classified<kSamples>& samples, Floats opacity, Sums& sums) {
+  const RayLook& look = *work.look;
+  Light light = {Set(1), hn::Zero(FloatTag())};
+  [[maybe_unused]] LayeredLight lights = {light, light};
+  if (look.phong) {
+    const bool has_gradient = kSamples != Samples::kPlain && !look.gradient_factors.empty();
+    Gradient gradient = has_gradient ? samples.gradient : GradientAt(neighbours, place);
+    [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
+    if constexpr (kSamples != Samples::kPlain) {
+      on_face = hn::Lt(k, part->face_end);
+      gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
+    }
+    if constexpr (kSamples == Samples::kLayered) {
+      lights = LightOfLayers(work, place, neighbours.at, samples.layered, samples.visible, gradient, on_face);
+    } else {
+      light = LightOf(look, gradient);
+    }
+  }
+  if constexpr (kSamples == Samples::kLayered) {
+    AddLayered(work, samples.visible, opacity, samples.entry, samples.layered, lights, sums);
+  } else {
+    sums.Add(samples.visible, opacity, look.entries.data(), samples.entry, light);
+  }
+}
+
 // Samples `owned` of the rays, which lie in `part`; of kPlain it is null. Returns how many samples were shaded.
 template <class T, Samples kSamples>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
                                       const PacketPart* part, Sums& gathered) {
-  constexpr bool kAll = kSamples != Samples::kPlain, kLayered = kSamples == Samples::kLayered;
+  constexpr bool kAll = kSamples != Samples::kPlain;
   const FloatTag df;
-  const IntTag di;
-  const RayBox& box = *work.box;
   const RayLook& look = *work.look;
   const auto zero = hn::Zero(df), one = Set(1);
   // A ray ends when it transmits less.
   const auto opaque = Set(1 - work.termination);
-  const float* const entries = look.entries.data();
 
   // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
@@ -114,88 +202,36 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   const bool has_surfaces = kAll && !look.isovalues.empty();
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
-    if (!kLayered && !look.volume_shows) alive = hn::Lt(one, zero);
+    if (kSamples != Samples::kLayered && !look.volume_shows) alive = hn::Lt(one, zero);
     if (has_surfaces) surfaces.Start(*part);
   }
   if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
-  const bool has_ends = kAll || box.at_border;
+  const bool has_ends = kAll || work.box->at_border;
   EndSamples ends{zero, zero, zero, zero};
   if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
 
   Sums sums = gathered;
   bool in_matter = false;  // most of the last samples were visible
   while (!hn::AllFalse(df, alive)) {
-    const SamplePlace place = PlaceSample(packet, box, k);
-    // Rays in empty space leap ahead; the others go on to their next sample.
-    auto sampled = alive;
-    auto steps = one;
-    if (!in_matter) {
-      const auto cell = CellOf<kCellShift>(place, box.cells, alive);
-      const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
-      const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-      sampled = hn::AndNot(empty, alive);
-      steps = hn::IfThenElse(empty, StepsWithin<kCellShift>(box, leaps, place, hn::ConvertTo(df, distance)), one);
-    }
+    const SamplePlace place = PlaceSample(packet, *work.box, k);
+    Stride stride = {alive, one};
+    if (!in_matter) stride = LeapFrom(work, leaps, place, alive);
     const auto this_k = k;
-    k = hn::Add(k, steps);
+    k = hn::Add(k, stride.steps);
     alive = hn::And(alive, hn::Lt(k, owned.end));
-    if (hn::AllFalse(df, sampled)) continue;
+    if (hn::AllFalse(df, stride.sampled)) continue;
 
-    const Neighbours<T> neighbours = LoadNeighbours<T>(box, place, sampled);
-    const auto value = Interpolate(neighbours, place);
-    const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-    const auto entry = EntryOf(look, value, finite);
-    auto opacity = hn::GatherIndex(df, entries + 3, entry);
-    auto visible = hn::And(hn::And(sampled, finite), hn::Gt(opacity, zero));
-    Gradient gradient = {zero, zero, zero};
-    const bool by_gradient = kAll && !look.gradient_factors.empty();
-    if (by_gradient && !hn::AllFalse(df, visible)) {
-      gradient = GradientAt(neighbours, place);
-      opacity = OpacityByGradient(look, opacity, gradient);
-      visible = hn::And(visible, hn::Gt(opacity, zero));
-    }
-    [[maybe_unused]] LayeredSample layered;
-    if constexpr (kLayered) {
-      layered = WithLayers(*work.layers, box, place, neighbours.at, hn::IfThenElseZero(finite, opacity));
-      opacity = layered.opacity;
-      visible = hn::And(sampled, hn::Gt(opacity, zero));
-    }
-    const std::size_t count = hn::CountTrue(df, visible);
+    const Neighbours<T> neighbours = LoadNeighbours<T>(*work.box, place, stride.sampled);
+    const Classified<kSamples> samples = ClassifySamples<T, kSamples>(work, place, neighbours, stride.sampled);
+    const std::size_t count = hn::CountTrue(df, samples.visible);
     in_matter = count > kLanes / 2;
     if (count == 0) continue;
     shaded += count;
     if constexpr (kAll) {
-      if (has_surfaces) shaded += AddSurfaces<T>(work, visible, this_k, surfaces, sums);
+      if (has_surfaces) shaded += AddSurfaces<T>(work, samples.visible, this_k, surfaces, sums);
     }
-
-    if (has_ends) {
-      const auto is_first = hn::Eq(this_k, ends.first), is_last = hn::Eq(this_k, ends.last);
-      if (!hn::AllFalse(df, hn::And(visible, hn::Or(is_first, is_last)))) {
-        const auto steps_of_first = hn::Add(one, hn::IfThenElseZero(is_first, ends.first_excess));
-        const auto power = hn::Add(steps_of_first, hn::IfThenElseZero(is_last, ends.last_excess));
-        opacity = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
-      }
-    }
-    Light light = {one, zero};
-    [[maybe_unused]] LayeredLight lights = {light, light};
-    if (look.phong) {
-      if (!by_gradient) gradient = GradientAt(neighbours, place);
-      [[maybe_unused]] auto on_face = hn::Lt(one, zero);
-      if constexpr (kAll) {
-        on_face = hn::Lt(this_k, part->face_end);
-        gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
-      }
-      if constexpr (kLayered) {
-        lights = LightOfLayers(work, place, neighbours.at, layered, visible, gradient, on_face);
-      } else {
-        light = LightOf(look, gradient);
-      }
-    }
-    if constexpr (kLayered) {
-      AddLayered(work, visible, opacity, entry, layered, lights, sums);
-    } else {
-      sums.Add(visible, opacity, entries, entry, light);
-    }
+    const auto opacity = has_ends ? OpacityAtEnds(ends, this_k, samples.visible, samples.opacity) : samples.opacity;
+    AddSamples<T, kSamples>(work, place, this_k, part, neighbours, samples, opacity, sums);
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   }
   if constexpr (kAll) {

@@ -133,10 +133,116 @@ class SurfaceWalk {
   Ints look() const { return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)); }
 
  private:
+  // The way of the rays through their cells, x from 0 where they enter to 3 where they leave.
+  struct Way {
+    Floats enter, leave;         // samples
+    Floats begin[3], change[3];  // fractions at x = 0, and to x = 3
+    Floats end[3];
+
+    HWY_INLINE Floats FractionAt(std::size_t axis, Floats x) const {
+      return hn::Add(begin[axis], hn::Mul(hn::Mul(x, Set(1.0F / 3)), change[axis]));
+    }
+  };
+  // Rays enter and leave exactly on a face of the cell.
+  HWY_INLINE Way WayThroughCells() const {
+    const auto zero = hn::Zero(FloatTag()), one = Set(1);
+    Way way;
+    Floats in[3], out[3];
+    way.enter = Set(-kRayEnd);
+    way.leave = Set(kRayEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto a = PlaneAt(i, cell_[i]), b = PlaneAt(i, hn::Add(cell_[i], one));
+      in[i] = hn::IfThenElse(still_[i], Set(-kRayEnd), hn::Min(a, b));
+      out[i] = hn::IfThenElse(still_[i], Set(kRayEnd), hn::Max(a, b));
+      way.enter = hn::Max(way.enter, in[i]);
+      way.leave = hn::Min(way.leave, out[i]);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto fraction = [&](Floats at) HWY_ATTR { return hn::Min(hn::Max(hn::Sub(PositionOf(packet_, i, at), cell_[i]), zero), one); };
+      const auto backward = hn::Lt(packet_.move[i], zero);
+      const auto near_face = hn::IfThenElseZero(backward, one), far_face = hn::Sub(one, near_face);
+      way.begin[i] = hn::IfThenElse(hn::Eq(in[i], way.enter), near_face, fraction(way.enter));
+      way.end[i] = hn::IfThenElse(hn::Eq(out[i], way.leave), far_face, fraction(way.leave));
+      way.change[i] = hn::Sub(way.end[i], way.begin[i]);
+    }
+    return way;
+  }
+
+  // The interpolant at x = 0, 1, 2 and 3 of a way.
+  static HWY_INLINE void InterpolateAlong(const Way& way, const Neighbours<T>& voxels, Floats (&values)[4]) {
+    // Exact at both ends of t, unlike Lerp.
+    const auto mix = [&](Floats t, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(hn::Sub(Set(1), t), a), hn::Mul(t, b)); };
+    const auto value_at = [&](Floats u, Floats v, Floats w) HWY_ATTR {
+      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(u, pair.a, pair.b); };
+      return mix(w, mix(v, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(v, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
+    };
+    values[0] = value_at(way.begin[0], way.begin[1], way.begin[2]);
+    for (int i = 1; i < 3; ++i) {
+      const auto x = Set(float(i));
+      values[i] = value_at(way.FractionAt(0, x), way.FractionAt(1, x), way.FractionAt(2, x));
+    }
+    values[3] = value_at(way.end[0], way.end[1], way.end[2]);
+  }
+
+  // A place between low and high, where `above` changes its sign; `low_side`: its side at low.
+  static HWY_INLINE Floats Bisect(const Cubic& above, Mask low_side, Floats low, Floats high) {
+    constexpr int kHalvings = 16;  // of at most 1.8 voxels
+    for (int i = 0; i < kHalvings; ++i) {
+      const auto middle = hn::Mul(Set(0.5F), hn::Add(low, high));
+      const auto behind = hn::Xor(hn::Ge(above.At(middle), hn::Zero(FloatTag())), low_side);
+      high = hn::IfThenElse(behind, middle, high);
+      low = hn::IfThenElse(behind, low, middle);
+    }
+    return high;
+  }
+
+  // The nearest crossing so far in the cells.
+  struct Crossing {
+    Floats at, x, surface;
+  };
+
+  // Whether a crossing counts: it comes after the last one, within the clipped ray, and the box owns it.
+  HWY_INLINE Mask Counts(const Way& way, Floats at, Floats x, Floats surface) const {
+    auto counts = hn::And(hn::Ge(at, from_), hn::Le(at, to_));
+    counts = hn::And(counts, hn::Or(hn::Gt(at, last_), hn::And(hn::Eq(at, last_), hn::Gt(surface, surface_))));
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto position = hn::Add(cell_[i], way.FractionAt(i, x));
+      counts = hn::And(counts, hn::And(hn::Ge(position, Set(box_.low[i])), hn::Lt(position, Set(box_.high[i]))));
+    }
+    return counts;
+  }
+
+  // Looks for crossings of `rays` with a surface, stretch by stretch between the extrema of their cubic.
+  HWY_INLINE void CrossSurface(const Way& way, const Cubic& cubic, const Extrema& extrema, const Floats (&values)[4], std::size_t surface,
+                               Mask rays, Crossing& nearest) const {
+    const FloatTag df;
+    const auto zero = hn::Zero(df), value = Set(work_.look->isovalues[surface]);
+    const Floats ends[4] = {zero, extrema.first, extrema.second, Set(3)};
+    Cubic above = cubic;
+    above.c0 = hn::Sub(cubic.c0, value);
+    const auto enters_above = hn::Ge(values[0], value), leaves_above = hn::Ge(values[3], value);
+    const auto is_above = [&](Floats x) HWY_ATTR {
+      const auto at_end = hn::Ge(x, ends[3]);
+      return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
+    };
+    const Mask sides[4] = {enters_above, is_above(ends[1]), is_above(ends[2]), leaves_above};
+    for (std::size_t stretch = 0; stretch < 3; ++stretch) {
+      const auto changes = hn::And(rays, hn::Xor(sides[stretch], sides[stretch + 1]));
+      if (hn::AllFalse(df, changes)) continue;
+      const auto x = Bisect(above, sides[stretch], ends[stretch], ends[stretch + 1]);
+      const auto at = hn::Add(way.enter, hn::Mul(hn::Mul(x, Set(1.0F / 3)), hn::Sub(way.leave, way.enter)));
+      const auto number = Set(float(surface));
+      const auto counts = hn::And(hn::And(changes, hn::Lt(at, nearest.at)), Counts(way, at, x, number));
+      nearest.at = hn::IfThenElse(counts, at, nearest.at);
+      nearest.x = hn::IfThenElse(counts, x, nearest.x);
+      nearest.surface = hn::IfThenElse(counts, number, nearest.surface);
+    }
+  }
+
   // Crossings of these rays in their cells behind the last ones. Returns which rays have one.
   HWY_NOINLINE Mask FindIn(const SamplePlace& cell, Mask rays) {
     const FloatTag df;
-    const auto zero = hn::Zero(df), one = Set(1);
+    const auto zero = hn::Zero(df);
     const Neighbours<T> voxels = LoadNeighbours<T>(box_, cell, rays);
     auto least = voxels.inner[0][0].a, greatest = least, magnitude = zero;
     for (const auto& slice : voxels.inner) {
@@ -152,88 +258,27 @@ class SurfaceWalk {
       const auto value = Set(isovalues[surface]);
       return hn::And(rays, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
     };
-    auto any = hn::Lt(one, zero);
+    auto any = hn::Lt(Set(1), zero);
     for (std::size_t surface = 0; surface < isovalues.size(); ++surface) any = hn::Or(any, holds(surface));
     if (hn::AllFalse(df, any)) return any;
 
-    // Where the rays enter and leave the cell: exactly on a face of it.
-    Floats in[3], out[3];
-    auto enter = Set(-kRayEnd), leave = Set(kRayEnd);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto a = PlaneAt(i, cell_[i]), b = PlaneAt(i, hn::Add(cell_[i], one));
-      in[i] = hn::IfThenElse(still_[i], Set(-kRayEnd), hn::Min(a, b));
-      out[i] = hn::IfThenElse(still_[i], Set(kRayEnd), hn::Max(a, b));
-      enter = hn::Max(enter, in[i]);
-      leave = hn::Min(leave, out[i]);
-    }
-    rays = hn::And(rays, hn::Le(enter, leave));
-    Floats begin[3], end[3], change[3];  // fractions
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto fraction = [&](Floats at) HWY_ATTR { return hn::Min(hn::Max(hn::Sub(PositionOf(packet_, i, at), cell_[i]), zero), one); };
-      const auto backward = hn::Lt(packet_.move[i], zero);
-      const auto near_face = hn::IfThenElseZero(backward, one), far_face = hn::Sub(one, near_face);
-      begin[i] = hn::IfThenElse(hn::Eq(in[i], enter), near_face, fraction(enter));
-      end[i] = hn::IfThenElse(hn::Eq(out[i], leave), far_face, fraction(leave));
-      change[i] = hn::Sub(end[i], begin[i]);
-    }
-    const auto fraction_at = [&](std::size_t i, Floats x)
-                                 HWY_ATTR { return hn::Add(begin[i], hn::Mul(hn::Mul(x, Set(1.0F / 3)), change[i])); };
-    // Exact at both ends of t, unlike Lerp.
-    const auto mix = [&](Floats t, Floats a, Floats b) HWY_ATTR { return hn::Add(hn::Mul(hn::Sub(one, t), a), hn::Mul(t, b)); };
-    const auto value_at = [&](Floats u, Floats v, Floats w) HWY_ATTR {
-      const auto row = [&](const InnerPair& pair) HWY_ATTR { return mix(u, pair.a, pair.b); };
-      return mix(w, mix(v, row(voxels.inner[0][0]), row(voxels.inner[0][1])), mix(v, row(voxels.inner[1][0]), row(voxels.inner[1][1])));
-    };
-    const auto value_of = [&](float x)
-                              HWY_ATTR { return value_at(fraction_at(0, Set(x)), fraction_at(1, Set(x)), fraction_at(2, Set(x))); };
-    const Floats values[4] = {value_at(begin[0], begin[1], begin[2]), value_of(1), value_of(2), value_at(end[0], end[1], end[2])};
+    const Way way = WayThroughCells();
+    rays = hn::And(rays, hn::Le(way.enter, way.leave));
+    Floats values[4];
+    InterpolateAlong(way, voxels, values);
     const Cubic cubic = CubicThrough(values);
     const Extrema extrema = ExtremaOf(cubic);
-    const Floats ends[4] = {zero, extrema.first, extrema.second, Set(3)};
-
-    auto nearest = Set(kRayEnd), nearest_x = zero, nearest_surface = zero;
+    Crossing nearest = {Set(kRayEnd), zero, zero};
     for (std::size_t surface = 0; surface < isovalues.size(); ++surface) {
       const auto crossed = hn::And(rays, holds(surface));
-      if (hn::AllFalse(df, crossed)) continue;
-      const auto value = Set(isovalues[surface]);
-      Cubic above = cubic;
-      above.c0 = hn::Sub(cubic.c0, value);
-      const auto enters_above = hn::Ge(values[0], value), leaves_above = hn::Ge(values[3], value);
-      const auto is_above = [&](Floats x) HWY_ATTR {
-        const auto at_end = hn::Ge(x, ends[3]);
-        return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
-      };
-      const Mask sides[4] = {enters_above, is_above(ends[1]), is_above(ends[2]), leaves_above};
-      for (std::size_t stretch = 0; stretch < 3; ++stretch) {
-        const auto changes = hn::And(crossed, hn::Xor(sides[stretch], sides[stretch + 1]));
-        if (hn::AllFalse(df, changes)) continue;
-        auto low = ends[stretch], high = ends[stretch + 1];
-        constexpr int kHalvings = 16;  // of at most 1.8 voxels
-        for (int i = 0; i < kHalvings; ++i) {
-          const auto middle = hn::Mul(Set(0.5F), hn::Add(low, high));
-          const auto behind = hn::Xor(hn::Ge(above.At(middle), zero), sides[stretch]);
-          high = hn::IfThenElse(behind, middle, high);
-          low = hn::IfThenElse(behind, low, middle);
-        }
-        const auto at = hn::Add(enter, hn::Mul(hn::Mul(high, Set(1.0F / 3)), hn::Sub(leave, enter)));
-        auto counts = hn::And(hn::And(hn::Ge(at, from_), hn::Le(at, to_)), hn::And(changes, hn::Lt(at, nearest)));
-        const auto number = Set(float(surface));
-        counts = hn::And(counts, hn::Or(hn::Gt(at, last_), hn::And(hn::Eq(at, last_), hn::Gt(number, surface_))));
-        for (std::size_t i = 0; i < 3; ++i) {
-          const auto position = hn::Add(cell_[i], fraction_at(i, high));
-          counts = hn::And(counts, hn::And(hn::Ge(position, Set(box_.low[i])), hn::Lt(position, Set(box_.high[i]))));
-        }
-        nearest = hn::IfThenElse(counts, at, nearest);
-        nearest_x = hn::IfThenElse(counts, high, nearest_x);
-        nearest_surface = hn::IfThenElse(counts, number, nearest_surface);
-      }
+      if (!hn::AllFalse(df, crossed)) CrossSurface(way, cubic, extrema, values, surface, crossed, nearest);
     }
-    const auto found = hn::And(rays, hn::Lt(nearest, Set(kRayEnd)));
-    at_ = hn::IfThenElse(found, nearest, at_);
-    last_ = hn::IfThenElse(found, nearest, last_);
-    surface_ = hn::IfThenElse(found, nearest_surface, surface_);
+    const auto found = hn::And(rays, hn::Lt(nearest.at, Set(kRayEnd)));
+    at_ = hn::IfThenElse(found, nearest.at, at_);
+    last_ = hn::IfThenElse(found, nearest.at, last_);
+    surface_ = hn::IfThenElse(found, nearest.surface, surface_);
     for (std::size_t i = 0; i < 3; ++i) {
-      place_.fraction[i] = hn::IfThenElse(found, fraction_at(i, nearest_x), place_.fraction[i]);
+      place_.fraction[i] = hn::IfThenElse(found, way.FractionAt(i, nearest.x), place_.fraction[i]);
       place_.voxel[i] = hn::IfThenElse(hn::RebindMask(IntTag(), found), cell.voxel[i], place_.voxel[i]);
     }
     return found;

@@ -1,11 +1,13 @@
+#include "common/planning/frame_plan.h"
+
 #include <algorithm>
 #include <string>
 #include <utility>
 
 #include "common/planning/brick_visibility.h"
-#include "common/planning/frame_plan.h"
 #include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
+#include "common/planning/resolve_look.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {

@@ -1,4 +1,4 @@
-// Session: a client connected to a service, or to an embedded one of its own (`--local`).
+// ServiceConnection: a client connected to a service, or to an embedded one of its own (`--local`).
 #pragma once
 
 #include <memory>
@@ -16,31 +16,32 @@ namespace slabstream {
 
 class EmbeddedService;
 
-class Session {
+class ServiceConnection {
  public:
   // For volumes `sources`, at least one. At the service they are names of its catalogue. With local workers they are volume files: Open
   // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers.
   // `layers`: files that belong to each of them, with local workers only; else InvalidArgument.
-  static Result<Session> Open(const ConnectionOptions& connection, std::span<const std::string> sources, const LayerFiles& layers = {});
-  static Result<Session> Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers = {}) {
+  static Result<ServiceConnection> Open(const ConnectionOptions& connection, std::span<const std::string> sources,
+                                        const LayerFiles& layers = {});
+  static Result<ServiceConnection> Open(const ConnectionOptions& connection, const std::string& source, const LayerFiles& layers = {}) {
     return Open(connection, {&source, 1}, layers);
   }
   // In this process, by connection.local_workers > 0. A function in a source supplies its volume when the first frame needs it, on a thread
   // of its own.
-  static Result<Session> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources);
+  static Result<ServiceConnection> OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources);
   // The service alone, for `status`.
-  static Result<Session> OpenService(const ServiceChoice& choice);
-  static Result<Session> OpenService(const ServiceAddress& service);
-  Session(Session&&) noexcept;
-  Session& operator=(Session&&) = delete;
-  ~Session();
+  static Result<ServiceConnection> OpenService(const ServiceChoice& choice);
+  static Result<ServiceConnection> OpenService(const ServiceAddress& service);
+  ServiceConnection(ServiceConnection&&) noexcept;
+  ServiceConnection& operator=(ServiceConnection&&) = delete;
+  ~ServiceConnection();
 
   Client& client() { return *client_; }
   // The dataset to request for the source of this number.
   const std::string& dataset(std::size_t source = 0) const { return datasets_[source]; }
 
  private:
-  Session();
+  ServiceConnection();
   // Destroyed last to first: the client leaves, the service ends, the context closes.
   std::unique_ptr<Context> context_;
   std::unique_ptr<EmbeddedService> service_;

@@ -3,7 +3,7 @@
 
 #include "common/frame/dataset_name.h"
 #include "common/volume/memory_budget.h"
-#include "coordinator/frame_machine_state.h"
+#include "coordinator/dataset_machine_state.h"
 
 namespace slabstream {
 namespace {
@@ -13,23 +13,19 @@ constexpr std::uint64_t kUploadWindow = std::uint64_t{8} << 20;  // bytes that m
 
 }  // namespace
 
-void FrameMachine::State::OnClientMessage(PeerToken client, const AddVolume& message) {
-  clients.Meet(client, now);  // its silence is noticed from now on
+void DatasetMachine::State::OnMessage(PeerToken client, const AddVolume& message, const Bytes&) {
   if (const Upload earlier = UploadOf(client); earlier != uploads.end())
     EndUpload(earlier, Status::Cancelled("the client sends another volume"));
   if (const Status admitted = AdmitUpload(message); !admitted.ok()) {
-    return SendClient(client, OrderRefused{.nonce = message.nonce, .status = Bounded(admitted)});
+    return Send(client, OrderRefused{.nonce = message.nonce, .status = Bounded(admitted)});
   }
   uploads.emplace(++last_upload, OpenUpload{.client = client, .order = message});
   actions.emplace_back(BeginUpload{last_upload, message});
 }
 
-Status FrameMachine::State::AdmitUpload(const AddVolume& order) {
+Status DatasetMachine::State::AdmitUpload(const AddVolume& order) {
   if (Status name = CheckDatasetName(order.name); !name.ok()) return name;
-  const DatasetTable::Entry* const entry = datasets.Find(order.name);
-  if (entry != nullptr && entry->awaited == 0) {
-    return Status::InvalidArgument(fmt::format("there is already a dataset named \"{}\"; remove it first", order.name));
-  }
+  if (Status taken = NameIsFree(order.name); !taken.ok()) return taken;
   if (std::ranges::any_of(uploads, [&](const auto& each) { return each.second.order.name == order.name; })) {
     return Status::InvalidArgument(fmt::format("a dataset named \"{}\" is on its way from another client", order.name));
   }
@@ -44,36 +40,38 @@ Status FrameMachine::State::AdmitUpload(const AddVolume& order) {
   }
   if (datasets.bytes() + UploadBytes() + bytes <= share) return Status::Ok();
   ++refused.too_large;
-  return Status::ResourceExhausted(
-      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the coordinator's "
-                  "--memory sets the limit",
-                  order.name, MemoryText(bytes), MemoryText(share), MemoryText(datasets.bytes() + UploadBytes())));
+  return TooLarge(order.name, bytes, datasets.bytes() + UploadBytes());
 }
 
-std::uint64_t FrameMachine::State::UploadBytes() const {
+Status DatasetMachine::State::NameIsFree(const std::string& name) const {
+  if (!datasets.IsListed(name)) return Status::Ok();
+  return Status::InvalidArgument("there is already a dataset named " + InQuotes(name) + "; remove it first");
+}
+
+std::uint64_t DatasetMachine::State::UploadBytes() const {
   std::uint64_t total = 0;
   for (const auto& [id, upload] : uploads) total += upload.order.bytes();
   return total;
 }
 
-void FrameMachine::State::On(const UploadBegun& event) {
+void DatasetMachine::State::On(const UploadBegun& event) {
   const Upload upload = uploads.find(event.upload);
   if (upload == uploads.end()) return;  // its client has gone
   if (!event.status.ok()) return EndUpload(upload, event.status);
   GrantCredit(upload->second);
 }
 
-void FrameMachine::State::GrantCredit(OpenUpload& upload) {
+void DatasetMachine::State::GrantCredit(OpenUpload& upload) {
   upload.allowed = std::min(upload.received + kUploadWindow, upload.order.bytes());
-  SendClient(upload.client, VolumeCredit{.nonce = upload.order.nonce, .received = upload.received, .allowed = upload.allowed});
+  Send(upload.client, VolumeCredit{.nonce = upload.order.nonce, .received = upload.received, .allowed = upload.allowed});
 }
 
-FrameMachine::State::Upload FrameMachine::State::UploadOf(PeerToken client, std::optional<std::uint64_t> nonce) {
+DatasetMachine::State::Upload DatasetMachine::State::UploadOf(PeerToken client, std::optional<std::uint64_t> nonce) {
   return std::ranges::find_if(
       uploads, [&](const auto& each) { return each.second.client == client && (!nonce || each.second.order.nonce == *nonce); });
 }
 
-void FrameMachine::State::OnVolumePart(PeerToken client, const VolumePart& part, const Bytes& payload) {
+void DatasetMachine::State::OnMessage(PeerToken client, const VolumePart& part, const Bytes& payload) {
   const Upload found = UploadOf(client, part.nonce);
   if (found == uploads.end()) return;  // it was refused meanwhile
   OpenUpload& upload = found->second;
@@ -91,31 +89,27 @@ void FrameMachine::State::OnVolumePart(PeerToken client, const VolumePart& part,
   }
 }
 
-void FrameMachine::State::On(const UploadFinished& event) {
+void DatasetMachine::State::On(const UploadFinished& event) {
   const auto upload = uploads.extract(event.upload);
   if (upload.empty()) return;
   const AddVolume& order = upload.mapped().order;
-  Status status = event.source.status();
   // A file of that name may have come into a watched folder.
-  const DatasetTable::Entry* const entry = datasets.Find(order.name);
-  if (status.ok() && entry != nullptr && entry->awaited == 0) {
-    status = Status::InvalidArgument(fmt::format("there is already a dataset named \"{}\"; remove it first", order.name));
-  }
-  if (!status.ok()) return SendClient(upload.mapped().client, OrderRefused{.nonce = order.nonce, .status = Bounded(status)});
+  const Status status = event.source.ok() ? NameIsFree(order.name) : event.source.status();
+  if (!status.ok()) return Send(upload.mapped().client, OrderRefused{.nonce = order.nonce, .status = Bounded(status)});
   AddData(order.name, *event.source);
-  SendClient(upload.mapped().client, DataReply{.nonce = order.nonce, .datasets = datasets.Report(now)});
+  Send(upload.mapped().client, DataReply{.nonce = order.nonce, .datasets = datasets.Report(now)});
 }
 
-void FrameMachine::State::OnClientMessage(PeerToken client, const DropVolume& message) {
+void DatasetMachine::State::OnMessage(PeerToken client, const DropVolume& message, const Bytes&) {
   const Upload upload = UploadOf(client, message.nonce);
   if (upload != uploads.end()) EndUpload(upload, Status::Cancelled("the client gave the volume up"));
 }
 
-void FrameMachine::State::EndUpload(Upload upload, const Status& why) {
+void DatasetMachine::State::EndUpload(Upload upload, const Status& why) {
   const OpenUpload& open = upload->second;
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset \"{}\" of client {} did not arrive: {}", open.order.name, open.client,
        why.message());
-  SendClient(open.client, OrderRefused{.nonce = open.order.nonce, .status = Bounded(why)});
+  Send(open.client, OrderRefused{.nonce = open.order.nonce, .status = Bounded(why)});
   actions.emplace_back(DropUpload{upload->first});
   uploads.erase(upload);
 }

@@ -1,4 +1,4 @@
-#include "client/cli/session.h"
+#include "client/cli/service_connection.h"
 
 #include <fmt/format.h>
 
@@ -24,11 +24,12 @@ Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files
 
 }  // namespace
 
-Session::Session() = default;
-Session::Session(Session&&) noexcept = default;
-Session::~Session() = default;
+ServiceConnection::ServiceConnection() = default;
+ServiceConnection::ServiceConnection(ServiceConnection&&) noexcept = default;
+ServiceConnection::~ServiceConnection() = default;
 
-Result<Session> Session::Open(const ConnectionOptions& connection, std::span<const std::string> sources, const LayerFiles& layers) {
+Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& connection, std::span<const std::string> sources,
+                                                  const LayerFiles& layers) {
   if (connection.local_workers == 0) {
     if (layers.any()) {
       return Status::InvalidArgument(
@@ -40,9 +41,9 @@ Result<Session> Session::Open(const ConnectionOptions& connection, std::span<con
       if (source.size() <= kMaxNameBytes) continue;
       return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
     }
-    Result<Session> session = OpenService(connection.service);
-    if (session.ok()) session->datasets_.assign(sources.begin(), sources.end());
-    return session;
+    Result<ServiceConnection> opened = OpenService(connection.service);
+    if (opened.ok()) opened->datasets_.assign(sources.begin(), sources.end());
+    return opened;
   }
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
@@ -55,43 +56,43 @@ Result<Session> Session::Open(const ConnectionOptions& connection, std::span<con
   return OpenLocal(connection, std::move(files));
 }
 
-Result<Session> Session::OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources) {
-  Session session;
-  session.context_ = std::make_unique<Context>();
+Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& connection, std::vector<DataSource> sources) {
+  ServiceConnection opened;
+  opened.context_ = std::make_unique<Context>();
   EmbeddedOptions options;
   options.workers = connection.local_workers;
   for (DataSource& source : sources) {
-    const std::size_t number = session.datasets_.size();
-    session.datasets_.push_back(number == 0 ? kLocalDataset : fmt::format("{}-{}", kLocalDataset, number));
-    options.coordinator.catalogue[session.datasets_.back()] = std::move(source);
+    const std::size_t number = opened.datasets_.size();
+    opened.datasets_.push_back(number == 0 ? kLocalDataset : fmt::format("{}-{}", kLocalDataset, number));
+    options.coordinator.catalogue[opened.datasets_.back()] = std::move(source);
   }
   options.worker.threads = std::uint32_t(LocalThreads(connection));
-  Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*session.context_, std::move(options));
+  Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();
-  session.service_ = *std::move(service);
-  Result<Client> client = Client::Connect(*session.context_, session.service_->endpoint());
+  opened.service_ = *std::move(service);
+  Result<Client> client = Client::Connect(*opened.context_, opened.service_->endpoint());
   if (!client.ok()) return client.status();
-  session.client_ = std::make_unique<Client>(*std::move(client));
-  return session;
+  opened.client_ = std::make_unique<Client>(*std::move(client));
+  return opened;
 }
 
-Result<Session> Session::OpenService(const ServiceChoice& choice) {
+Result<ServiceConnection> ServiceConnection::OpenService(const ServiceChoice& choice) {
   const Result<ServiceAddress> service = ResolveService(choice);
   if (!service.ok()) return service.status();
   return OpenService(*service);
 }
 
-Result<Session> Session::OpenService(const ServiceAddress& service) {
-  Session session;
-  session.context_ = std::make_unique<Context>();
-  Result<Client> client = Client::Connect(*session.context_, service);
+Result<ServiceConnection> ServiceConnection::OpenService(const ServiceAddress& service) {
+  ServiceConnection connection;
+  connection.context_ = std::make_unique<Context>();
+  Result<Client> client = Client::Connect(*connection.context_, service);
   if (!client.ok()) {
     const std::string hint =
         client.status().code() == StatusCode::kUnavailable ? " (`slabstream up` starts a service, --local needs none)" : "";
     return Status(client.status().code(), client.status().message() + hint);
   }
-  session.client_ = std::make_unique<Client>(*std::move(client));
-  return session;
+  connection.client_ = std::make_unique<Client>(*std::move(client));
+  return connection;
 }
 
 }  // namespace slabstream

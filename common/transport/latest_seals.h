@@ -1,0 +1,44 @@
+// LatestSeals: the seals of one plane of sealed connections, at the end that listens: one a key, the latest. Private to this folder.
+//
+// A seal is kept after its connections, and even after its key has left the plane: a ticket is no secret, so whoever has recorded one
+// may connect with it, and must not be believed what was said before.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/transport/sealing.h"
+
+namespace slabstream {
+
+// Any thread.
+class LatestSeals {
+ public:
+  LatestSeals(KeyPair own, std::uint64_t max_payload_bytes) : own_(std::move(own)), max_payload_bytes_(max_payload_bytes) {}
+
+  // None: the holder of `from` did not make the ticket.
+  std::optional<Seal> Read(std::string_view ticket, const std::string& from) const { return Seal::Read(ticket, from, own_); }
+
+  // Makes it the seal of `from`, if it is not already. False: there is a later one.
+  bool Enter(const std::string& from, const Seal& seal);
+
+  // What opens frames of the seal of `from`, for the socket's thread only; null: it has none.
+  std::shared_ptr<Unsealer> Of(const std::string& from) const;
+
+ private:
+  struct Entry {
+    SealName name;
+    std::shared_ptr<Unsealer> unsealer;
+  };
+  const KeyPair own_;
+  const std::uint64_t max_payload_bytes_;
+  mutable std::mutex mutex_;
+  std::map<std::string, Entry> latest_;  // by public key; guarded by mutex_
+};
+
+}  // namespace slabstream

@@ -1,0 +1,300 @@
+#include "coordinator/dataset_machine.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include "common/volume/memory_budget.h"
+#include "coordinator/dataset_machine_state.h"
+
+namespace slabstream {
+
+// ---------------------------------------------------------------- requests
+
+void DatasetMachine::State::On(const SeekDataset& event) {
+  if (datasets.folders.empty() && datasets.Find(event.name) == nullptr) {
+    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(event.name), &RefusedRequests::unknown_dataset};
+    return;
+  }
+  TellUse(*uses.insert_or_assign(event.use, Use{.name = event.name, .look = Seek(event.name)}).first);
+}
+
+void DatasetMachine::State::On(const KeepDataset& event) {
+  const auto use = uses.find(event.use);
+  if (use != uses.end()) use->second.kept = event.dataset;
+}
+
+void DatasetMachine::State::On(const ForgetClient& event) {
+  std::erase_if(orders, [&](const auto& order) { return order.second.client == event.client; });
+  if (const Upload upload = UploadOf(event.client); upload != uploads.end()) {
+    EndUpload(upload, Status::Unavailable("its client has gone"));
+  }
+  std::erase_if(questions, [&](const auto& open) { return open.second.client == event.client; });
+}
+
+void DatasetMachine::State::On(const FinishStatus& event) {
+  StatusReply reply = event.reply;
+  reply.datasets = datasets.Report(now);
+  reply.refused += refused;
+  Send(event.client, std::move(reply));
+}
+
+void DatasetMachine::State::On(const EndDatasets& event) {
+  for (const auto& [id, open] : questions) RefuseQuestion(open, Status::Unavailable(event.reason));
+  stopped = true;
+}
+
+// Sees to it that the dataset is loaded as its files are now. The look at them that must be over before; 0: none.
+LookId DatasetMachine::State::Seek(const std::string& name) {
+  if (!datasets.IsListed(name)) {
+    datasets.Await(name, folder_looks.Want());
+    LookThroughFolders();
+    return 0;
+  }
+  datasets.Use(name);
+  DatasetTable::Entry* const entry = datasets.Find(name);
+  switch (entry->state) {
+    case DatasetState::kUnloaded:
+    case DatasetState::kFailed: LoadData(name); break;
+    case DatasetState::kLoading: return entry->looks.Want();
+    case DatasetState::kReady: {
+      if (entry->stamp == nullptr) break;
+      const LookId look = entry->looks.Want();
+      LookAt(name);
+      return look;
+    }
+  }
+  return 0;
+}
+
+// Until a look has shown that the files have not changed, requests are planned for the voxels that are there.
+void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
+  const auto& [id, use] = each;
+  const DatasetTable::Entry& entry = *datasets.Find(use.name);
+  if (entry.state == DatasetState::kReady) {
+    news.uses[id] = DatasetReady{entry.id, entry.summary, entry.looks.IsOver(use.look)};
+  } else {
+    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading};
+  }
+}
+
+void DatasetMachine::State::TellUses(const std::string& name) {
+  for (const auto& use : uses) {
+    if (use.second.name == name && !use.second.kept) TellUse(use);
+  }
+}
+
+// What waits for the dataset ends.
+void DatasetMachine::State::Lose(const std::string& name, const Status& why, RefusedAs as) {
+  std::erase_if(uses, [&](const auto& each) {
+    const auto& [id, use] = each;
+    if (use.name != name || use.kept) return false;
+    news.uses[id] = DatasetLost{why, as};
+    return true;
+  });
+  std::erase_if(questions, [&](const auto& each) {
+    const OpenQuestion& open = each.second;
+    if (open.asked || DatasetOf(open.question) != name) return false;
+    if (as != nullptr) ++(refused.*as);
+    RefuseQuestion(open, why);
+    return true;
+  });
+}
+
+bool DatasetMachine::State::IsWanted(const std::string& name) const {
+  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.name == name && !use.second.kept; }) ||
+         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && DatasetOf(open.second.question) == name; });
+}
+
+bool DatasetMachine::State::InUse(DatasetId dataset) const {
+  const auto is_of = [&](const std::string& name) {
+    const DatasetTable::Entry* const entry = datasets.Find(name);
+    return entry != nullptr && entry->id == dataset;
+  };
+  return std::ranges::any_of(uses,
+                             [&](const auto& use) { return use.second.kept ? use.second.kept == dataset : is_of(use.second.name); }) ||
+         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && is_of(DatasetOf(open.second.question)); });
+}
+
+// ---------------------------------------------------------------- voxels
+
+void DatasetMachine::State::LoadData(const std::string& name) {
+  const LoadId load = datasets.BeginLoad(name, now);
+  actions.emplace_back(LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source});
+  TellUses(name);
+}
+
+void DatasetMachine::State::On(const DatasetLoaded& event) {
+  const DatasetTable::Entry* const loading = datasets.Find(event.name);
+  const Time begun = loading == nullptr ? now : loading->since;
+  if (!datasets.Loaded(event.name, event.load, event.dataset, event.summary, event.bytes, event.stamp, now)) {
+    if (!datasets.Holds(event.dataset)) actions.emplace_back(UnloadDataset{event.dataset});  // the executor has its voxels
+    return;
+  }
+  const Index3& size = event.summary->description.geometry.size;
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is loaded: {} x {} x {} voxels, {}, {:.1f} ms", InQuotes(event.name), size.x,
+       size.y, size.z, MemoryText(event.bytes), std::chrono::duration<double, std::milli>(now - begun).count());
+  if (event.stamp == nullptr) datasets.Find(event.name)->looks.AnswerAll();
+  LookAt(event.name);
+  TellUses(event.name);
+
+  const std::uint64_t share = DatasetShare(config.memory_bytes);
+  while (datasets.bytes() > share && UnloadOne()) {
+  }
+  if (datasets.bytes() <= share) return;
+  // All that are loaded are in use. What came last goes, with its requests.
+  const Status full = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  Lose(event.name, full, &RefusedRequests::too_large);
+  UnloadOne();
+}
+
+Status DatasetMachine::State::TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const {
+  return Status::ResourceExhausted(
+      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the coordinator's --memory sets the limit", name,
+                  MemoryText(bytes), MemoryText(DatasetShare(config.memory_bytes)), MemoryText(others)));
+}
+
+void DatasetMachine::State::On(const DatasetFailed& event) {
+  if (datasets.IsLoading(event.name, event.load)) FailData(event.name, event.status);
+}
+
+// A dataset cannot be read, or not be looked at. It is tried again when it is asked for again.
+void DatasetMachine::State::FailData(const std::string& name, const Status& status) {
+  datasets.Fail(name, status, now);
+  const bool full = status.code() == StatusCode::kResourceExhausted;
+  if (full && UnloadOne()) return LoadData(name);  // there may be room now
+  Tell(NoteAbout::kDatasets, LogLevel::kWarning, "dataset {} cannot be read: {}", InQuotes(name), status.message());
+  Lose(name, status, full ? &RefusedRequests::too_large : nullptr);
+}
+
+// What the dataset is read from is not what it was. Frames that have begun go on with the voxels that they began with.
+void DatasetMachine::State::RenewData(const std::string& name) {
+  datasets.Reset(name, now);
+  if (IsWanted(name)) LoadData(name);
+}
+
+bool DatasetMachine::State::UnloadOne() {
+  const std::optional<DatasetId> unloaded = datasets.UnloadOne([this](DatasetId dataset) { return InUse(dataset); }, now);
+  if (!unloaded) return false;
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the dataset that was used least recently is unloaded: others need its memory");
+  Unload(*unloaded);
+  return true;
+}
+
+void DatasetMachine::State::UnloadRetired() {
+  if (datasets.retired() == 0) return;
+  for (const DatasetId dataset : datasets.TakeRetired([this](DatasetId id) { return InUse(id); })) Unload(dataset);
+}
+
+void DatasetMachine::State::Unload(DatasetId dataset) {
+  news.unloaded.push_back(dataset);
+  actions.emplace_back(UnloadDataset{dataset});
+}
+
+// ---------------------------------------------------------------- looks
+
+// If somebody wants it and none is under way.
+void DatasetMachine::State::LookAt(const std::string& name) {
+  DatasetTable::Entry& entry = *datasets.Find(name);
+  if (entry.state != DatasetState::kReady || entry.stamp == nullptr || !entry.looks.MustBegin()) return;
+  entry.looks.Begin();
+  actions.emplace_back(LookAtDataset{.name = name, .load = entry.load, .stamp = entry.stamp});
+}
+
+void DatasetMachine::State::On(const DatasetSeen& event) {
+  DatasetTable::Entry* const entry = datasets.FindLoad(event.name, event.load);
+  if (entry == nullptr) return;
+  entry->looks.End();
+  if (!event.changed.ok()) {
+    FailData(event.name, event.changed.status());
+  } else if (*event.changed) {
+    Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));
+    RenewData(event.name);
+  } else {
+    LookAt(event.name);
+    for (auto& use : uses) {
+      if (use.second.look == 0 || use.second.name != event.name || !entry->looks.IsOver(use.second.look)) continue;
+      use.second.look = 0;
+      if (!use.second.kept) TellUse(use);
+    }
+  }
+  AnswerLists();
+}
+
+// If somebody wants it and it is not under way.
+void DatasetMachine::State::LookThroughFolders() {
+  if (!folder_looks.MustBegin()) return;
+  folder_looks.Begin();
+  actions.emplace_back(LookAtFolders{datasets.folders});
+}
+
+// At the folders, if there are any, and the files of what is loaded.
+void DatasetMachine::State::LookAtEverything() {
+  if (!datasets.folders.empty()) {
+    folder_looks.Want();
+    LookThroughFolders();
+  }
+  datasets.ForEach([this](const std::string& name, DatasetTable::Entry& entry) {
+    if (entry.state != DatasetState::kReady || entry.stamp == nullptr) return;
+    entry.looks.Want();
+    LookAt(name);
+  });
+}
+
+// ---------------------------------------------------------------- the machine
+
+void DatasetMachine::State::On(const ClientAsked& event) {
+  std::visit([&](const auto& message) { OnMessage(event.from, message, event.payload); }, event.message);
+}
+
+void DatasetMachine::State::On(const BadRequest& event) {
+  ++refused.bad_request;
+  Tell(NoteAbout::kFrames, LogLevel::kInfo, "a request of client {} is refused: {}", event.from, event.why.message());
+  if (const auto* order = std::get_if<OrderRefused>(&event.answer)) {
+    if (const Upload upload = UploadOf(event.from, order->nonce); upload != uploads.end()) return EndUpload(upload, event.why);
+  }
+  Send(event.from, event.answer);
+}
+
+Time DatasetMachine::State::NextWake() const {
+  return stopped || datasets.folders.empty() || folder_looks.UnderWay() ? Time::max() : next_round;
+}
+
+DatasetMachine::DatasetMachine(DatasetConfig config) : state_(std::make_unique<State>(std::move(config))) {}
+DatasetMachine::~DatasetMachine() = default;
+DatasetMachine::DatasetMachine(DatasetMachine&&) noexcept = default;
+
+std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time now) {
+  State& state = *state_;
+  if (state.stopped) return {};
+  state.now = now;
+  if (!std::exchange(state.started, true)) {
+    state.next_round = now + state.config.look_interval;
+    state.datasets.ForEach([now](const std::string&, DatasetTable::Entry& entry) { entry.since = now; });
+  }
+  std::visit([&state](const auto& e) { state.On(e); }, event);
+  if (!state.stopped) {
+    if (now >= state.NextWake()) state.LookAtEverything();
+    state.AskExecutor();
+    state.UnloadRetired();
+    if (!state.news.uses.empty() || !state.news.unloaded.empty()) state.actions.emplace_back(std::exchange(state.news, {}));
+  }
+  return std::exchange(state.actions, {});
+}
+
+Time DatasetMachine::NextWake() const { return state_->NextWake(); }
+
+DatasetSizes DatasetMachine::sizes() const {
+  State& state = *state_;
+  std::size_t awaited = 0;
+  state.datasets.ForEach([&](const std::string&, const DatasetTable::Entry& entry) { awaited += entry.awaited != 0 ? 1 : 0; });
+  return {.uses = state.uses.size(),
+          .orders = state.orders.size(),
+          .awaited = awaited,
+          .retired = state.datasets.retired(),
+          .questions = state.questions.size(),
+          .uploads = state.uploads.size()};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,168 @@
+// DatasetMachine::State: what the machine knows, and its handlers. Not for executors: only the sources dataset_machine*.cpp include it.
+// Handlers append to `actions` and `news`.
+//   dataset_machine.cpp            requests, voxels, looks at their files, and the Step itself
+//   dataset_machine_catalogue.cpp  the catalogue: watched folders and orders
+//   dataset_machine_questions.cpp  questions about what datasets hold
+//   dataset_machine_uploads.cpp    datasets that clients send
+#pragma once
+
+#include <fmt/format.h>
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "coordinator/dataset_machine.h"
+
+namespace slabstream {
+
+// What datasets may take of a coordinator's memory; the rest is for a volume that is being read, and for pictures. `memory_bytes` 0: no
+// limit.
+inline std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? UINT64_MAX : memory_bytes / 4 * 3; }
+
+inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
+
+struct DatasetMachine::State {
+  explicit State(DatasetConfig c) : config(std::move(c)), datasets(config.datasets, config.folders) {}
+
+  // A dataset that a request needs.
+  struct Use {
+    std::string name;
+    LookId look = 0;                // at its files, which must be over before a frame begins; 0: none
+    std::optional<DatasetId> kept;  // its frame has begun with these voxels
+  };
+  // An order that waits for a look at files. kList: for that at the folders and those at datasets.
+  struct OpenOrder {
+    PeerToken client = 0;
+    DataOrder order;
+    LookId folders = 0;
+    std::map<std::string, LookId> datasets = {};
+  };
+  // A question that has no answer yet.
+  struct OpenQuestion {
+    PeerToken client = 0;
+    Question question;
+    LookId look = 0;     // as of a Use
+    bool asked = false;  // of the executor
+  };
+  // A dataset on its way from a client.
+  struct OpenUpload {
+    PeerToken client = 0;
+    AddVolume order;
+    std::uint64_t received = 0, allowed = 0;  // bytes
+  };
+
+  const DatasetConfig config;
+  DatasetTable datasets;
+  std::map<UseId, Use> uses;
+  std::map<OrderId, OpenOrder> orders;  // at most one of each client
+  OrderId last_order = 0;
+  std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
+  QuestionId last_question = 0;
+  std::map<UploadId, OpenUpload> uploads;  // at most one of each client
+  UploadId last_upload = 0;
+  LookCounter folder_looks;
+  Time next_round;                            // when the folders are looked through, if there are any
+  std::set<std::string> complaints;           // about what lies in the folders
+  std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
+  RefusedRequests refused;                    // questions and uploads, and what could not be decoded
+
+  Time now;  // of this Step
+  bool started = false, stopped = false;
+  std::vector<DatasetAction> actions;  // of this Step
+  DatasetNews news;                    // likewise
+
+  // ---- events
+  void On(const ToDatasets& event) {
+    std::visit([this](const auto& e) { On(e); }, event);
+  }
+  void On(const SeekDataset& event);
+  void On(const KeepDataset& event);
+  void On(const LeaveDataset& event) { uses.erase(event.use); }
+  void On(const ForgetClient& event);
+  void On(const FinishStatus& event);
+  void On(const EndDatasets& event);
+  void On(const ClientAsked& event);
+  void On(const BadRequest& event);
+  void On(const DatasetLoaded& event);
+  void On(const DatasetFailed& event);
+  void On(const DatasetSeen& event);
+  void On(const FoldersSeen& event);
+  void On(const DatasetsFound& event);
+  void On(const QuestionAnswered& event);
+  void On(const UploadBegun& event);
+  void On(const UploadFinished& event);
+  void On(const DatasetTick&) {}
+
+  // ---- messages of clients
+  void OnMessage(PeerToken client, const DataOrder& message, const Bytes&);
+  void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
+  void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
+  void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);
+
+  // ---- requests
+  LookId Seek(const std::string& name);
+  void TellUse(const std::pair<const UseId, Use>& use);
+  void TellUses(const std::string& name);
+  void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
+  bool IsWanted(const std::string& name) const;  // by a request whose frame has not begun, or a question that was not asked
+  bool InUse(DatasetId dataset) const;
+
+  // ---- voxels
+  void LoadData(const std::string& name);
+  void FailData(const std::string& name, const Status& status);
+  void RenewData(const std::string& name);
+  bool UnloadOne();  // false: all are in use
+  void UnloadRetired();
+  void Unload(DatasetId dataset);
+  Status TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const;
+
+  // ---- looks
+  void LookAt(const std::string& name);
+  void LookThroughFolders();
+  void LookAtEverything();
+
+  // ---- the catalogue
+  Status NameIsFree(const std::string& name) const;
+  void AddData(const std::string& name, const DataSource& source);
+  void RemoveData(const std::string& name, const std::string& why);
+  void StopWatching(const std::string& folder);
+  void MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
+  Status Remove(const std::vector<std::string>& items);
+  Status Reload(const std::vector<std::string>& items);
+  Status AddFound(const FoundData& found);
+  void AnswerOrder(PeerToken client, const DataOrder& order, const Status& status);
+  void AnswerLists();
+
+  // ---- questions
+  void Ask(PeerToken client, Question question);
+  void AskExecutor();
+  void RefuseQuestion(const OpenQuestion& open, const Status& status);
+
+  // ---- uploads
+  Status AdmitUpload(const AddVolume& order);
+  std::uint64_t UploadBytes() const;  // of those under way
+  void GrantCredit(OpenUpload& upload);
+  using Upload = std::map<UploadId, OpenUpload>::iterator;
+  Upload UploadOf(PeerToken client, std::optional<std::uint64_t> nonce = {});  // end: it has none, or another one
+  void EndUpload(Upload upload, const Status& why);                            // without a dataset
+
+  Time NextWake() const;
+
+  // ---- actions
+  template <class... Values>
+  void Tell(NoteAbout about, LogLevel level, fmt::format_string<Values...> format, Values&&... values) {
+    if (level < config.log_level) return;
+    actions.emplace_back(Note{about, level, fmt::format(format, std::forward<Values>(values)...)});
+  }
+  void Send(PeerToken client, CoordinatorToClient message) { actions.emplace_back(ToClient{client, std::move(message)}); }
+};
+
+}  // namespace slabstream
