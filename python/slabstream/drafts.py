@@ -295,6 +295,12 @@ _PLANES: dict[str, tuple[str, values.Vector, bool]] = {
 _SEVERAL_PLANES = {"anatomical": ("axial", "coronal", "sagittal"), "zyx": ("z", "y", "x")}
 
 
+def _renderer_with(*wanted: str) -> str:
+    """The first one with these abilities and parameters."""
+    renderers = COMMANDS["render"]["renderer"].renderers
+    return next(str(each["name"]) for each in renderers if set(wanted) <= {*each["abilities"], *each["parameters"]})
+
+
 def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     """The requests of `slabstream slice` with these options, one a plane, from left to right."""
     given = _given(options)
@@ -318,7 +324,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         draft.format = planes.format
         frame = draft.frame
         frame.MergeFrom(planes.frame)
-        frame.renderer = "raycast" if layers else "mip"
+        frame.renderer = _renderer_with("labels", "overlay") if layers else _renderer_with("projection-mode")
         if layers:
             frame.shading.model = schema.SHADING_MODEL_NONE
         _look_from(frame.view, side, of_patient)

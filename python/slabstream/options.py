@@ -33,6 +33,7 @@ class Option:
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
     same_picture: bool      # it never changes the finished picture
+    renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, parameters of each
 
 
 def _keyword(name: str) -> str:
@@ -55,6 +56,7 @@ def _option(entry: dict[str, Any]) -> Option:
         excludes=tuple(map(_keyword, entry.get("excludes", ()))),
         needs=tuple(map(_keyword, entry.get("needs", ()))),
         same_picture=entry.get("same_picture", False),
+        renderers=tuple(entry.get("renderers", ())),
     )
 
 
