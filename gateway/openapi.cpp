@@ -97,7 +97,7 @@ Json Named(const Json& fields, std::initializer_list<std::string_view> names) {
 }
 
 Json With(Json fields, std::initializer_list<Json> more) {
-  fields.insert(fields.begin() + 1, more.begin(), more.end());  // behind the dataset
+  for (const Json& field : more) fields.push_back(field);
   return fields;
 }
 

@@ -1,4 +1,4 @@
-#include "client/request/camera_json.h"
+#include "client/request/picture_options.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 namespace slabstream {
 namespace {
 
-TEST(CameraJson, IsReadBackAsItWas) {
+TEST(CameraFile, IsReadBackAsItWas) {
   const ViewParameters views[] = {
       {},
       {.projection = Projection::kPerspective,
@@ -20,20 +20,22 @@ TEST(CameraJson, IsReadBackAsItWas) {
       {.azimuth_degrees = 180, .fit = true, .of_patient = true},
   };
   for (const ViewParameters& view : views) {
-    const Result<ViewParameters> read = ParseCamera(ViewJson(view).dump());
+    FrameRequest request;
+    request.view = view;
+    const Result<ViewParameters> read = ParseCamera(OptionsJson(request, "view.").dump());
     ASSERT_TRUE(read.ok()) << read.status().message();
     EXPECT_EQ(*read, view);
   }
 }
 
-TEST(CameraJson, MistakesNameFieldValueAndLimit) {
+TEST(CameraFile, MistakesNameFieldValueAndLimit) {
   const std::pair<const char*, const char*> cases[] = {
       {"{\"azimuth\": 1e7}", "azimuth"},
       {"{\"zoom\": 0}", "zoom"},
       {"{\"zom\": 1}", "zom"},
-      {"{\"look_at\": [1, 2]}", "[1,2] must be three numbers"},
+      {"{\"look_at\": [1, 2]}", "look-at '1,2' is not X,Y,Z"},
       {"{\"eye\": [1, 2, \"x\"]}", "eye"},
-      {"{\"of_patient\": 3}", "3 must be true or false"},
+      {"{\"of_patient\": 3}", "of-patient '3' is neither true nor false"},
       {"{\"up\": [0, 0, 1]}", "view.up needs view.eye"},
       {"[1]", "must be an object"},
       {"{", "not JSON"},

@@ -65,9 +65,10 @@ TEST(PictureFieldsTest, EveryFieldIsAnOptionOfTheCommandLine) {
   AddSliceOptions(slice, slice_options);
   for (const auto& [fields, app] : {std::pair(RenderFields(), &render), std::pair(SliceFields(), &slice)}) {
     EXPECT_GT(fields.size(), 10U);
-    for (const FieldDescription& field : fields) {
-      if (field.name == "dataset") continue;
-      EXPECT_NE(app->get_option_no_throw("--" + field.name), nullptr) << field.name;
+    for (const Json& field : fields) {
+      const std::string name = field["name"];
+      if (name == "dataset") continue;
+      EXPECT_NE(app->get_option_no_throw("--" + name), nullptr) << name;
     }
   }
 }
