@@ -119,9 +119,9 @@ void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer) {
 
 void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files) {
   const ColorMaps maps = files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts;
-  if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddRequestOptions(app, request, maps, [](const RequestOption& option) { return option.name != "dataset" && option.name != "previews"; });
   AddWholeViews(app, request.view, files != nullptr);
+  if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddPictureFormat(app, format);
   AddAnnotationOptions(app, format.annotations);
 }
@@ -160,7 +160,6 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
       ->type_name("VALUE")
       ->default_str("half of --window")
       ->needs(window);
-  if (files != nullptr) AddLayerFiles(app, *files, &slice.frame);
   const auto& parameters = RequireRenderer(slice.frame.renderer).value()->parameters();
   const auto wanted = [&](const RequestOption& option) {
     if (option.path.starts_with("labels.")) return option.name != "label-opacity";
@@ -168,6 +167,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
            option.path.starts_with("overlay.") || std::ranges::find(parameters, option.name, &RendererParameter::name) != parameters.end();
   };
   AddRequestOptions(app, slice.frame, files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts, wanted);
+  if (files != nullptr) AddLayerFiles(app, *files, &slice.frame);
   app.get_option("--transfer")->excludes(window)->default_str("window");
   app.get_option("--size")->description("Pixels of each plane: WIDTHxHEIGHT, or one number for a square")->group("Plane");
   AddPictureFormat(app, slice.format);
