@@ -107,9 +107,10 @@ HostileWords::Words<WorkerToCoordinator> HostileWords::OfWorker(const Speaker& s
 WorkerToCoordinator HostileWords::MakeOfWorker(const Speaker& self, std::uint32_t nodes) {
   const Epoch epoch = EpochLike(self.epoch);
   const auto worker = WorkerId(Number32());
-  switch (random_.Integer(0, 5)) {
+  switch (random_.Integer(0, 6)) {
     case 0: return Heartbeat{epoch, random_.Chance(0.5) ? self.incarnation : Number(), worker, Number(), Number(), Number32()};
-    case 1: return GroupDone{.epoch = epoch, .worker = worker, .key = Key(), .reports = {}, .hidden = {}};
+    case 1:
+    case 5: return GroupDone{.epoch = epoch, .worker = worker, .key = Key(), .reports = {}, .hidden = {}};
     case 2: {
       FrameImage image{.epoch = epoch, .worker = worker == self.worker ? kNobody : worker, .frame = Number(), .attempt = Number32()};
       image.groups_done = Number32();

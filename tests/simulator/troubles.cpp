@@ -10,6 +10,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr int kHostileWords = 40;                       // of each hostile peer
+constexpr double kNoMessages = 0.35;                    // so many of its words are dropped when they are decoded
 constexpr double kLongestPause = 6, kLongestJump = 30;  // seconds
 
 }  // namespace
@@ -237,8 +238,9 @@ void Simulation::Speak(HostilePeer& peer) {
     tally_.Add(Count::kHostileImages);
     return service_.StepWorker(to, MessageReceived{Widen<MessageToWorker>(std::move(words.message)), std::move(words.payload)});
   }
-  HostileWords::Words<WorkerToCoordinator> words = words_.OfWorker(peer.self, nodes);
   tally_.Add(Count::kHostileWorkerMessages);
+  if (random_.Chance(kNoMessages)) return;
+  HostileWords::Words<WorkerToCoordinator> words = words_.OfWorker(peer.self, nodes);
   const auto* done = std::get_if<GroupDone>(&words.message);
   if (done != nullptr && done->epoch == epoch_ && done->worker == peer.self.worker) witness_.OnGroupDone(*done);
   service_.StepCoordinator(FromWorker{service_.TokenOf(peer.self.node), std::move(words.message), std::move(words.payload)});
@@ -246,6 +248,7 @@ void Simulation::Speak(HostilePeer& peer) {
 
 void Simulation::SpeakAsClient(std::size_t hostile) {
   tally_.Add(Count::kHostileClientMessages);
+  if (random_.Chance(kNoMessages)) return;
   ClientToCoordinator words = words_.OfClient(world_.policy);
   const auto* const submit = std::get_if<SubmitFrame>(&words);
   if (submit != nullptr && submit->frame.policy.teams <= kMaxTeams) most_teams_ = std::max(most_teams_, submit->frame.policy.teams);
