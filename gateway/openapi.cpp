@@ -97,7 +97,7 @@ Json Named(const Json& fields, std::initializer_list<std::string_view> names) {
 }
 
 Json With(Json fields, std::initializer_list<Json> more) {
-  fields.insert(fields.begin() + 1, more.begin(), more.end());  // behind the dataset
+  for (auto one = std::rbegin(more); one != std::rend(more); ++one) fields.insert(fields.begin() + 1, *one);  // behind the dataset
   return fields;
 }
 

@@ -112,7 +112,13 @@ Result<SliceRequest> ParseSliceFields(const PictureFields& fields) {
   return std::move(options.request);
 }
 
-Json RenderFields() { return DescribeOptions(RenderOptionsApp().app); }
-Json SliceFields() { return DescribeOptions(SliceOptionsApp().app); }
+Json RenderFields() {
+  RenderOptionsApp options;
+  return DescribeOptions(options.app);
+}
+Json SliceFields() {
+  SliceOptionsApp options;
+  return DescribeOptions(options.app);
+}
 
 }  // namespace slabstream
