@@ -23,13 +23,13 @@ Status CheckPlace(const DicomSlice& slice) {
     return Refused(fmt::format("{} has no {}: its slices have no place (a secondary capture?)", slice.name,
                                frame.position ? "ImageOrientationPatient" : "ImagePositionPatient"));
   }
-  if (!IsFinite(*frame.position)) return Refused(fmt::format("{}: ImagePositionPatient is {}", slice.name, TextOf(*frame.position)));
+  if (!IsFinite(*frame.position)) return Refused(fmt::format("{}: ImagePositionPatient is {}", slice.name, InBrackets(*frame.position)));
   const auto& [row, column] = *frame.directions;
   // Written so that NaN is refused.
   const bool sound = std::abs(Length(row) - 1) < 0.01 && std::abs(Length(column) - 1) < 0.01 && std::abs(Dot(row, column)) < 0.01;
   if (!sound) {
-    return Refused(fmt::format("{}: ImageOrientationPatient is {}, {}, must be two unit vectors at right angles", slice.name, TextOf(row),
-                               TextOf(column)));
+    return Refused(fmt::format("{}: ImageOrientationPatient is {}, {}, must be two unit vectors at right angles", slice.name,
+                               InBrackets(row), InBrackets(column)));
   }
   if (!frame.spacing) return Refused(slice.name + " has no PixelSpacing");
   const auto& [dx, dy] = *frame.spacing;
@@ -47,7 +47,7 @@ Status CheckAlike(const DicomSlice& slice, const DicomSlice& first) {
     const Vec3 &direction = (*slice.frame->directions)[i], &wanted = (*first.frame->directions)[i];
     if (LargestPart(direction - wanted) > kMostTurned) {
       return Refused(fmt::format("images of several orientations: {} of {} are along {}, those of {} along {}; dcm2niix separates them",
-                                 i == 0 ? "rows" : "columns", slice.name, TextOf(direction), first.name, TextOf(wanted)));
+                                 i == 0 ? "rows" : "columns", slice.name, InBrackets(direction), first.name, InBrackets(wanted)));
     }
     const double spacing = (*slice.frame->spacing)[i], wanted_spacing = (*first.frame->spacing)[i];
     if (std::abs(spacing - wanted_spacing) > kMostTurned * wanted_spacing) {
@@ -109,7 +109,8 @@ class SortedSlices {
     std::vector<const DicomFrame*> frames;
     for (std::size_t i = begin; i < end; ++i) frames.push_back((*this)[i].frame);
     return Refused(fmt::format("{} images at {} positions, {} of them at {}, such as {} and {}{}; dcm2niix separates them", size(), places,
-                               end - begin, TextOf(position(begin)), (*this)[begin].name, (*this)[begin + 1].name, Distinguished(frames)));
+                               end - begin, InBrackets(position(begin)), (*this)[begin].name, (*this)[begin + 1].name,
+                               Distinguished(frames)));
   }
 
   // Slices that do not lie where an even stack with these steps has them.

@@ -34,15 +34,15 @@ Status CheckSteps(const RawHeader& header, const std::string& path) {
   for (std::size_t i = 0; i < 3; ++i) {
     const Vec3& step = header.steps[i];
     if (!IsFinite(step) || !(Length(step) > 0) || !std::isfinite(Length(step))) {
-      return wrong(fmt::format("the step along {} is {}, must be finite and not zero", Letter(kAxes[i]), TextOf(step)));
+      return wrong(fmt::format("the step along {} is {}, must be finite and not zero", Letter(kAxes[i]), InBrackets(step)));
     }
     unit[i] = Normalized(step);
   }
   if (std::abs(SpannedVolume(unit)) < kLeastVolume) {
-    return wrong(fmt::format("the steps {}, {} and {} lie in a plane, so the matrix has no inverse", TextOf(header.steps[0]),
-                             TextOf(header.steps[1]), TextOf(header.steps[2])));
+    return wrong(fmt::format("the steps {}, {} and {} lie in a plane, so the matrix has no inverse", InBrackets(header.steps[0]),
+                             InBrackets(header.steps[1]), InBrackets(header.steps[2])));
   }
-  if (!IsFinite(header.origin)) return wrong(fmt::format("the origin is {}, must be finite", TextOf(header.origin)));
+  if (!IsFinite(header.origin)) return wrong(fmt::format("the origin is {}, must be finite", InBrackets(header.origin)));
   return Status::Ok();
 }
 
@@ -147,7 +147,7 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
 
 bool IsFinite(const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
-std::string TextOf(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
+std::string InBrackets(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z); }
 
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path) {
   WorldPlacement placed;

@@ -41,7 +41,7 @@ inline constexpr double kStraight = 1e-4;
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path);
 
 bool IsFinite(const Vec3& v);
-std::string TextOf(const Vec3& v);  // "(0, 1.5, nan)", for messages
+std::string InBrackets(const Vec3& v);  // "(0, 1.5, nan)", for messages
 
 // `block`: the whole volume as stored.
 VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn);
