@@ -52,6 +52,7 @@ class SchemaCheck {
     if constexpr (std::is_same_v<T, std::string>) {
       Name(value);
     } else if constexpr (std::is_arithmetic_v<T>) {
+      if (!AboutOf(field).ability().empty() && fmt::format("{}", value) != AboutOf(field).standard()) Given(field);
       if (limits.least != 0 || limits.most != 0) Number(double(value), limits);
     } else if constexpr (requires { value.number(); }) {
       const auto* const chosen = field.enum_type()->FindValueByNumber(value.number());
