@@ -17,8 +17,8 @@
 #include <deque>
 #include <list>
 #include <set>
-#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "common/base/limited_log.h"
 #include "common/base/printable.h"
@@ -107,12 +107,56 @@ http::response<http::string_body> ResponseOf(HttpReply reply, unsigned version, 
   return response;
 }
 
+// A connection with or without TLS, and with handlers of one type: so Beast's templates, which take long to compile, are made once.
+class Stream {
+ public:
+  using executor_type = PlainStream::executor_type;
+
+  explicit Stream(PlainStream stream) : stream_(std::move(stream)) {}
+  Stream(PlainStream stream, asio::ssl::context& tls) : stream_(std::in_place_type<TlsStream>, std::move(stream), tls) {}
+
+  TlsStream* tls() { return std::get_if<TlsStream>(&stream_); }  // null: there is none
+  // As Beast names them.
+  PlainStream& next_layer() { return tls() != nullptr ? tls()->next_layer() : std::get<PlainStream>(stream_); }
+  executor_type get_executor() { return next_layer().get_executor(); }
+  template <class Buffers, class Handler>
+  void async_read_some(const Buffers& buffers, Handler&& handler) {
+    Read({asio::buffer_sequence_begin(buffers), asio::buffer_sequence_end(buffers)}, Erased(std::forward<Handler>(handler)));
+  }
+  template <class Buffers, class Handler>
+  void async_write_some(const Buffers& buffers, Handler&& handler) {
+    Write({asio::buffer_sequence_begin(buffers), asio::buffer_sequence_end(buffers)}, Erased(std::forward<Handler>(handler)));
+  }
+  template <class Handler>
+  friend void async_teardown(beast::role_type role, Stream& stream, Handler&& handler) {
+    stream.TearDown(role, Erased(std::forward<Handler>(handler)));
+  }
+
+ private:
+  using Moved = std::function<void(Error, std::size_t)>;
+
+  // Beast's handlers cannot be copied.
+  template <class Handler>
+  static auto Erased(Handler&& handler) {
+    return [shared = std::make_shared<std::decay_t<Handler>>(std::forward<Handler>(handler))](auto... what) { (*shared)(what...); };
+  }
+  void Read(const std::vector<asio::mutable_buffer>& buffers, Moved moved) {
+    std::visit([&](auto& stream) { stream.async_read_some(buffers, std::move(moved)); }, stream_);
+  }
+  void Write(const std::vector<asio::const_buffer>& buffers, Moved moved) {
+    std::visit([&](auto& stream) { stream.async_write_some(buffers, std::move(moved)); }, stream_);
+  }
+  void TearDown(beast::role_type role, std::function<void(Error)> done) {
+    using websocket::async_teardown;
+    std::visit([&](auto& stream) { async_teardown(role, stream, std::move(done)); }, stream_);
+  }
+
+  std::variant<PlainStream, TlsStream> stream_;
+};
+
 // ---- WebSockets
 
-template <class Stream>
-class WebSocketConnection final : public Registered,
-                                  public WebSocketPeer,
-                                  public std::enable_shared_from_this<WebSocketConnection<Stream>> {
+class WebSocketConnection final : public Registered, public WebSocketPeer, public std::enable_shared_from_this<WebSocketConnection> {
  public:
   WebSocketConnection(Stream stream, std::shared_ptr<Shared> shared, WebSocketAccepted accepted)
       : Registered(std::move(shared)), socket_(std::move(stream)), accepted_(std::move(accepted)), timer_(socket_.get_executor()) {}
@@ -129,7 +173,7 @@ class WebSocketConnection final : public Registered,
     socket_.read_message_max(limits.message_bytes);
     socket_.auto_fragment(false);
     socket_.write_buffer_bytes(std::size_t{1} << 16);
-    socket_.async_accept(request, [self = this->shared_from_this()](Error error) {
+    socket_.async_accept(request, [self = shared_from_this()](Error error) {
       if (error) return self->End(error.message());
       self->open_ = true;
       self->accepted_.session->OnOpen(*self);
@@ -149,7 +193,7 @@ class WebSocketConnection final : public Registered,
     websocket::close_reason closing(static_cast<websocket::close_code>(code), reason.substr(0, kMaxReasonBytes));
     // The other end may be one that does not read: it has only so long.
     timer_.expires_after(std::chrono::seconds(2));
-    timer_.async_wait([self = this->shared_from_this()](Error error) {
+    timer_.async_wait([self = shared_from_this()](Error error) {
       if (!error) self->CloseNow();
     });
     if (writing_) {
@@ -169,7 +213,7 @@ class WebSocketConnection final : public Registered,
   };
 
   void SendClose(const websocket::close_reason& closing) {
-    socket_.async_close(closing, [self = this->shared_from_this()](Error) { self->timer_.cancel(); });
+    socket_.async_close(closing, [self = shared_from_this()](Error) { self->timer_.cancel(); });
   }
 
   void Queue(Message message) {
@@ -185,13 +229,13 @@ class WebSocketConnection final : public Registered,
     const Message& message = queue_.front();
     socket_.text(message.text);
     timer_.expires_after(shared_->limits.writing);
-    timer_.async_wait([self = this->shared_from_this()](Error error) {
+    timer_.async_wait([self = shared_from_this()](Error error) {
       if (!error && self->writing_ && !self->closing_) self->Drop("a message did not leave in time");
     });
     const std::array<asio::const_buffer, 2> buffers = {
         asio::buffer(message.head),
         message.tail == nullptr ? asio::const_buffer() : asio::const_buffer(message.tail->data(), message.tail->size())};
-    socket_.async_write(buffers, [self = this->shared_from_this()](Error error, std::size_t) { self->OnWritten(error); });
+    socket_.async_write(buffers, [self = shared_from_this()](Error error, std::size_t) { self->OnWritten(error); });
   }
 
   void OnWritten(const Error& error) {
@@ -212,7 +256,7 @@ class WebSocketConnection final : public Registered,
   }
 
   void Read() {
-    socket_.async_read(buffer_, [self = this->shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
+    socket_.async_read(buffer_, [self = shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
   }
 
   void OnRead(const Error& error) {
@@ -247,16 +291,15 @@ class WebSocketConnection final : public Registered,
 
 // ---- HTTP
 
-template <class Stream>
-class HttpConnection final : public Registered, public std::enable_shared_from_this<HttpConnection<Stream>> {
+class HttpConnection final : public Registered, public std::enable_shared_from_this<HttpConnection> {
  public:
   HttpConnection(Stream stream, std::shared_ptr<Shared> shared)
       : Registered(std::move(shared)), stream_(std::move(stream)), watch_(stream_.get_executor()) {}
 
   void Run() {
-    if constexpr (std::is_same_v<Stream, TlsStream>) {
+    if (TlsStream* tls = stream_.tls()) {
       Lowest().expires_after(shared_->limits.reading);
-      stream_.async_handshake(asio::ssl::stream_base::server, [self = this->shared_from_this()](Error error) {
+      tls->async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](Error error) {
         if (!error) self->Read();
       });
     } else {
@@ -270,14 +313,14 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   }
 
  private:
-  PlainStream& Lowest() { return beast::get_lowest_layer(stream_); }
+  PlainStream& Lowest() { return stream_.next_layer(); }
 
   void Read() {
     parser_.emplace();
     parser_->header_limit(std::uint32_t(shared_->limits.header_bytes));
     parser_->body_limit(shared_->limits.body_bytes);
     Lowest().expires_after(shared_->limits.reading);
-    http::async_read(stream_, buffer_, *parser_, [self = this->shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
+    http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
   }
 
   void OnRead(const Error& error) {
@@ -293,7 +336,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     HttpRequest request = RequestOf(message_);
     if (websocket::is_upgrade(message_)) return Upgrade(request);
     gone_ = request.gone;
-    shared_->application.Handle(std::move(request), [self = this->shared_from_this()](HttpReply reply) {
+    shared_->application.Handle(std::move(request), [self = shared_from_this()](HttpReply reply) {
       self->gone_.reset();
       self->watch_.cancel();
       self->Write(std::move(reply), self->message_.keep_alive());
@@ -305,7 +348,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   // tell sooner, but it would also take what belongs to the next request, or to TLS.
   void Watch() {
     watch_.expires_after(kWatchInterval);
-    watch_.async_wait([self = this->shared_from_this()](Error error) {
+    watch_.async_wait([self = shared_from_this()](Error error) {
       if (error || self->gone_ == nullptr) return;
       if (self->IsThere()) return self->Watch();
       const auto gone = std::exchange(self->gone_, nullptr);
@@ -323,8 +366,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   void Upgrade(const HttpRequest& request) {
     auto answer = shared_->application.Accept(request);
     if (auto* reply = std::get_if<HttpReply>(&answer)) return Write(std::move(*reply), false);
-    std::make_shared<WebSocketConnection<Stream>>(std::move(stream_), shared_, std::move(std::get<WebSocketAccepted>(answer)))
-        ->Run(message_);
+    std::make_shared<WebSocketConnection>(std::move(stream_), shared_, std::move(std::get<WebSocketAccepted>(answer)))->Run(message_);
   }
 
   void Refuse(unsigned status, std::string_view what, std::string_view why) {
@@ -342,7 +384,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     }
     response_.emplace(ResponseOf(std::move(reply), message_.version() == 0 ? 11 : message_.version(), keep_alive, *shared_));
     Lowest().expires_after(shared_->limits.writing);
-    const auto written = [self = this->shared_from_this()](Error error, std::size_t) {
+    const auto written = [self = shared_from_this()](Error error, std::size_t) {
       if (error) return self->DropAfter(error);
       if (self->rest_ == nullptr) return self->Next();
       self->part_.empty() ? self->ReadPart() : self->WritePart();
@@ -370,7 +412,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   void WritePart() {
     Lowest().expires_after(shared_->limits.writing);
     const bool last = part_.empty();
-    const auto written = [self = this->shared_from_this(), last](Error error, std::size_t) {
+    const auto written = [self = shared_from_this(), last](Error error, std::size_t) {
       if (error || self->rest_ == nullptr) return self->DropAfter(error);
       if (!last) return self->ReadPart();
       self->rest_.reset();
@@ -385,7 +427,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
     Lowest().expires_never();
     gone_ = std::make_shared<std::function<void()>>([] {});  // CloseNow tells the stream
     Watch();
-    rest_->Read([self = this->shared_from_this()](Result<std::string> part) {
+    rest_->Read([self = shared_from_this()](Result<std::string> part) {
       self->gone_.reset();
       self->watch_.cancel();
       if (!part.ok()) return self->CloseNow();
@@ -395,9 +437,9 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   }
 
   void Shutdown() {
-    if constexpr (std::is_same_v<Stream, TlsStream>) {
+    if (TlsStream* tls = stream_.tls()) {
       Lowest().expires_after(std::chrono::seconds(2));
-      stream_.async_shutdown([self = this->shared_from_this()](Error) { self->CloseNow(); });
+      tls->async_shutdown([self = shared_from_this()](Error) { self->CloseNow(); });
     } else {
       Error ignored;
       Lowest().socket().shutdown(tcp::socket::shutdown_send, ignored);
@@ -410,7 +452,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   void Drain() {
     if (drained_ > shared_->limits.body_bytes) return;
     Lowest().expires_after(std::chrono::seconds(2));
-    stream_.async_read_some(asio::buffer(waste_), [self = this->shared_from_this()](Error error, std::size_t size) {
+    stream_.async_read_some(asio::buffer(waste_), [self = shared_from_this()](Error error, std::size_t size) {
       self->drained_ += size;
       if (!error) self->Drain();
     });
@@ -494,11 +536,8 @@ class Server final : public HttpServer {
     }
     Error ignored;
     socket.set_option(tcp::no_delay(true), ignored);
-    if (tls_) {
-      std::make_shared<HttpConnection<TlsStream>>(TlsStream(PlainStream(std::move(socket)), *tls_), shared_)->Run();
-    } else {
-      std::make_shared<HttpConnection<PlainStream>>(PlainStream(std::move(socket)), shared_)->Run();
-    }
+    PlainStream plain(std::move(socket));
+    std::make_shared<HttpConnection>(tls_ ? Stream(std::move(plain), *tls_) : Stream(std::move(plain)), shared_)->Run();
   }
 
   std::optional<asio::ssl::context> tls_;
