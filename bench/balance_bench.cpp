@@ -165,7 +165,7 @@ int main(int argc, char** argv) {
   CLI::App app("How even partitions are, and how much more work they are than the whole volume", "balance_bench");
   AddSubjectOptions(app, options.subject);
   AddList(app, "--decomposition", options.decompositions, CLI::IsMember(options.decompositions), "Partitions to compare");
-  AddList(app, "--split", options.splits, CLI::IsMember({"voxels", "occupied"}), "What boxes have equal shares of");
+  AddList(app, "--balance-by", options.splits, CLI::IsMember({"voxels", "occupied"}), "What boxes have equal shares of");
   app.add_option("--assignment", options.policy.assignment, "Which worker owns which box")
       ->check(CLI::IsMember(NamesOf(Assignments())).description(""))
       ->type_name("NAME");

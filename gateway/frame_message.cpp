@@ -76,7 +76,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                  {"assignment", statistics.assignment},
                  {"balance", statistics.balance},
                  {"combine", statistics.combine},
-                 {"split", statistics.balance_by}}}};
+                 {"balance_by", statistics.balance_by}}}};
   if (timeline) json["timeline"] = TimelineJson(statistics);
   return json;
 }

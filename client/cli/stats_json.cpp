@@ -65,7 +65,7 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
   }
   const FrameStatistics last = frames.empty() ? FrameStatistics() : frames.back().statistics;
   json["plan"] = {{"workers", last.workers},  {"groups", last.groups},  {"decomposition", last.decomposition},
-                  {"split", last.balance_by}, {"axis", last.axis},      {"assignment", last.assignment},
+                  {"balance_by", last.balance_by}, {"axis", last.axis},      {"assignment", last.assignment},
                   {"balance", last.balance},  {"combine", last.combine}};
   json["bytes"] = {{"voxels", voxel_bytes}, {"images", image_bytes}};
   json["frames"] = std::move(list);

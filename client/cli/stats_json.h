@@ -1,7 +1,7 @@
 // --stats: the plans and costs of the frames.
 //
 //   { "source", "renderer", "size": [w, h],
-//     "plan": {"workers", "groups", "decomposition", "split", "axis",       of the last frame: a lost worker changes it
+//     "plan": {"workers", "groups", "decomposition", "balance_by", "axis",       of the last frame: a lost worker changes it
 //              "assignment", "balance", "combine"},
 //     "bytes": {"voxels", "images"},                                        of all frames
 //     "frames": [{"output", "latency_ms", "queued_ms", "attempts", "workers", "bytes": {...}, "stages_ms": {stage: worker time},

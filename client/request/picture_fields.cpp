@@ -63,6 +63,9 @@ Status Parse(const PictureFields& fields, OptionsApp& options) {
   if (fields.size() > kMaxPictureFields) {
     return Status::InvalidArgument(fmt::format("there are {} options, at most {} are taken", fields.size(), kMaxPictureFields));
   }
+  if (std::ranges::find(fields, "dataset", &PictureField::name) == fields.end()) {
+    return Status::InvalidArgument("dataset is missing: the name of a dataset of the service");
+  }
   std::vector<std::string> arguments;
   for (const PictureField& field : fields) {
     if (Status status = AddArgument(options.app, field, arguments); !status.ok()) return status;

@@ -11,7 +11,7 @@ namespace slabstream::calibration {
 // and of occupied voxels, over a class-I sphere, vessels, heptane, bonsai and an MR brain in views along x and along y. Root mean square of
 // the relative error over 16 boxes, in brackets when fitted to the other four volumes: sphere 0.05 (0.05), vessels 0.05 (0.06), heptane
 // 0.05 (0.05), bonsai 0.11 (0.12: its pot is denser than its median voxel), MR brain 0.07 (0.07).
-//   balance_bench VOLUME --decomposition kd-tree --split occupied
+//   balance_bench VOLUME --decomposition kd-tree --balance-by occupied
 namespace splat {
 inline constexpr double kBox = 39e-6;
 inline constexpr double kSlice = 1e-6;       // of a box
@@ -24,7 +24,7 @@ inline constexpr float kOpaqueDepth = 1.5F;  // mean optical depth of a segment'
 
 // Z-buffer, at about a pixel a voxel (common/renderers/zbuffer). Fitted to boxes of vessels (root mean square of the relative error 0.19)
 // and heptane (0.27).
-//   balance_bench VOLUME --renderer zbuffer --decomposition kd-tree --split occupied
+//   balance_bench VOLUME --renderer zbuffer --decomposition kd-tree --balance-by occupied
 namespace zbuffer {
 inline constexpr double kBox = 1.5e-6;
 inline constexpr double kSurfaceCell = 230e-9;  // a cell through which a surface passes
@@ -32,7 +32,7 @@ inline constexpr double kPixel = 1.5e-9;        // of the image
 }  // namespace zbuffer
 
 // Ray casting (common/renderers/raycast). Measured with the two spheres of 256 voxels a side that `slabstream bench` renders.
-//   balance_bench VOLUME --renderer raycast --decomposition kd-tree --split occupied
+//   balance_bench VOLUME --renderer raycast --decomposition kd-tree --balance-by occupied
 namespace raycast {
 inline constexpr double kBox = 30e-6;
 inline constexpr double kPixel = 60e-9;   // that the box covers
@@ -40,7 +40,7 @@ inline constexpr double kSample = 11e-9;  // that is shaded
 }  // namespace raycast
 
 // Multi-pass shears (common/renderers/shear).
-//   balance_bench VOLUME --renderer shear --decomposition kd-tree --split occupied
+//   balance_bench VOLUME --renderer shear --decomposition kd-tree --balance-by occupied
 namespace shear {
 inline constexpr double kBox = 50e-6;
 inline constexpr double kResample = 4e-9;  // a voxel of a cell that is drawn, at a pixel a voxel
@@ -48,7 +48,7 @@ inline constexpr double kSample = 6e-9;    // that is shaded
 }  // namespace shear
 
 // Projections of values (common/renderers/projection_kind.h).
-//   balance_bench VOLUME --renderer mip --decomposition kd-tree --split voxels
+//   balance_bench VOLUME --renderer mip --decomposition kd-tree --balance-by voxels
 namespace projection {
 inline constexpr double kBox = 30e-6;
 inline constexpr double kSample = 4e-9;

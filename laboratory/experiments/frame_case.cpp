@@ -106,7 +106,7 @@ Json ColumnsOf(const FrameCase& frame) {
                       {"renderer", frame.volume.renderer->name()},
                       {"decomposition", decomposition},
                       {"axis", NameOf(axis)},
-                      {"split", BalanceByOf(frame.policy)},
+                      {"balance_by", BalanceByOf(frame.policy)},
                       {"assignment", assignment},
                       {"balance", balance},
                       {"combine", combine},

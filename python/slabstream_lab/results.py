@@ -11,7 +11,7 @@ from .value import Value
 
 VERSION = 1
 TEXTS = (
-    "experiment part volume view renderer decomposition axis split assignment balance combine link variant stage metric unit noise origin "
+    "experiment part volume view renderer decomposition axis balance_by assignment balance combine link variant stage metric unit noise origin "
     "commit machine"
 ).split()
 NUMBERS = "version n occupancy workers pixels groups teams share active k step box value low high repeats".split()

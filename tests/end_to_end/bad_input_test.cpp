@@ -176,7 +176,7 @@ TEST_F(BadInputTest, OptionsOfRender) {
       {{"--title"}, "--title"},
       {{"--scale-bar=wide"}, "--scale-bar"},
       {{"--decomposition", "cheese"}, "--decomposition 'cheese' is not one of auto, slab"},
-      {{"--split", "hairs"}, "--split 'hairs'"},
+      {{"--balance-by", "hairs"}, "--balance-by 'hairs'"},
       {{"--assignment", "lots"}, "--assignment 'lots'"},
       {{"--balance", "act"}, "--balance 'act'"},
       {{"--combine", "glue"}, "--combine 'glue'"},

@@ -129,8 +129,7 @@ TEST_F(RenderTest, AnOptionHasTheSameMeaningInEachOfItsSpellings) {
       {"--local", "2", ball_, "--transfer", "opaque"},
       {"--local", ball_, "--transfer", "opaque"},
       {ball_ + ":opaque", "--local"},
-      {ball_, "--transfer", "opaque", "--local=2", "--balance-by", "voxels", "--frame-parallel", "1"},
-      {ball_, "--transfer", "opaque", "--local=2", "--split", "voxels", "--teams", "1"},
+      {ball_, "--transfer", "opaque", "--local=2", "--balance-by", "voxels", "--teams", "1"},
   };
   for (std::vector<std::string> arguments : spellings) {
     arguments.insert(arguments.begin(), "render");
@@ -229,7 +228,7 @@ TEST_F(RenderTest, StatisticsShowThatVoxelsTravelOnce) {
   EXPECT_EQ(stats["plan"]["workers"], 2);
   EXPECT_EQ(stats["plan"]["groups"], 2);
   EXPECT_EQ(stats["plan"]["decomposition"], "slab");
-  EXPECT_EQ(stats["plan"]["split"], "voxels");
+  EXPECT_EQ(stats["plan"]["balance_by"], "voxels");
   EXPECT_EQ(stats["plan"]["assignment"], "cyclic");
   EXPECT_EQ(stats["plan"]["balance"], "static");
   EXPECT_EQ(stats["plan"]["combine"], "fan-in");
@@ -249,7 +248,7 @@ TEST_F(RenderTest, StatisticsShowThatVoxelsTravelOnce) {
   MustRun({"turntable", ball_, "--local=2", "--decomposition", "auto", "--assignment", "auto", "--combine", "auto", "-o", "a_%d.png",
            "--frames", "3", "--size", "64", "--stats", "auto.json"});
   const json chosen = json::parse(ReadFile("auto.json"));
-  for (const char* name : {"decomposition", "split", "assignment", "combine"}) EXPECT_NE(chosen["plan"][name], "auto") << name;
+  for (const char* name : {"decomposition", "balance_by", "assignment", "combine"}) EXPECT_NE(chosen["plan"][name], "auto") << name;
   for (const json& frame : chosen["frames"]) {
     for (const char* figure : {"render_ms", "combine_ms", "finish_ms", "latency_ms", "imbalance"}) {
       EXPECT_GE(frame["predicted"][figure], 0.0) << figure;

@@ -126,7 +126,6 @@ TEST_F(VolumeToolsTest, HelpExplainsEveryOptionInWords) {
   const std::string text = MustRun({"turntable", "--help"}).out;
   for (const char* heading : {"View:", "Look:", "Distribution", "Output:", "(required)", "(default: 512)"})
     EXPECT_THAT(text, HasSubstr(heading));
-  for (const char* old : {"--split", "--teams"}) EXPECT_THAT(text, testing::Not(HasSubstr(old)));
 }
 
 TEST_F(VolumeToolsTest, EveryProgramTellsItsVersion) {

@@ -51,15 +51,15 @@ std::vector<FuzzBytes> SweepSeeds() {
   return {SeedOf(R"({
   "title": "two", "size": [300, 200],
   "volumes": [{"sphere": {"class": 2, "size": 40, "occupancy": 0.3}, "opacity": 0.2}, {"sphere": {}, "transfer": "opaque", "opacity_distance": 2}],
-  "renderers": ["splat", {"name": "fine", "renderer": "raycast", "sampling-rate": 2, "shading": "none", "lights": [[1, 0, 0.5]], "termination": 0}],
+  "renderers": ["splat", {"name": "fine", "renderer": "raycast", "sampling-rate": 2, "shading": "none", "light": [[1, 0, 0.5]], "termination": 0}],
   "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2, "fov": 40, "roll": 3, "elevation": -4}],
-  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2,
+  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "balance_by": "occupied", "assignment": "greedy", "groups": 2,
     "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001, "axis": "x", "teams": 2}],
   "workers": [1, 16],
   "links": ["10gbit", "1gbit:30,1"]
 })"),
           SeedOf(R"({"volumes": [{"sphere": {}}], "workers": [2], "size": 64,
-    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})")};
+    "policies": [{"decomposition": "auto", "balance_by": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})")};
 }
 
 }  // namespace slabstream

@@ -86,7 +86,7 @@ def sweep(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None
     """`times`: latency of each policy with one worker."""
     rows = []
     for (variant, seconds), p, link in itertools.product((times or {"a & b": 1.0, "c": 2.0}).items(), (1, 4), ("10gbit", "1gbit")):
-        policy = {"decomposition": "slab", "split": "voxels", "assignment": "cyclic", "balance": "static", "combine": "fan-in"}
+        policy = {"decomposition": "slab", "balance_by": "voxels", "assignment": "cyclic", "balance": "static", "combine": "fan-in"}
         of = {"part": "brain, splat, view 1", "volume": "brain", "renderer": "splat", "view": "view 1", "variant": variant, **policy}
         of |= {"workers": p, "groups": 1, "teams": 1, "pixels": 77}
         rows += figures(seconds / p, repeats, link=link, **of)

@@ -43,7 +43,7 @@ def page(run: Run) -> Page:
 
 
 def _partition(row: pandas.Series) -> str:
-    return f"{row['decomposition']} by {row['split']}"
+    return f"{row['decomposition']} by {row['balance_by']}"
 
 
 def _method(row: pandas.Series) -> str:

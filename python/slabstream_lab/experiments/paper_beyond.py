@@ -28,7 +28,7 @@ class _Beyond:
 
     def find(self, metric: str, renderer: str, link: str, p: int, variant: str = "without empty pixels") -> Value:
         """Of the paper's slabs, shared by all workers."""
-        slabs = {"decomposition": "slab", "split": "voxels", "combine": "fan-in", "teams": 1}
+        slabs = {"decomposition": "slab", "balance_by": "voxels", "combine": "fan-in", "teams": 1}
         return self.rows.value(metric, renderer=renderer, link=link, workers=p, variant=variant, **slabs)
 
     def best(self, renderer: str, link: str, p: int, teams: int) -> Ranking:
@@ -45,7 +45,7 @@ class _Beyond:
 def _policy_text(row) -> str:
     along = " along the view" if row["axis"] == "view" else ""
     dynamic = ", dynamic" if row["balance"] == "dynamic" else ""
-    return f"{row['decomposition']} by {row['split']}{along}{dynamic}, {row['combine']}"
+    return f"{row['decomposition']} by {row['balance_by']}{along}{dynamic}, {row['combine']}"
 
 
 def _short(found: Ranking) -> str:

@@ -74,7 +74,7 @@ def _service_section(run: Run, part: str, name: str) -> Section:
 def _policy(row) -> str:
     """The policy as it was made, with what was left open."""
     teams = f", {int(row.teams)} teams" if row.teams > 1 else ""
-    return f"{row.decomposition} by {row.split}, {row.assignment}, {row.balance}, {int(row.groups)} groups, {row.combine}{teams}"
+    return f"{row.decomposition} by {row.balance_by}, {row.assignment}, {row.balance}, {int(row.groups)} groups, {row.combine}{teams}"
 
 
 def _section(run: Run, part: str, name: str) -> Section:

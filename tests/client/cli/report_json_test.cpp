@@ -68,7 +68,7 @@ TEST(StatsJsonTest, HasThePromisedFields) {
   EXPECT_EQ(stats["plan"], (json{{"workers", 2},
                                  {"groups", 3},
                                  {"decomposition", "slab"},
-                                 {"split", "occupied"},
+                                 {"balance_by", "occupied"},
                                  {"axis", "z"},
                                  {"assignment", "greedy"},
                                  {"balance", "dynamic"},

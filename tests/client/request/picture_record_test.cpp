@@ -91,7 +91,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--background", "0,0,0,0.1", "--depth", "16"},
     {"--termination", "0"},
     {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "auto", "--balance", "dynamic"},
-    {"--groups", "3", "--frame-parallel", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
+    {"--groups", "3", "--teams", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
     {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
     {"--title=-x"},
     {"--previews"},

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -103,7 +104,7 @@ Changes<ViewParameters> ChangesOfView() {
 Changes<Policy> ChangesOfPartition() {
   return {
       {"decomposition", [](auto& p) { p.decomposition = "slab"; }},
-      {"split", [](auto& p) { p.balance_by = "occupied"; }},
+      {"balance_by", [](auto& p) { p.balance_by = "occupied"; }},
       {"axis", [](auto& p) { p.axis = AxisChoice::kX; }},
       {"groups", [](auto& p) { p.groups = 3; }},
   };
@@ -302,8 +303,10 @@ TEST_F(Keys, ReadPlainly) {
   EXPECT_EQ(key["dataset"], "class1-24-0.1");
   EXPECT_EQ(key["volume"], (Json{{"class", 1}, {"size", 24}, {"occupancy", 0.1}}));
   EXPECT_EQ(key["renderer"], "splat");
-  EXPECT_EQ(key["view"]["roll"], 10);
-  EXPECT_EQ(key["policy"], (Json{{"decomposition", "kd-tree"}, {"split", "voxels"}, {"axis", "auto"}, {"groups", 2}}));
+  EXPECT_EQ(key["view"]["roll_degrees"], 10);
+  const std::map<std::string, Json> policy = key["policy"], expected = {
+      {"decomposition", "kd-tree"}, {"balance_by", "voxels"}, {"axis", "AXIS_CHOICE_AUTO"}, {"groups", 2}};
+  EXPECT_EQ(policy, expected);
 }
 
 // A trial that several cases share measures the boxes of each of them.

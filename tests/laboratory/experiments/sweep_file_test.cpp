@@ -14,9 +14,9 @@ using testing::HasSubstr;
 constexpr const char* kGood = R"({
   "title": "two", "size": [300, 200],
   "volumes": [{"sphere": {"class": 2, "size": 40, "occupancy": 0.3}, "opacity": 0.2}],
-  "renderers": ["splat", {"name": "fine", "renderer": "raycast", "sampling-rate": 2, "shading": "none", "lights": [[1, 0, 0.5]], "termination": 0}],
+  "renderers": ["splat", {"name": "fine", "renderer": "raycast", "sampling-rate": 2, "shading": "none", "light": [[1, 0, 0.5]], "termination": 0}],
   "views": [{"azimuth": 30}, {"name": "close", "projection": "perspective", "zoom": 2}],
-  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "split": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001, "axis": "x", "teams": 2}],
+  "policies": [{"combine": "fan-in"}, {"name": "even", "decomposition": "kd-tree", "balance_by": "occupied", "assignment": "greedy", "groups": 2, "combine": "tree:4,strips=8", "balance": "dynamic", "pixel_error": 0.001, "axis": "x", "teams": 2}],
   "workers": [1, 16],
   "links": ["10gbit", "1gbit:30,1"],
   "hosts": {"cores": 1, "traffic": "encrypted"}
@@ -53,7 +53,7 @@ TEST(SweepFile, ReadsWhatItSays) {
 
 TEST(SweepFile, LeavesNamesOpen) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
-    "policies": [{"decomposition": "auto", "split": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})");
+    "policies": [{"decomposition": "auto", "balance_by": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
   EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, auto groups, auto");
   EXPECT_EQ(sweep->policies[0].policy.groups, 0);
@@ -84,27 +84,27 @@ TEST(SweepFile, TellsWhatIsWrongInOneLineThatNamesFieldValueAndLimit) {
       {"[1, 16]", "[]", "workers: [] must be a list of at least one"},
       {"[1, 16]", "3", "workers: 3 must be a list"},
       {"\"workers\"", "\"wrokers\"", "'wrokers' is no field; there are title, size"},
-      {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: \"cake\" must be one of slab, "},
+      {"\"kd-tree\"", "\"cake\"", "policies[1].decomposition: decomposition 'cake' is not one of auto, slab, "},
       {"\"tree:4,strips=8\"", "\"tree:1\"", "policies[1].combine: "},
-      {"\"greedy\"", "\"lots\"", "policies[1].assignment: \"lots\" must be one of cyclic"},
-      {"\"dynamic\"", "\"always\"", "policies[1].balance: \"always\" must be one of static, dynamic"},
-      {"0.001", "2", "policies[1].pixel_error: 2 must be a number in [0, "},
-      {"\"groups\": 2", "\"groups\": -1", "policies[1].groups: -1 must be a whole number in [0, 1024]"},
+      {"\"greedy\"", "\"lots\"", "policies[1].assignment: assignment 'lots' is not one of auto, cyclic"},
+      {"\"dynamic\"", "\"always\"", "policies[1].balance: balance 'always' is not one of static, dynamic"},
+      {"0.001", "2", "policies[1].pixel_error: pixel-error 2 is out of range [0, 0.1]"},
+      {"\"groups\": 2", "\"groups\": -1", "policies[1].groups: groups -1 is out of range [0, 1024]"},
       {"\"teams\": 2", "\"teams\": 3", "policies[1].teams: 3 must divide 16 workers"},
-      {"\"teams\": 2", "\"teams\": 0", "policies[1].teams: 0 must be a whole number in [1, 1024]"},
-      {"\"sampling-rate\": 2", "\"sampling-rate\": 99", "renderers[1].sampling-rate: 99 must be a number in ["},
-      {"\"sampling-rate\": 2", "\"slope\": 2", "renderers[1]: 'slope' is no field; there are name, renderer, shading"},
-      {"\"none\"", "\"flat\"", "renderers[1].shading: \"flat\" must be one of phong, none, depth-gradient"},
-      {"[1, 0, 0.5]", "[0, 0, 0]", "renderers[1].lights[0]: light 0,0,0 has no direction"},
-      {"[1, 0, 0.5]", "[1, 0]", "renderers[1].lights[0]: light '1,0' is not X,Y,Z"},
-      {"\"termination\": 0", "\"termination\": 1", "renderers[1].termination: 1 must be a number in [0, 0.5]"},
+      {"\"teams\": 2", "\"teams\": 0", "policies[1].teams: teams 0 is out of range [1, 1024]"},
+      {"\"sampling-rate\": 2", "\"sampling-rate\": 99", "renderers[1]: sampling-rate is '99'"},
+      {"\"sampling-rate\": 2", "\"slope\": 2", "renderers[1]: 'slope' is no field; there are "},
+      {"\"none\"", "\"flat\"", "renderers[1].shading: shading 'flat' is not one of phong, none, depth-gradient"},
+      {"[1, 0, 0.5]", "[0, 0, 0]", "renderers[1].light: light 0,0,0 has no direction"},
+      {"[1, 0, 0.5]", "[1, 0]", "renderers[1].light: light '1,0' is not X,Y,Z"},
+      {"\"termination\": 0", "\"termination\": 1", "renderers[1].termination: termination 1 is out of range [0, 0.5]"},
       {"\"opacity\": 0.2", "\"transfer\": \"cake\"", "volumes[0].transfer: "},
       {"\"opacity\": 0.2", "\"opacity_distance\": 0", "volumes[0].opacity_distance: 0 must be a number in (0, 1000000]"},
       {"\"opacity\": 0.2", "\"opacity\": 0.2, \"transfer\": \"auto\"", "volumes[0]: 'opacity' is that of a sphere without"},
       {"\"groups\": 2", "\"group\": 2", "policies[1]: 'group' is no field"},
       {"\"1gbit:30,1\"", "\"string\"", "links[1]: "},
       {"\"1gbit:30,1\"", "7", "links[1]: 7 must be a text"},
-      {"\"zoom\": 2", "\"zoom\": 0", "views[1].zoom: 0 must be a number in ["},
+      {"\"zoom\": 2", "\"zoom\": 0", "views[1].zoom: zoom 0 is out of range ["},
       {"{\"azimuth\": 30}", "30", "views[0]: 30 must be an object"},
       {"\"close\"", "\"view 1\"", "views: two of them are called 'view 1'"},
       {"\"occupancy\": 0.3", "\"occupancy\": 0.9", "volumes[0].sphere.occupancy: 0.9 must be a number in (0, 0.52]"},
