@@ -74,6 +74,7 @@ class OptionList {
 // Those of all fields that are not standard. --local would not show the layers of a file without --label-mode or --overlay-transfer.
 void AddRequest(OptionList& out, const FrameRequest& request) {
   for (const RequestOption& option : RequestOptions()) {
+    if (option.name == "dataset") continue;  // the source says it
     // Without --transfer, isosurfaces stand alone.
     const bool alone = !request.transfer.isosurfaces.empty();
     std::vector<std::string> texts = TextsOf(option, request);

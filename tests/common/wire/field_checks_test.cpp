@@ -274,17 +274,18 @@ TEST(FieldChecks, Clients) {
       {[&](auto& e) { frame(e)->mutable_size()->set_height(0x80000000); },
        "SubmitFrame.frame.size.height: 2147483648 is not in [1, 16384]"},
       {[&](auto& e) { frame(e)->mutable_view()->set_fov_degrees(90); }, "SubmitFrame.frame: view.fov"},
-      {[&](auto& e) { frame(e)->mutable_transfer()->clear_choice(); },
-       "SubmitFrame.frame.transfer.choice: not set, expected preset or function"},
+      {[&](auto& e) { frame(e)->mutable_transfer()->clear_choice(); }, ""},
       {[&](auto& e) { frame(e)->mutable_transfer()->mutable_function(); }, "SubmitFrame.frame"},  // without points
       {[&](auto& e) { frame(e)->mutable_transfer()->set_opacity_distance(0); }, "SubmitFrame.frame: transfer.opacity_distance"},
       {[&](auto& e) { frame(e)->mutable_shading()->set_shininess(0); }, "SubmitFrame.frame: shading.shininess"},
       {[&](auto& e) { frame(e)->set_termination(0.75); }, "SubmitFrame.frame: termination"},
       {[&](auto& e) { frame(e)->mutable_policy()->set_groups(1025); }, "SubmitFrame.frame.policy.groups: 1025 is not in [0, 1024]"},
-      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(1025); }, "SubmitFrame.frame.policy.teams: 1025 is not in [0, 1024]"},
-      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(0); }, ""},
-      {[&](auto& e) { frame(e)->mutable_policy()->clear_combine(); },
-       "SubmitFrame.frame.policy.combine: a text of 0 bytes, expected 1 to 256"},
+      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(1025); }, "SubmitFrame.frame.policy.teams: 1025 is not in [1, 1024]"},
+      {[&](auto& e) { frame(e)->mutable_policy()->set_teams(0); }, "SubmitFrame.frame.policy.teams: 0 is not in [1, 1024]"},
+      {[&](auto& e) { frame(e)->mutable_policy()->clear_combine(); }, ""},
+      {[&](auto& e) { frame(e)->mutable_policy()->clear_teams(); }, ""},
+      {[&](auto& e) { frame(e)->clear_view(); }, ""},
+      {[&](auto& e) { frame(e)->clear_dataset(); }, "SubmitFrame.frame.dataset: a text of 0 bytes, expected 1 to 256"},
   });
   const auto geometry = [](auto& e) { return e.mutable_frame_reply()->mutable_geometry(); };
   Check<FrameReply>({
