@@ -84,6 +84,7 @@ struct FrameRequest {
   std::optional<LabelChoice> labels = {};     // none: those of the dataset, if it has any, are not shown
   std::optional<OverlayChoice> overlay = {};  // likewise
   Shading shading;
+  double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
   Policy policy;
   bool previews = false;  // a picture after each group

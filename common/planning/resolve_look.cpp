@@ -74,10 +74,23 @@ Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& data
       fmt::format("renderer '{}' draws the cells of unstructured grids, and dataset \"{}\" is a volume", renderer.name(), dataset));
 }
 
+namespace {
+
+void Brighten(double factor, TransferFunction& transfer) {
+  const auto brighten = [factor](Rgb& color) {
+    for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
+  };
+  for (ColorPoint& point : transfer.colors) brighten(point.color);
+  for (Isosurface& surface : transfer.isosurfaces) brighten(surface.color);
+}
+
+}  // namespace
+
 Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary) {
   if (Status status = CheckHasWhatIsDrawn(*FindRenderer(request.renderer), request.dataset, summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
   if (!transfer.ok()) return transfer.status();
+  Brighten(request.brightness, *transfer);
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
   if (!clip.ok()) return clip.status();
   Result<LayerLooks> layers = ResolveLayers(request, summary);

@@ -196,6 +196,7 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Finite("termination", m.termination, &P::termination, &P::set_termination);
+  io.Finite("brightness", m.brightness, &P::brightness, &P::set_brightness);
   io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
   io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);

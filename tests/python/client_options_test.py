@@ -63,7 +63,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      ["--view", "front", "--clip-plane", "1,0,0,-35", "--clip-mode", "cut-away"]),
     ({"view": "back", "shading": "none", "background": "teal"}, ["--view", "back", "--shading", "none", "--background", "teal"]),
     ({"view": "top", "light": (1, 1, 2), "termination": 0.25}, ["--view", "top", "--light", "1,1,2", "--termination", "0.25"]),
-    ({"azimuth": 30, "of_patient": True}, ["--azimuth", "30", "--of-patient"]),
+    ({"azimuth": 30, "of_patient": True, "brightness": 0.5}, ["--azimuth", "30", "--of-patient", "--brightness", "0.5"]),
     ({"azimuth": 30, "ambient": 0.5, "diffuse": 0.4, "specular": 0.7, "shininess": 5},
      ["--azimuth", "30", "--ambient", "0.5", "--diffuse", "0.4", "--specular", "0.7", "--shininess", "5"]),
     ({"view": "bottom", "light": [(1, 1, 2), (-1, 0, 0)], "background": (0.1, 0.7, 0.3, 0.4)},
