@@ -222,7 +222,7 @@ struct OptionReader {
         status = Status::InvalidArgument(fmt::format("{} {}", shown, parsed.status().message()));
       }
     }
-    value = text;
+    if (status.ok()) value = text;
   }
   void Read(const std::string& text, std::variant<std::string, TransferFunction>& value) {
     Take(value, maps == ColorMaps::kFilesToo ? ParseTransfer(shown, text) : ParseTransferText(shown, text));

@@ -166,11 +166,11 @@ void Fields(auto& io, Is<RefusedRequests> auto& m) {
 v1::StatusReply ProtoOf(const StatusReply&);
 void Fields(auto& io, Is<RendererStatus> auto& m) {
   using P = v1::RendererStatus;
-  constexpr std::size_t kMost = 64;
+  constexpr std::size_t kMostAbilities = 64;
   io.Text("name", m.name, &P::name, &P::mutable_name, 1, kMaxNameBytes);
   io.Text("title", m.title, &P::title, &P::mutable_title, 0, kMaxNameBytes);
-  io.ByteStrings("abilities", m.abilities, &P::abilities, &P::mutable_abilities, kMost, kMaxNameBytes);
-  io.ByteStrings("parameters", m.parameters, &P::parameters, &P::mutable_parameters, kMost, kMaxNameBytes);
+  io.ByteStrings("abilities", m.abilities, &P::abilities, &P::mutable_abilities, kMostAbilities, kMaxNameBytes);
+  io.ByteStrings("parameters", m.parameters, &P::parameters, &P::mutable_parameters, kMaxParameters, kMaxNameBytes);
 }
 
 void Fields(auto& io, Is<StatusReply> auto& m) {

@@ -57,8 +57,8 @@ class SchemaCheck {
     } else if constexpr (requires { value.number(); }) {
       const auto* const chosen = field.enum_type()->FindValueByNumber(value.number());
       if (chosen == nullptr || value.number() == 0) {
-        return Keep(
-            Status::InvalidArgument(fmt::format("{} is none of its choices: {}", path_, fmt::join(WordsOf(*field.enum_type()), ", "))));
+        return Keep(Status::InvalidArgument(
+            fmt::format("{} is {}, but must be one of: {}", path_, value.number(), fmt::join(WordsOf(*field.enum_type()), ", "))));
       }
       const std::string& ability = chosen->options().GetExtension(v1::value_ability);
       if (!ability.empty()) Require(ability, fmt::format("{} '{}'", AboutOf(field).name(), WordOf(*chosen)));

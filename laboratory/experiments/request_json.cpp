@@ -23,8 +23,8 @@ std::string DigestText(std::string_view bytes) { return fmt::format("{:016x}", D
 Json TransferJson(const TransferChoice& transfer) { return RequestJson({.transfer = transfer})["transfer"]; }
 
 Json RequestJson(const FrameRequest& request) {
-  Json json = {{"dataset", request.dataset}};
-  json.update(Json::parse(RequestToJson(request)));
+  Json json = Json::parse(RequestToJson(request));
+  json["dataset"] = request.dataset;
   json["transfer"] = Shortened(json["transfer"]);
   if (json.contains("overlay")) json["overlay"] = Shortened(json["overlay"]);
   return json;

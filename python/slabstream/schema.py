@@ -25,7 +25,7 @@ def _load() -> dict[str, Any]:
     else:  # before protobuf 4.22
         class_of = message_factory.MessageFactory(pool).GetPrototype
     found: dict[str, Any] = {}
-    for file in files.file:
+    for file in (file for file in files.file if file.package == PACKAGE):
         for message in file.message_type:
             found[message.name] = class_of(pool.FindMessageTypeByName(f"{PACKAGE}.{message.name}"))
         for enum in file.enum_type:

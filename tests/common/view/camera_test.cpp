@@ -218,7 +218,7 @@ TEST(Camera, ValidateNamesTheFieldAndTheLimits) {
   };
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
   EXPECT_EQ(message([](auto& v) { v.zoom = 0; }), "view.zoom is 0, but must lie in [0.001, 10000]");
-  EXPECT_EQ(message([](auto& v) { v.fov_degrees = 90; }), "view.fov is 90, but must lie in [1, 60]");
+  EXPECT_EQ(message([](auto& v) { v.fov_degrees = 90; }), "view.fov_degrees is 90, but must lie in [1, 60] degrees");
   for (double bad : {kNan, kInfinity, -kInfinity, 2e6}) {
     EXPECT_NE(message([&](auto& v) { v.azimuth_degrees = bad; }).find("view.azimuth"), std::string::npos);
     EXPECT_NE(message([&](auto& v) { v.elevation_degrees = bad; }).find("view.elevation"), std::string::npos);
@@ -227,8 +227,8 @@ TEST(Camera, ValidateNamesTheFieldAndTheLimits) {
     EXPECT_NE(message([&](auto& v) { v.fov_degrees = bad; }).find("view.fov"), std::string::npos);
   }
   EXPECT_NE(message([](auto& v) { v.projection = Projection{9}; }).find("view.projection is 9"), std::string::npos);
-  EXPECT_EQ(Validate(ImageSize{0, 5}).message(), "size.width is 0, but must lie in [1, 16384]");
-  EXPECT_EQ(Validate(ImageSize{5, 16385}).message(), "size.height is 16385, but must lie in [1, 16384]");
+  EXPECT_EQ(Validate(ImageSize{0, 5}).message(), "size.width is 0, but must lie in [1, 16384] pixels");
+  EXPECT_EQ(Validate(ImageSize{5, 16385}).message(), "size.height is 16385, but must lie in [1, 16384] pixels");
   EXPECT_TRUE(Validate(ImageSize{16384, 4096}).ok());
   EXPECT_EQ(Validate(ImageSize{16384, 4097}).code(), StatusCode::kInvalidArgument);
 }
@@ -374,7 +374,7 @@ TEST(Camera, SaysWhichViewsCannotBeHad) {
     EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
     return status.message();
   };
-  EXPECT_EQ(refusal({.up = Vec3{0, 0, 1}}), "view.up needs view.eye; without an eye, view.roll turns the picture");
+  EXPECT_EQ(refusal({.up = Vec3{0, 0, 1}}), "view.up needs view.eye; without an eye, view.roll_degrees turns the picture");
   EXPECT_EQ(refusal({.distance = 3}), "view.distance needs a perspective projection; view.zoom magnifies orthographic pictures");
   EXPECT_EQ(refusal({.projection = Projection::kPerspective, .eye = Vec3{9, 9, 9}, .distance = 3}),
             "view.distance and view.eye cannot both be given");

@@ -150,15 +150,15 @@ TEST(Clip, InvalidOnesAreErrorsThatNameTheField) {
     Clipping clipping;
     std::string names;
   } kCases[] = {
-      {box({0, 5, 0}, {1, 5, 1}), "clip.box.y is 5:5"},
-      {box({0, kNan, 0}, {1, 5, 1}), "clip.box.y"},
-      {box({0, 0, -2e9}, {1, 5, 1}), "clip.box.z"},
-      {{.planes = {{{0, 0, 0}, 1}}}, "clip.planes[0].normal"},
-      {{.planes = {{{1, 0, 0}, 1}, {{kNan, 0, 0}, 1}}}, "clip.planes[1].normal.x"},
-      {{.planes = {{{1, 0, 0}, kNan}}}, "clip.planes[0].offset"},
-      {{.planes = std::vector<ClipPlane>(17, {{1, 0, 0}, 1})}, "17 are too many; the limit is 16"},
-      {{.mode = ClipMode(3)}, "clip.mode is 3"},
-      {{.box = ClipBox{{0, 0, 0}, {1, 1, 1}, ClipUnit(4)}}, "clip.box.unit is 4"},
+      {box({0, 5, 0}, {1, 5, 1}), "clipping.box is 5:5 along y"},
+      {box({0, kNan, 0}, {1, 5, 1}), "clipping.box.low.y"},
+      {box({0, 0, -2e9}, {1, 5, 1}), "clipping.box.low.z"},
+      {{.planes = {{{0, 0, 0}, 1}}}, "clipping.clip_planes[0].normal"},
+      {{.planes = {{{1, 0, 0}, 1}, {{kNan, 0, 0}, 1}}}, "clipping.clip_planes[1].normal.x"},
+      {{.planes = {{{1, 0, 0}, kNan}}}, "clipping.clip_planes[0].offset"},
+      {{.planes = std::vector<ClipPlane>(17, {{1, 0, 0}, 1})}, "clipping.clip_planes has 17 items, at most 16"},
+      {{.mode = ClipMode(3)}, "clipping.mode is 3"},
+      {{.box = ClipBox{{0, 0, 0}, {1, 1, 1}, ClipUnit(4)}}, "clipping.box.unit is 4"},
   };
   for (const auto& [clipping, names] : kCases) {
     const Status status = Validate(clipping);

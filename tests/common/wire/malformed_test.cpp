@@ -207,6 +207,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"shown", kMaxLabelRanges},
       {"entries", kMaxLabels},
       {"parameters", kMaxParameters},
+      {"renderers", 256},
+      {"abilities", 64},
   };
   std::map<std::string, bool> seen;
   AlterEachField(
@@ -235,8 +237,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 9)
-      << "reports are in four messages; parameters, datasets, isosurfaces, gradients, opacities and labels in two";
+  EXPECT_EQ(seen.size(), limits.size() + 10)
+      << "reports are in four messages, parameters in three; datasets, isosurfaces, gradients, opacities and labels in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

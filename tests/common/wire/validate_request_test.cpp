@@ -60,7 +60,7 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
       {[](auto& r) { r.policy.balance_by = ""; }, "policy.balance_by has 0 bytes"},
       {[](auto& r) { r.policy.assignment = ""; }, "policy.assignment has 0 bytes"},
       {[&](auto& r) { r.policy.balance = long_name; }, "policy.balance has 257 bytes"},
-      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is none of its choices: x, y, z, auto, view"},
+      {[](auto& r) { r.policy.axis = AxisChoice{5}; }, "policy.axis is 6, but must be one of: x, y, z, auto, view"},
       {[](auto& r) { r.policy.groups = -1; }, "policy.groups is -1, but must lie in [0, 1024]"},
       {[&](auto& r) { r.policy.combine = long_name; }, "policy.combine has 257 bytes"},
   };
