@@ -169,7 +169,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
   AddRequestOptions(app, slice.frame, files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts, wanted);
   if (files != nullptr) AddLayerFiles(app, *files, &slice.frame);
   app.get_option("--transfer")->excludes(window)->default_str("window");
-  app.get_option("--size")->description("Pixels of each plane: WIDTHxHEIGHT, or one number for a square")->group("Plane");
+  app.get_option("--size")->group("Plane");
   AddPictureFormat(app, slice.format);
 }
 
