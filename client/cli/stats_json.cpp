@@ -64,9 +64,9 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
     list.push_back(FrameJson(frame, summary));
   }
   const FrameStatistics last = frames.empty() ? FrameStatistics() : frames.back().statistics;
-  json["plan"] = {{"workers", last.workers},  {"groups", last.groups},  {"decomposition", last.decomposition},
+  json["plan"] = {{"workers", last.workers},       {"groups", last.groups},  {"decomposition", last.decomposition},
                   {"balance_by", last.balance_by}, {"axis", last.axis},      {"assignment", last.assignment},
-                  {"balance", last.balance},  {"combine", last.combine}};
+                  {"balance", last.balance},       {"combine", last.combine}};
   json["bytes"] = {{"voxels", voxel_bytes}, {"images", image_bytes}};
   json["frames"] = std::move(list);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

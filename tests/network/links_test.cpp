@@ -1,5 +1,5 @@
-// Networks that fail in the middle of a frame. Nothing is timed, but every frame must end before its deadline, which is shorter than a frame
-// waits for messages that do not come.
+// Networks that fail in the middle of a frame. Nothing is timed, but every frame must end before its deadline, which is shorter than a
+// frame waits for messages that do not come.
 #include <gtest/gtest.h>
 
 #include <chrono>
