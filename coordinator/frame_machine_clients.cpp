@@ -130,7 +130,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
   }
   for (const RendererKind* kind : Renderers()) {
     RendererStatus& renderer = reply.renderers.emplace_back(RendererStatus{std::string(kind->name()), std::string(kind->title()), {}, {}});
-    for (const Ability ability : kind->abilities()) renderer.abilities.emplace_back(NameOf(ability));
+    for (const std::string_view ability : kind->AbilityNames()) renderer.abilities.emplace_back(ability);
     for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
   }
   actions.emplace_back(ToDatasets(FinishStatus{client, std::move(reply)}));

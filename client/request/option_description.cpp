@@ -34,7 +34,7 @@ Json DescribeRenderers() {
                  {"purpose", kind->purpose()},
                  {"abilities", Json::array()},
                  {"parameters", Json::array()}};
-    for (const Ability ability : kind->abilities()) json["abilities"].push_back(NameOf(ability));
+    for (const std::string_view ability : kind->AbilityNames()) json["abilities"].push_back(ability);
     for (const RendererParameter& parameter : kind->parameters()) json["parameters"].push_back(parameter.name);
     renderers.push_back(std::move(json));
   }

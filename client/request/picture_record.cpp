@@ -71,14 +71,13 @@ class OptionList {
   std::vector<std::string> arguments_;
 };
 
-// Those of all fields that are not standard. --local would not show the layers of a file without --label-mode or --overlay-transfer.
+// Those of all fields that are not standard. Without --transfer, isosurfaces stand alone.
 void AddRequest(OptionList& out, const FrameRequest& request) {
+  const bool has_surfaces = !request.transfer.isosurfaces.empty();
   for (const RequestOption& option : RequestOptions()) {
     if (option.name == "dataset") continue;  // the source says it
-    // Without --transfer, isosurfaces stand alone.
-    const bool alone = !request.transfer.isosurfaces.empty();
     std::vector<std::string> texts = TextsOf(option, request);
-    if (alone && option.path == "transfer.preset") {
+    if (has_surfaces && option.path == "transfer.preset") {
       if (texts.empty()) texts = {option.standard};
       if (texts.front() == kNoTransfer) continue;
     }

@@ -107,17 +107,13 @@ class SchemaCheck {
     if (!about.ability().empty()) Require(about.ability(), about.name().empty() ? field.name() : about.name());
   }
 
-  void Require(const std::string& ability, const std::string& what) {
-    const auto can = [&](const RendererKind& kind) {
-      return std::ranges::any_of(kind.abilities(), [&](Ability a) { return NameOf(a) == ability; });
-    };
-    if (renderer_ == nullptr || can(*renderer_)) return;
-    std::vector<std::string_view> names;
-    for (const RendererKind* kind : Renderers()) {
-      if (can(*kind)) names.push_back(kind->name());
-    }
-    Keep(
-        Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, fmt::join(names, ", "))));
+  // `name`: of an ability.
+  void Require(const std::string& name, const std::string& what) {
+    const auto found = std::ranges::find(kAbilityNames, name);
+    CHECK(found != kAbilityNames.end()) << name;
+    const auto ability = Ability(found - kAbilityNames.begin());
+    if (renderer_ == nullptr || renderer_->Can(ability)) return;
+    Keep(Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, NamesOfAble(ability))));
   }
 
   void Keep(const Status& status) {
