@@ -9,6 +9,7 @@
 
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_display.h"
+#include "client/report/picture_warnings.h"
 
 namespace slabstream {
 namespace {
@@ -82,7 +83,7 @@ class FrameLoop {
     open_.erase(found);
     display_.FrameDone(int(index));
     FrameRecord& record = records_[index];
-    record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
+    record = {jobs_[index].output, picture.latency, std::move(picture.statistics), IsEmpty(picture.image)};
     if (!options_.keep_reports) record.statistics.reports = {};
     if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
     return Status::Ok();

@@ -16,6 +16,7 @@ struct FrameRecord {
   std::string output;
   Duration latency{};          // request to last byte
   FrameStatistics statistics;  // reports only if they were asked for
+  bool empty = false;          // the picture shows nothing
 };
 
 struct FrameLoopOptions {

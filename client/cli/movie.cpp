@@ -36,7 +36,8 @@ Status Movie::OfFile(Status status) const {
 
 Status Movie::Put(const Picture& picture, const FrameJob&) {
   CHECK(picture.final && picture.size == options_.shape.size);
-  const Result<ComposedPicture> composed = ComposedPicture::Make(picture.image, picture.size, options_.format, picture.geometry);
+  const Result<ComposedPicture> composed =
+      ComposedPicture::Make(picture.image, picture.size, options_.format, picture.geometry, options_.key);
   if (!composed.ok()) return composed.status();
   return OfFile(encoder_->Put(MovieFrame(*composed)));
 }

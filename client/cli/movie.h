@@ -16,7 +16,8 @@ namespace slabstream {
 struct MovieOptions {
   std::string path;  // of a movie, as MovieFormatOf has it
   MovieShape shape;
-  PictureFormat format;  // black shows through a transparent background
+  PictureFormat format;
+  PictureKey key = {};  // black shows through a transparent background
 };
 
 // For a message before the work begins. Errors of CheckShape and CheckHasMovieEncoder.

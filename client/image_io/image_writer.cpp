@@ -60,6 +60,10 @@ bool WriteExrRows(const ComposedPicture& picture, const PictureEncoder::WriteRow
   return true;
 }
 
+std::span<const PictureGeometry> PanesOf(const PictureNotes& notes) {
+  return notes.panes.empty() ? std::span(&notes.geometry, 1) : std::span(notes.panes);
+}
+
 // PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch. nullopt:
 // pixels do not all have the same size, or none that is known.
 std::optional<double> PixelDensity(const PictureGeometry& geometry, bool png) {
@@ -119,7 +123,7 @@ Status CheckPicturePath(const std::string& path) {
 Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes) {
   if (Status status = CheckPicturePath(path); !status.ok()) return status;
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
   if (!picture.ok()) return picture.status();
   Result<OutputFile> file = OutputFile::Create(path);
   if (!file.ok()) return file.status();
@@ -135,7 +139,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
 }
 
 Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
   if (!picture.ok()) return picture.status();
   std::vector<std::byte> file;
   const auto write = [&](std::int64_t offset, std::span<const std::byte> bytes) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ namespace slabstream {
 // What a file holds beside the pixels.
 struct PictureNotes {
   PictureGeometry geometry;
+  std::vector<PictureGeometry> panes = {};  // of several pictures side by side, of equal widths; empty: it is one
+  PictureKey key = {};
   std::string record;  // ASCII text that says how the picture was made, under the name kRecordName; empty: none
 };
 inline constexpr char kRecordName[] = "slabstream";

@@ -34,6 +34,9 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   return exit_status;
 }
 
+void PrintNote(const std::string& message) { std::cerr << "slabstream: note: " << message << std::endl; }
+void PrintWarning(const std::string& message) { std::cerr << "slabstream: warning: " << message << std::endl; }
+
 int Finish(const std::string& who, const Status& status) {
   if (status.ok()) return 0;
   std::string message = status.message();

@@ -20,6 +20,10 @@ int Finish(const std::string& who, const Status& status);
 // Writes all of them but the last one as Finish does, and returns that one. Ok if there is none.
 Status ReportAll(const std::string& who, const std::vector<Status>& failures);
 
+// What a user should know of a command that goes on: one line to stderr, "slabstream: note: message" or "slabstream: warning: message".
+void PrintNote(const std::string& message);
+void PrintWarning(const std::string& message);
+
 // The style of help texts, --help and --version.
 void SetUp(CLI::App& app, const std::string& version);
 

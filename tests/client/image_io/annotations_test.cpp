@@ -52,7 +52,7 @@ struct Drawing {
 };
 
 Drawing Draw(const Annotations& annotations, ImageSize size, const PictureGeometry& geometry = {}, Color background = kBlack) {
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, geometry);
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, {&geometry, 1});
   EXPECT_TRUE(layers.ok()) << layers.status().message();
   Drawing drawing{size, {}, background};
   for (std::int64_t i = 0; i < std::int64_t{size.width} * size.height; ++i)
