@@ -57,7 +57,9 @@ Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& te
   Subject subject{.name = parsed->name, .volume = *volume, .summary = std::make_shared<const VolumeSummary>(SummaryOf(**volume))};
   const ViewParameters view{.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation, .zoom = options.zoom};
   subject.request = BenchRequest(*parsed, view, {options.size, options.size});
-  Result<FrameSetup> setup = MakeFrameSetup(subject.request, 1, *subject.summary);
+  const Result<ResolvedRequest> resolved = ResolveRequest(subject.request, 1, subject.summary);
+  if (!resolved.ok()) return resolved.status();
+  Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   subject.setup = *std::move(setup);
   subject.occupied =

@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-// Errors: as of MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
+// Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
 Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples);
 
 }  // namespace slabstream

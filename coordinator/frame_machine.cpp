@@ -27,7 +27,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
     const auto waits = [&](const OpenRequest& request) {
-      return request.needs_occupancy && request.dataset() != nullptr && request.dataset()->volume.Whole() == *failed;
+      return request.needs_occupancy && request.dataset() != nullptr && request.dataset()->volume().Whole() == *failed;
     };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
@@ -36,8 +36,8 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
 // A request that has ended is not in the queue any more.
 void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
-  const Result<int> fit =
-      event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.summary) : Result<int>(event.frame.status());
+  const Result<int> fit = event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.resolved->summary)
+                                           : Result<int>(event.frame.status());
   const auto asked = [&](const OpenRequest& request) {
     const auto* const ask = request.plan<PlanAsked>();
     return ask != nullptr && ask->plan == event.plan ? ask : nullptr;
@@ -48,7 +48,7 @@ void FrameMachine::State::On(const Planned& event) {
     });
   }
   const StatusCode code = fit.status().code();
-  const bool bad = code == StatusCode::kInvalidArgument || code == StatusCode::kNotFound;
+  const bool bad = code == StatusCode::kInvalidArgument;
   const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
   const RefusedAs as = bad ? &RefusedRequests::bad_request : too_large ? &RefusedRequests::too_large : nullptr;
   const auto is_it = [&](const OpenRequest& request) { return asked(request) != nullptr && asked(request)->version == roster.version(); };
@@ -67,9 +67,9 @@ void FrameMachine::State::CountAhead() {
   queue.VisitInTurn([&](const OpenRequest& request) {
     const auto* const dataset = request.dataset();
     if (dataset == nullptr || !request.needs_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
-    const ClassifiedVolume volume = dataset->volume.Whole();
+    const ClassifiedVolume volume = dataset->volume().Whole();
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
-      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->summary});
+      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->resolved->summary});
     }
     return ++ahead < kCountAhead;
   });
@@ -85,7 +85,7 @@ void FrameMachine::State::PlanAhead() {
     auto* const dataset = request.dataset();
     if (dataset == nullptr) return true;
     if (!std::visit(is_present, dataset->plan)) {
-      const auto occupied = request.needs_occupancy ? occupancy.Find(dataset->volume.Whole()) : nullptr;
+      const auto occupied = request.needs_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
       if (request.needs_occupancy && occupied == nullptr) return true;  // it waits for the count
       dataset->plan = PlanAsked{++last_plan, roster.version()};
       planning.insert(last_plan);
@@ -96,12 +96,9 @@ void FrameMachine::State::PlanAhead() {
 }
 
 PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
-  const FrameRequest& frame = request.submit.frame;
-  Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), last_plan);
+  Team team = TeamOf(roster.slots(), std::uint32_t(request.submit.frame.policy.teams), last_plan);
   PlanRequest ask{.plan = last_plan,
-                  .frame = frame,
-                  .volume = request.dataset()->volume,
-                  .summary = request.dataset()->summary,
+                  .resolved = request.dataset()->resolved,
                   .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
                   .turn = team.turn};
@@ -200,7 +197,7 @@ std::string_view FrameMachine::State::WhatLacks(const OpenRequest& request) cons
   if (!dataset->seen) return "its dataset's files were still being looked at";
   if (clients.IsBehind(request.client)) return "this client did not read its earlier pictures";
   if (roster.empty()) return "there was no worker";
-  if (occupancy.Counting(dataset->volume.Whole())) return "the occupied voxels of its dataset were still being counted";
+  if (occupancy.Counting(dataset->volume().Whole())) return "the occupied voxels of its dataset were still being counted";
   const bool under_way = request.plan<PlanAsked>() != nullptr || (request.plan<PlanMade>() != nullptr && ReadyPlan(request) == nullptr);
   return under_way ? "it was still being planned" : "it was still queued";
 }
@@ -235,7 +232,7 @@ void FrameMachine::State::BeginAttempts() {
     Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
-      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.summary);
+      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.resolved->summary);
       if (fit.ok()) frame.SetFit(*fit);
       status = fit.status();
     }
@@ -264,7 +261,7 @@ bool FrameMachine::State::StartNextFrame() {
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
-  actions.emplace_back(ToDatasets(KeepDataset{next->use, next->dataset()->volume.dataset()}));
+  actions.emplace_back(ToDatasets(KeepDataset{next->use, next->dataset()->volume().dataset()}));
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/planning/resolve_look.h"
 #include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
@@ -35,9 +34,9 @@ void FrameMachine::State::On(const DatasetNews& event) {
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
-               request.dataset() != nullptr && request.dataset()->volume.dataset() == ready.dataset) {
+               request.dataset() != nullptr && request.dataset()->volume().dataset() == ready.dataset) {
       request.dataset()->seen = ready.seen;
-    } else if (const Status suits = Classify(request, ready); suits.ok()) {
+    } else if (const Status suits = Resolve(request, ready); suits.ok()) {
       SendQueued(request, false);
     } else {
       lost[request.use] = {suits, &RefusedRequests::bad_request};
@@ -48,15 +47,11 @@ void FrameMachine::State::On(const DatasetNews& event) {
   }
 }
 
-// NotFound: no such preset; InvalidArgument: clipping or layers do not suit the dataset.
-Status FrameMachine::State::Classify(OpenRequest& request, const DatasetReady& ready) const {
-  const FrameRequest& frame = request.submit.frame;
-  Result<VolumeLook> look = ResolveLook(frame, *ready.summary);
-  if (!look.ok()) return look.status();
-  request.state = OpenRequest::HasDataset{
-      .volume = {ready.dataset, std::move(look->transfer), FindRenderer(frame.renderer), std::move(look->clip), std::move(look->layers)},
-      .summary = ready.summary,
-      .seen = ready.seen};
+// Errors as of ResolveRequest.
+Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
+  Result<ResolvedRequest> resolved = ResolveRequest(request.submit.frame, ready.dataset, ready.summary);
+  if (!resolved.ok()) return resolved.status();
+  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
   return Status::Ok();
 }
 

@@ -106,7 +106,7 @@ struct FrameMachine::State {
   // ---- requests
   bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
   Status WithinQuota(PeerToken client) const;
-  Status Classify(OpenRequest& request, const DatasetReady& ready) const;
+  Status Resolve(OpenRequest& request, const DatasetReady& ready) const;
   void SendQueued(const OpenRequest& request, bool loading);
   void EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload);
   // `as`: it is refused; else it has failed.

@@ -172,7 +172,7 @@ void FrameSimulation::Perform(const PlanRequest& action) {
   timeline_.frames[frame].planned = service_.coordinator_free() - origin_;
   frames_.emplace(frame, Frame{{}, FrameAccount(ids_.size())});
   auto planned = std::make_shared<PlannedFrame>(PlannedFrame{.asked = action,
-                                                             .policy = ResolvePolicy(action.frame, {}).value(),
+                                                             .policy = *action.resolved->policy,
                                                              .prediction = {},
                                                              .plan = PlanForMachines(plan(frame), frame, ids_)});
   Threads& threads = service_.threads();

@@ -17,7 +17,7 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
 

@@ -4,7 +4,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
 #include "common/mesh/lattice.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 
 namespace slabstream {
 

@@ -10,7 +10,7 @@
 #include "common/mesh/mesh_part.h"
 #include "common/planning/count_drawn.h"
 #include "common/planning/frame_plan.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
 #include "data/volume_io/read_options.h"
 

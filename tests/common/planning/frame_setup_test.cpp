@@ -52,9 +52,9 @@ TEST(PlanFrame, RefusesViewsThatCannotBeRendered) {
   FrameRequest request = SomeRequest();
   request.view.elevation_degrees = -50;
   VolumeSummary summary = FullSummary({64, 64, 600});
-  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1), {}).ok());
+  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1)).ok());
   summary.description.geometry.spacing = {1, 1, 3000};
-  const Status status = PlanFrame(request, 7, summary, FullRoster(1), {}).status();
+  const Status status = PlanFrame(request, 7, summary, FullRoster(1)).status();
   EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
   EXPECT_NE(status.message().find("at most 131072 a side"), std::string::npos) << status.message();
 }
