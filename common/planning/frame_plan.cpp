@@ -73,7 +73,7 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
 }
 
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            std::int64_t slab_bytes_target) {
+                            std::int64_t box_bytes_target) {
   const Result<ResolvedRequest> resolved = ResolveRequest(request, dataset, std::make_shared<const VolumeSummary>(summary));
   if (!resolved.ok()) return resolved.status();
   if (!resolved->policy) {
@@ -85,7 +85,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                                            .volume = &resolved->volume,
                                                            .policy = &*resolved->policy,
                                                            .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
-                                                           .slab_bytes_target = slab_bytes_target}));
+                                                           .box_bytes_target = box_bytes_target}));
   return PlanFrame(*std::move(setup), *resolved->policy, roster, std::move(layout));
 }
 

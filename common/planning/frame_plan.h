@@ -80,6 +80,6 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
 // Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
 // for a policy that leaves a choice.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            std::int64_t slab_bytes_target = kSlabBytesTarget);
+                            std::int64_t box_bytes_target = kBoxBytesTarget);
 
 }  // namespace slabstream

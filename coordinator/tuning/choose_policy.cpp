@@ -51,7 +51,7 @@ class Search {
         layouts_({.summary = question.resolved->summary.get(),
                   .volume = &question.resolved->volume,
                   .slots = question.slots,
-                  .slab_bytes_target = question.slab_bytes_target,
+                  .box_bytes_target = question.box_bytes_target,
                   .known = question.known}),
         predictor_(predictor),
         asked_(*question.open),

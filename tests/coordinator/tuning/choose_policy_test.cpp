@@ -53,7 +53,7 @@ struct Question {
   FrameRequest request = SomeRequest();
   VolumeSummary summary;
   MachineModel machine = ServiceMachine({}, {});
-  std::int64_t slab_bytes_target = kSlabBytesTarget;
+  std::int64_t box_bytes_target = kBoxBytesTarget;
   std::uint32_t slots = 1;
 
   PolicyChoice Choose(const Policy& policy, const ResolvedPolicy* now = nullptr, double least_gain = 0) const {
@@ -64,7 +64,7 @@ struct Question {
                          .setup = &setup,
                          .slots = slots,
                          .machine = &machine,
-                         .slab_bytes_target = slab_bytes_target,
+                         .box_bytes_target = box_bytes_target,
                          .now = now,
                          .least_gain = least_gain});
   }
@@ -204,7 +204,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
 
 TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
   Question question{.summary = FullSummary({256, 256, 256}), .slots = 2};
-  question.slab_bytes_target = 3 << 20;
+  question.box_bytes_target = 3 << 20;
   for (const DecompositionEntry& entry : Decompositions()) {
     Policy asked = Automatic();
     asked.decomposition = entry.name;
@@ -213,7 +213,7 @@ TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
     const Layout layout =
         MakeLayout({.summary = &question.summary, .volume = &resolved.volume, .policy = &choice.policy, .slots = question.slots});
     for (const Box& box : layout.partition.boxes()) {
-      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.slab_bytes_target)
+      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.box_bytes_target)
           << entry.name << ", " << choice.policy.groups << " groups";
     }
   }
