@@ -6,6 +6,8 @@
 #include <limits>
 #include <type_traits>
 
+#include "tests/worker/rays/pixel_ray.h"
+
 namespace slabstream::testing {
 namespace {
 

@@ -6,6 +6,8 @@
 #include <deque>
 #include <vector>
 
+#include "tests/worker/rays/pixel_ray.h"
+
 namespace slabstream::testing {
 namespace {
 
