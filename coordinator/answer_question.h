@@ -1,8 +1,6 @@
 // The answers to questions about what a dataset holds. Pure; they may take milliseconds.
 #pragma once
 
-#include <memory>
-
 #include "coordinator/dataset_machine.h"
 #include "coordinator/voxel_server.h"
 

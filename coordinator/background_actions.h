@@ -11,7 +11,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <variant>
 #include <vector>
 
 #include "common/base/background_tasks.h"
@@ -72,6 +71,8 @@ class BackgroundActions {
   static Result<News> Load(const LoadDataset& action);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(BackgroundTasks& tasks, const char* what, auto make, auto failed);
+  // Where the event holds a result: that of `find`, or the error.
+  AtOnce PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end);
 
   const std::shared_ptr<Mailbox<News>> inbox_ = std::make_shared<Mailbox<News>>();  // tasks that outlive this share it
   const PlanFunction make_plan_;

@@ -9,13 +9,11 @@
 #pragma once
 
 #include <list>
-#include <memory>
 #include <optional>
 #include <span>
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
-#include "common/volume/occupancy_grid.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/tuning/choose_policy.h"

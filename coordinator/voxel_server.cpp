@@ -11,7 +11,6 @@
 
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/transport/endpoint.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
 

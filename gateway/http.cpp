@@ -15,13 +15,11 @@
 #include <boost/beast/websocket.hpp>
 #include <boost/beast/websocket/ssl.hpp>
 #include <deque>
-#include <list>
 #include <set>
 #include <utility>
 #include <variant>
 
 #include "common/base/limited_log.h"
-#include "common/base/printable.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {

@@ -1,6 +1,5 @@
 // slabstream-gateway: pictures of a service over HTTP and WebSockets (docs/http.md). It ends on SIGINT or SIGTERM.
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
 #include <string>
 

@@ -6,7 +6,6 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "client/movie/turntable.h"
 #include "client/request/picture_fields.h"

@@ -6,9 +6,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <numeric>
 #include <span>
-#include <string_view>
 
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"

@@ -1,14 +1,12 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <utility>
-#include <variant>
 
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
@@ -22,7 +20,6 @@
 #include "client/request/request_options.h"
 #include "common/base/files.h"
 #include "common/frame/dataset_name.h"
-#include "common/planning/frame_plan.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
 

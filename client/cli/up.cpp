@@ -14,7 +14,6 @@
 #include <ctime>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 
 #include "client/cli/commands.h"

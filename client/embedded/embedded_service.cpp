@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstdint>
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 

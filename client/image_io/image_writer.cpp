@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>

@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "common/base/range_status.h"
 #include "common/view/camera.h"
 
 namespace slabstream {

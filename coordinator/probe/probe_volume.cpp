@@ -1,7 +1,6 @@
 #include "coordinator/probe/probe_volume.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace slabstream {

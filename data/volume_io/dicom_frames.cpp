@@ -7,7 +7,6 @@
 #include <cstring>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <type_traits>
 
 #include "common/base/aligned_buffer.h"

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "common/base/status.h"
 #include "data/volume_io/dicom_image.h"

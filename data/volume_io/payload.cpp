@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <fstream>
 #include <new>
-#include <string>
 #include <vector>
 
 namespace slabstream {

@@ -8,8 +8,6 @@
 #include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
 #include "common/planning/assignment.h"
-#include "common/planning/balance.h"
-#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/wire/validate_request.h"
 #include "coordinator/tuning/box_estimator.h"

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/planning/balance.h"
-#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/frame_keys.h"

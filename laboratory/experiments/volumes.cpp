@@ -102,13 +102,6 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
   return grid;
 }
 
-std::string TitleOf(const BenchCase& volume) {
-  const auto* sphere = std::get_if<SphereRequest>(&volume.volume);
-  if (sphere == nullptr) return volume.dataset;
-  return fmt::format("class {}, N = {}, {:.3g} % occupied", sphere->sphere_class == SphereClass::kHollow ? "I" : "II", sphere->size,
-                     sphere->occupancy * 100);
-}
-
 Json ColumnsOf(const BenchCase& volume) {
   Json columns = {{"volume", volume.dataset}};
   if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) {

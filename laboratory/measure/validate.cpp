@@ -5,7 +5,6 @@
 #include <map>
 #include <utility>
 
-#include "common/base/check.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
