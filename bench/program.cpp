@@ -44,9 +44,9 @@ void AddSubjectOptions(CLI::App& app, SubjectOptions& options) {
       ->required();
   AddRenderer(app, options.renderer);
   AddInteger(app, "--size", options.size, 1, kMaxImageSide, "Pixels a side");
-  AddNumber(app, "--azimuth", options.azimuth, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye turns about +z");
-  AddNumber(app, "--elevation", options.elevation, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye is lifted towards +z");
-  AddNumber(app, "--zoom", options.zoom, {kMinZoom, kMaxZoom}, "Magnification");
+  AddNumber(app, "--azimuth", options.azimuth, {-360, 360}, "Degrees that the eye turns about +z");
+  AddNumber(app, "--elevation", options.elevation, {-360, 360}, "Degrees that the eye is lifted towards +z");
+  AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification");
 }
 
 Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& text) {

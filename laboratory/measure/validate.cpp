@@ -1,7 +1,6 @@
 #include "laboratory/measure/validate.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 
@@ -96,14 +95,6 @@ ValidatedView ValidationRow::Mean() const {
     mean.simulated_high += share * view.simulated_high;
   }
   return mean;
-}
-
-double ValidationRow::worst_error() const {
-  double worst = 0;
-  for (const ValidatedView& view : views) {
-    if (std::abs(view.error()) > std::abs(worst)) worst = view.error();
-  }
-  return worst;
 }
 
 Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options) {

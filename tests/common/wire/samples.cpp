@@ -1,4 +1,5 @@
 #include "tests/common/wire/samples.h"
+#include "tests/common/view/view_limits.h"
 #include "tests/support/renderers.h"
 
 #include <limits>
