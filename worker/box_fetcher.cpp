@@ -201,7 +201,7 @@ void BoxFetcher::ExpireRequests(Time now) {
   }
   const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
   for (const auto& [generation, chunk] : expired) {
-    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a padded did not arrive within {} ms", chunk.chunk, waited)));
+    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a padded box did not arrive within {} ms", chunk.chunk, waited)));
   }
 }
 

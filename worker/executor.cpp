@@ -124,7 +124,7 @@ struct Executor::HeldBox {
 
   Status Store(const Chunk& chunk, const Bytes& payload) {
     if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset)
-      return Status::DataLoss("chunk of another padded");
+      return Status::DataLoss("chunk of another padded box");
     if (data != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
     if (IsCellChunk(chunk.chunk)) {
       return key.types.layers.cells ? cells.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
@@ -242,8 +242,8 @@ void Executor::Perform(StoreChunk&& action) {
   const auto found = boxes_.find(action.padded);
   std::shared_ptr<HeldBox> padded = found == boxes_.end() ? nullptr : found->second;
   combine_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
-    Status status = Guard("padded", [&] {
-      return padded == nullptr ? Status::NotFound("chunk of a padded that was dropped") : padded->Store(store.chunk, store.payload);
+    Status status = Guard("box", [&] {
+      return padded == nullptr ? Status::NotFound("chunk of a padded box that was dropped") : padded->Store(store.chunk, store.payload);
     });
     outbox_.Post(WorkerEvent(ChunkStored{store.padded, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });

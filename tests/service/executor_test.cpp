@@ -192,7 +192,7 @@ TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
     EXPECT_EQ(stored.chunk, header.chunk);
     return stored.status.code();
   };
-  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound) << "no such padded yet";
+  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound) << "no such padded box yet";
   executor_.Perform(OpenBox{padded});
   Chunk damaged = chunk;
   damaged.digest ^= 1;

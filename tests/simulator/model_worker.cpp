@@ -64,20 +64,20 @@ void ModelWorker::CheckCredit() {
 }
 
 void ModelWorker::Perform(const OpenBox& action) {
-  EXPECT_TRUE(boxes_.try_emplace(action.padded).second) << "a padded is opened twice";
+  EXPECT_TRUE(boxes_.try_emplace(action.padded).second) << "a padded box is opened twice";
   for (const OpenBox::Copy& copy : action.copies) {
-    EXPECT_TRUE(Complete(copy.from)) << "a padded is copied from that is not open or not complete";
+    EXPECT_TRUE(Complete(copy.from)) << "a padded box is copied from that is not open or not complete";
     EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.padded.dataset && copy.from.types == action.padded.types);
     boxes_[action.padded].copied.push_back(copy);
   }
 }
 
 double ModelWorker::Begin(Job&, const StoreChunk& action) {
-  EXPECT_EQ(boxes_.count(action.padded), 1U) << "a chunk is stored in a padded that is not open";
+  EXPECT_EQ(boxes_.count(action.padded), 1U) << "a chunk is stored in a padded box that is not open";
   EXPECT_TRUE(action.padded.box.Contains(action.chunk.box));
   if (IsCellChunk(action.chunk.chunk)) {
     EXPECT_TRUE(action.padded.types.layers.cells) << "cells of a dataset that has none";
-    EXPECT_EQ(action.chunk.box, action.padded.box) << "cells are those of the whole padded";
+    EXPECT_EQ(action.chunk.box, action.padded.box) << "cells are those of the whole padded box";
   }
   return speed_.store;
 }
@@ -111,18 +111,18 @@ bool ModelWorker::Complete(const BoxKey& key) const {
 }
 
 void ModelWorker::Perform(const DropBox& action) {
-  EXPECT_EQ(boxes_.erase(action.padded), 1U) << "a padded is dropped that is not open";
+  EXPECT_EQ(boxes_.erase(action.padded), 1U) << "a padded box is dropped that is not open";
   for (const auto& [key, padded] : boxes_) {
     for (const OpenBox::Copy& copy : padded.copied)
-      EXPECT_TRUE(padded.rendered || copy.from != action.padded) << "a padded is dropped that is copied from";
+      EXPECT_TRUE(padded.rendered || copy.from != action.padded) << "a padded box is dropped that is copied from";
   }
-  EXPECT_NE(rendering_, action.padded) << "a padded is dropped while it is rendered from";
+  EXPECT_NE(rendering_, action.padded) << "a padded box is dropped while it is rendered from";
 }
 
 double ModelWorker::Begin(Job&, const StartRender& action) {
   EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
-  EXPECT_TRUE(Complete(action.padded)) << "a padded is rendered from before it is complete";
-  EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.box, *action.setup))) << "a padded without the voxels of its box";
+  EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
+  EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.box, *action.setup))) << "a padded box without the voxels of its box";
   EXPECT_EQ(action.padded.dataset, action.setup->dataset);
   rendering_ = action.padded;
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);

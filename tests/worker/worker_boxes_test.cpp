@@ -147,7 +147,7 @@ TEST_F(WorkerBoxesTest, ALargerHaloReplacesTheBoxOnceItIsCopied) {
   EXPECT_THAT(All<DropBox>(fed), IsEmpty());
   EXPECT_THAT(All<DropBox>(Rendered(All<StartRender>(fed)[0])), ElementsAre(testing::Field(&DropBox::padded, first[0].padded)));
   const Actions narrow = Tell(Assignment(3, {kSelf}));
-  EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider padded holds all that the narrower halo needs";
+  EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider padded box holds all that the narrower halo needs";
   EXPECT_THAT(All<StartRender>(narrow), SizeIs(1));
 }
 
@@ -161,7 +161,7 @@ TEST_F(WorkerBoxesTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
   ASSERT_THAT(open, SizeIs(1));
   ASSERT_THAT(open[0].copies, SizeIs(1));
   EXPECT_EQ(open[0].copies[0].from, first.padded);
-  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the padded of 72 slices goes";
+  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the padded box of 72 slices goes";
   const auto requests = All<SendChunkRequest>(told);
   ASSERT_THAT(requests, SizeIs(1));
   EXPECT_EQ(requests[0].request.box, (Box{{0, 0, 72}, {108, 128, 88}}));
