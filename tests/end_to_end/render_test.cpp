@@ -198,6 +198,19 @@ TEST_F(RenderTest, AFontThatIsNotThereIsToldBeforeTheWorkBegins) {
   EXPECT_THAT(Files(), Not(Contains("x.png")));
 }
 
+// Copied without libslabstream-pictures.so, the program says so before it reads anything.
+TEST_F(RenderTest, AnEncoderThatIsNotThereIsToldBeforeTheWorkBegins) {
+  std::filesystem::copy_file(SLABSTREAM_PROGRAM, Path("slabstream"));
+  for (std::vector<std::string> command : {std::vector<std::string>{"render"}, {"turntable", "--frames", "2"}, {"slice"}}) {
+    command.insert(command.begin(), Path("slabstream"));
+    command.insert(command.end(), {"none.nrrd", "--local", "-o", command[1] == "turntable" ? "a%d.png" : "a.png"});
+    const ProgramResult result = RunningProgram(command, directory_).Wait();
+    EXPECT_EQ(result.exit_status, 1) << command[1];
+    ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("pictures cannot be written: libslabstream-pictures.so: ")) << command[1];
+  }
+}
+
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
   const PictureFile picture = Render("ball.png", {"--zoom", "0.001"});
   EXPECT_EQ(picture.width, kPixels);
