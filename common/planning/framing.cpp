@@ -77,9 +77,18 @@ std::optional<Ball> BallOfCut(const FrameRequest& request, const std::vector<Box
   if (!request.clipping.slab || clip.mode != ClipMode::kKeep) return std::nullopt;
   const Camera camera = MakeCamera(request.view, request.size, geometry);
   ViewBox cut(camera, geometry);
-  for (const Box& brick : bricks) {
-    if (cut.Frames(brick)) continue;
+  const auto add = [&](const Box& brick) {
     for (const Vec3& corner : CornersOf(clip, brick)) cut.Add(corner);
+  };
+  // Once the outermost bricks are in, few others lie outside.
+  for (const Vec3& side : {camera.right, camera.up}) {
+    const auto along = [axis = side * geometry.spacing](const Box& brick) { return Dot(axis, MiddleOf(brick)); };
+    const auto [first, last] = std::ranges::minmax_element(bricks, {}, along);
+    add(*first);
+    add(*last);
+  }
+  for (const Box& brick : bricks) {
+    if (!cut.Frames(brick)) add(brick);
   }
   if (cut.empty()) return std::nullopt;
   const double shorter = std::min(camera.width, camera.height);
