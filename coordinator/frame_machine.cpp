@@ -143,7 +143,7 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
   const Duration cost = frame.between_attempts() ? Duration::zero() : now - std::max(frame.attempt_begin(), last_end);
   queue.Settle(frame.request(), cost);
   last_end = now;
-  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   frames.Remove(id);
   for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }
@@ -261,7 +261,7 @@ bool FrameMachine::State::StartNextFrame() {
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
-  actions.emplace_back(ToDatasets(KeepDataset{next->use, next->dataset()->volume().dataset()}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->volume().dataset()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
@@ -284,7 +284,7 @@ void FrameMachine::State::StopAll(const CoordinatorToWorker& goodbye, const std:
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
   for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));
-  actions.emplace_back(ToDatasets(EndDatasets{reason}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, EndDatasets{reason});
   for (const Member& member : roster.members()) SendWorker(member.id, goodbye);
   actions.emplace_back(StopService{});
   stopped = true;

@@ -18,7 +18,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   request.needs_occupancy = NeedsOccupancy(policy);
   request.use = ++last_use;
   queue.Push(std::move(request));
-  actions.emplace_back(ToDatasets(SeekDataset{last_use, message.frame.dataset}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, message.frame.dataset});
 }
 
 void FrameMachine::State::On(const DatasetNews& event) {
@@ -128,7 +128,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
     for (const std::string_view ability : kind->AbilityNames()) renderer.abilities.emplace_back(ability);
     for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
   }
-  actions.emplace_back(ToDatasets(FinishStatus{client, std::move(reply)}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, FinishStatus{client, std::move(reply)});
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& message) {
@@ -164,16 +164,16 @@ void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status
 
 // Of a request whose frame has not begun.
 void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status, RefusedAs as) {
-  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   AnswerFailure(request, status, as);
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: {}", request.submit.request, request.client,
        as == nullptr ? "ends without a frame: dataset " + request.submit.frame.dataset : "is refused", status.message());
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
-  actions.emplace_back(ToDatasets(ForgetClient{client}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, ForgetClient{client});
   if (!clients.Forget(client)) return;
-  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());

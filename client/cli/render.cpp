@@ -143,7 +143,7 @@ Status CheckTurntable(const TurntableOptions& options) {
   } else if (options.frames_per_second) {
     return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
                                                *options.frames_per_second, MovieEndings(), first_output));
-  } else if (Status status = CheckPicturePath(first_output); !status.ok()) {
+  } else if (Status status = CheckCanWritePicture(first_output); !status.ok()) {
     return status;
   }
   return CheckPaths(options.frame, first_output);
@@ -174,7 +174,7 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
 
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
   const auto open_pictures = [&] { return FilesOf(options.frame); };
   const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1);

@@ -12,7 +12,7 @@
 namespace slabstream {
 
 Status RunSlice(const SliceOptions& options) {
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
   SliceRequest slice = options.slice;
   slice.frame.dataset = "-";  // not known yet, and the rest is checked before anything is connected

@@ -5,22 +5,12 @@
 #include <utility>
 
 #include "common/planning/brick_visibility.h"
+#include "common/planning/framing.h"
 #include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {
-namespace {
-
-// A slab is flat: if it faces the view, its picture is framed by its sides, not by a ball round them.
-double RadiusOfSlab(const BrickVisibility::Ball& ball, const FrameRequest& request, const VolumeGeometry& geometry) {
-  const Camera camera = MakeCamera(request.view, request.size, geometry);
-  const auto reach = [&](const Vec3& v) { return Dot(Absolute(v), ball.half_extent); };
-  const double shorter = std::min(camera.width, camera.height);
-  return std::min(ball.radius, std::max(reach(camera.right) * shorter / camera.width, reach(camera.up) * shorter / camera.height));
-}
-
-}  // namespace
 
 Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   const FrameRequest& request = resolved.frame;
@@ -40,8 +30,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   if (view.fit) {
     const BrickVisibility visibility(summary, setup.renderer->DrawnTable(setup.transfer, summary),
                                      LayerBricks(summary, *setup.renderer, setup.looks));
-    const auto ball = visibility.VisibleBall(setup.clip);
-    if (ball) view = FitView(view, geometry, ball->centre, request.clipping.slab ? RadiusOfSlab(*ball, request, geometry) : ball->radius);
+    view = FramedView(request, visibility.VisibleBricks(setup.clip), setup.clip, geometry);
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;

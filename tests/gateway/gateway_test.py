@@ -804,6 +804,14 @@ class StartTest(unittest.TestCase):
         refused = self.programs.run("view", "none", "--no-browser", "--endpoint", endpoint, expect=2).stderr
         self.assertEqual(refused, "slabstream view: SOURCE 'none' is neither a file nor a dataset of the service\n")
 
+    def test_view_without_a_display_says_that_it_opened_no_browser(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        child = self.programs.start("slabstream", "view", "a.nrrd")
+        Gateway(child.stdout.readline().split()[-1])
+        self.assertEqual(child.stdout.readline(), "No browser was opened, because there is no display here: open this address in one.\n")
+        self.assertEqual(child.stdout.readline(), "Ctrl-C ends it.\n")
+        self.assertEqual(self.programs.end(child), 0)
+
     def test_view_says_what_is_missing(self):
         refused = self.programs.run("view", "none.nrrd", "--no-browser", "--endpoint", f"ipc://{self.programs.folder}/none", expect=1)
         self.assertEqual(len(refused.stderr.splitlines()), 1)

@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "common/view/camera.h"
+#include "common/view/clip_corners.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/support/random.h"
@@ -130,6 +133,38 @@ TEST(Clip, KeepsAllOfABoxOnlyIfItKeepsEveryPointRoundIt) {
     }
   }
   EXPECT_GT(whole, 50);
+}
+
+// In every direction no kept point lies beyond the corners, and the corners themselves are kept.
+TEST(Clip, CornersAreThoseOfWhatIsLeftOfABox) {
+  Random random(25);
+  int with_points = 0;
+  for (int i = 0; i < 1000; ++i) {
+    SCOPED_TRACE(random.trace());
+    const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
+    Clipping clipping = RandomClipping(random, geometry);
+    clipping.mode = ClipMode::kKeep;
+    const ClipRegion region = MakeClipRegion(clipping, geometry).value();
+    const Box box = RandomBox(random, geometry.bounds());
+    const std::vector<Vec3> corners = CornersOf(region, box);
+    for (const Vec3& corner : corners) {
+      for (const HalfSpace& side : region.sides) EXPECT_GE(side.Distance(corner), -1e-6);
+    }
+    bool any = false;
+    for (int n = 0; n < 50; ++n) {
+      Vec3 p, direction;
+      for (const Axis axis : kAxes) {
+        p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
+        direction[axis] = random.Real(-1, 1);
+      }
+      if (!region.Keeps(p)) continue;
+      any = true;
+      EXPECT_TRUE(std::ranges::any_of(corners, [&](const Vec3& corner) { return Dot(direction, corner) >= Dot(direction, p) - 1e-6; }));
+    }
+    with_points += any && !region.empty() ? 1 : 0;
+  }
+  EXPECT_GT(with_points, 100);
+  EXPECT_EQ(CornersOf({}, {{1, 2, 3}, {4, 5, 6}}).size(), 8U);
 }
 
 TEST(Clip, DistancesArePhysical) {
