@@ -18,6 +18,7 @@
 #include "client/service/service_state.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
+#include "common/cli/program.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -168,7 +169,8 @@ Status RunView(const ViewOptions& options) {
   const std::string dataset =
       file ? DatasetName(std::filesystem::absolute(options.source.substr(0, options.source.find('?')))) : options.source;
   const std::string url = fmt::format("{}&dataset={}", line->substr(line->find(' ') + 1), dataset);
-  std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url) << std::flush;
+  std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url);
+  if (Status told = FlushOutput(); !told.ok()) return told;
   if (options.browser) OpenBrowser(url);
   return WatchHelpers(*gateway, service);
 }
