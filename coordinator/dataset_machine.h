@@ -57,7 +57,7 @@ struct ClientAsked {
   ClientToDatasets message;
   Bytes payload = {};
 };
-// A request, question or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
+// A request, question, order or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
   PeerToken from = 0;
   CoordinatorToClient answer;
