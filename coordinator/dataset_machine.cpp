@@ -206,7 +206,11 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
   DatasetTable::Entry* const entry = datasets.FindLoad(event.name, event.load);
   if (entry == nullptr) return;
   entry->looks.End();
-  if (!event.changed.ok()) {
+  if (event.changed.status().code() == StatusCode::kResourceExhausted) {
+    // Says nothing about the files: what is loaded stays, and whoever asks again may have more luck.
+    Lose(event.name, event.changed.status(), nullptr);
+    LookAt(event.name);
+  } else if (!event.changed.ok()) {
     FailData(event.name, event.changed.status());
   } else if (*event.changed) {
     Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));

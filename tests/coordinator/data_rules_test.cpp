@@ -117,6 +117,20 @@ TEST_F(DataRules, VoxelsThatAreTheSameAgainStay) {
   EXPECT_EQ(script.machine.sizes().retired, 0U);
 }
 
+TEST_F(DataRules, ALookForWhichThereIsNoMemoryRefusesItsRequestsAlone) {
+  for (const GroupAssignment& group : Begin()) script.Answer(group);
+  Actions actions = script.Client(kOther, Frame(1));
+  actions = Seen(LookOf(actions), Status::ResourceExhausted("checking the files of a dataset: not enough memory"));
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("checking the files of a dataset: not enough memory"));
+  EXPECT_THAT(Of<UnloadDataset>(actions), IsEmpty());
+  EXPECT_EQ(StateOf("block"), DatasetState::kReady) << "its voxels are still good";
+  actions = script.Client(kOther, Frame(2));
+  EXPECT_THAT(HandedOut(Seen(LookOf(actions), false)), SizeIs(1));
+  EXPECT_THAT(script.loads, SizeIs(1));
+}
+
 TEST_F(DataRules, AFileThatCannotBeReadFailsItsRequestsAndIsTriedAgain) {
   for (const GroupAssignment& group : Begin()) script.Answer(group);
   Actions actions = script.Client(kOther, Frame(1));
