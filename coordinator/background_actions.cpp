@@ -30,10 +30,14 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-FoldersSeen LookThrough(const LookAtFolders& action) {
+FoldersSeen LookThrough(const LookAtFolders& action, FolderMemory& memory) {
   FoldersSeen seen;
   for (const std::string& folder : action.folders) {
-    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
+    if (!action.asked_for && memory.IsUnchanged(folder)) {
+      seen.unchanged.insert(folder);
+    } else {
+      seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return memory.Remember(folder, [&] { return ListFolder(folder); }); }));
+    }
   }
   return seen;
 }
@@ -151,7 +155,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
   return Post(
-      looks_, "searching the watched folders", [action] { return News{LookThrough(action)}; },
+      looks_, "searching the watched folders", [action, memory = folders_] { return News{LookThrough(action, *memory)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};

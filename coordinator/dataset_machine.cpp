@@ -49,6 +49,7 @@ void DatasetMachine::State::On(const EndDatasets& event) {
 LookId DatasetMachine::State::Seek(const std::string& name) {
   if (!datasets.IsListed(name)) {
     datasets.Await(name, folder_looks.Want());
+    folders_asked_for = true;
     LookThroughFolders();
     return 0;
   }
@@ -230,7 +231,7 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
 void DatasetMachine::State::LookThroughFolders() {
   if (!folder_looks.MustBegin()) return;
   folder_looks.Begin();
-  actions.emplace_back(LookAtFolders{datasets.folders});
+  actions.emplace_back(LookAtFolders{datasets.folders, std::exchange(folders_asked_for, false)});
 }
 
 // At the folders, if there are any, and the files of what is loaded.

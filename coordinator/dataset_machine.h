@@ -85,6 +85,7 @@ struct DatasetSeen {
 // The end of a LookAtFolders.
 struct FoldersSeen {
   std::map<std::string, Result<FoundData>> folders;
+  std::set<std::string> unchanged = {};  // since the last one
 };
 // The end of a FindDatasets.
 struct DatasetsFound {
@@ -127,9 +128,11 @@ struct LookAtDataset {
   LoadId load = 0;
   std::shared_ptr<const FileStamp> stamp;
 };
-// -> FoldersSeen: what lies in each of these folders.
+// -> FoldersSeen: what lies in each of these folders. Not asked for: it is only time for another look, so folders that the file system says
+// are unchanged need none. One at a time.
 struct LookAtFolders {
   std::set<std::string> folders;
+  bool asked_for = false;
 };
 // -> DatasetsFound: what these arguments of an order mean, and whether it can be read.
 struct FindDatasets {

@@ -331,6 +331,26 @@ class FolderRules : public DataOrders {
   std::vector<std::string> Names() { return NamesOf(script.QueryStatus().datasets); }
 };
 
+TEST_F(FolderRules, WhatIsUnchangedStaysAndOnlyThoseWhoAskHaveItSearched) {
+  Watch({"a.nrrd"});
+  Actions actions = script.Pass(script.config.look_interval);
+  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  EXPECT_FALSE(Of<LookAtFolders>(actions)[0].asked_for);
+  script.Step(FoldersSeen{.folders = {}, .unchanged = {kFolder}});
+  EXPECT_THAT(Names(), ElementsAre("a", "block", "other"));
+  actions = script.Client(kOther, Frame(1, 1, "nonesuch"));
+  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  EXPECT_TRUE(Of<LookAtFolders>(actions)[0].asked_for);
+  SeenFolder(In({"a.nrrd"}));
+  actions = Order(DataAction::kList, {});
+  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  EXPECT_TRUE(Of<LookAtFolders>(actions)[0].asked_for);
+  SeenFolder(In({"a.nrrd"}));
+  actions = script.Pass(script.config.look_interval);
+  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  EXPECT_FALSE(Of<LookAtFolders>(actions)[0].asked_for);
+}
+
 TEST_F(FolderRules, FilesThatComeAndGoAreDatasetsThatComeAndGo) {
   Watch({"a.nrrd"});
   EXPECT_THAT(Names(), ElementsAre("a", "block", "other"));
