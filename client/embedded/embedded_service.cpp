@@ -30,7 +30,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   }
   options.coordinator.client_endpoint = UniqueEndpoint();
   options.coordinator.worker_endpoint = UniqueEndpoint();
-  options.coordinator.slabs_endpoint = UniqueEndpoint();
+  options.coordinator.voxels_endpoint = UniqueEndpoint();
   CoordinatorConfig& machine = options.coordinator.machine;
   machine.worker_timeout = machine.client_timeout = machine.stall_timeout = options.worker.chunk_timeout = kPatience;
   Result<std::unique_ptr<CoordinatorService>> coordinator = CoordinatorService::Start(context, std::move(options.coordinator));

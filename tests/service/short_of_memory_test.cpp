@@ -9,7 +9,7 @@
 #include <new>
 #include <optional>
 
-#include "coordinator/slab_server.h"
+#include "coordinator/voxel_server.h"
 #include "tests/support/random_volume.h"
 
 namespace {
@@ -37,7 +37,7 @@ TEST(ShortOfMemory, AChunkThatCannotBeCutIsTheCoordinatorsOwnTrouble) {
   Random random(1);
   const auto volume = std::make_shared<const Volume>(RandomVolume(random, {300, 70, 60}, ScalarType::kUint8));
   Context context;
-  const std::unique_ptr<SlabServer> server = SlabServer::Start(context, {"inproc://short-of-memory"}, 77).value();
+  const std::unique_ptr<VoxelServer> server = VoxelServer::Start(context, {"inproc://short-of-memory"}, 77).value();
   server->Publish(5, {.volume = volume});
   Socket worker = Socket::Dealer(context).value();
   ASSERT_TRUE(worker.Connect(server->endpoint()).ok());
