@@ -11,6 +11,7 @@
 #include "common/base/any_of.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
+#include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 #include "common/wire/validate_request.h"
@@ -119,9 +120,14 @@ struct Client::Impl {
   bool ExpireQuestions(Time now);                          // true: some have ended
   void FailAll(const std::string& reason);
 
+  // The reason, once the service counts as gone.
+  std::optional<std::string> Loss(Time now) const;
+
   std::string endpoint;
   Socket socket;
   ClientTiming timing;
+  const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
+  bool unreachable = false;  // the last ping could not be queued
   Wakeup wakeup;
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
@@ -145,10 +151,16 @@ void Client::Impl::SendPing(Time now) {
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
   }
-  (void)Send(ping);  // a ping that cannot be queued counts as unanswered
+  unreachable = !Send(ping).ok();  // it counts as unanswered
   pinged[ping.nonce] = std::move(ping.open);
   if (!unanswered_since) unanswered_since = now;
   next_ping = now + timing.ping;
+}
+
+std::optional<std::string> Client::Impl::Loss(Time now) const {
+  if (same_process) return unreachable ? std::optional<std::string>("has ended") : std::nullopt;
+  if (!unanswered_since || now - *unanswered_since < timing.silence) return std::nullopt;
+  return "has not answered for " + Milliseconds(now - *unanswered_since);
 }
 
 bool Client::Impl::Pump(Time limit) {
@@ -157,13 +169,13 @@ bool Client::Impl::Pump(Time limit) {
   Time now = MonotonicNow();
   if (ExpireQuestions(now)) ready = true;
   if (!open.empty() || !questions.empty()) {
-    if (unanswered_since && now - *unanswered_since >= timing.silence) {
-      FailAll("the service at " + endpoint + " has not answered for " + Milliseconds(now - *unanswered_since));
+    if (now >= next_ping) SendPing(now);
+    if (const std::optional<std::string> loss = Loss(now)) {
+      FailAll("the service at " + endpoint + " " + *loss);
       return false;
     }
-    if (now >= next_ping) SendPing(now);
     limit = std::min(limit, next_ping);
-    if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
+    if (unanswered_since && !same_process) limit = std::min(limit, *unanswered_since + timing.silence);
     for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
   }
   if (ready) return false;  // this may be what the caller waits for

@@ -48,8 +48,10 @@ struct ServiceAddress {
 };
 
 struct ClientTiming {
-  Duration ping = std::chrono::seconds(1);     // between pings while requests are open
-  Duration silence = std::chrono::seconds(5);  // without an answer to a ping, the service counts as gone
+  Duration ping = std::chrono::seconds(1);  // between pings while requests are open
+  // Without an answer to a ping for so long, the service counts as gone. One in the same process (inproc) cannot be lost, only slow: it
+  // counts as gone when it has ended.
+  Duration silence = std::chrono::seconds(5);
 };
 
 inline constexpr Duration kAnswerTime = std::chrono::minutes(2);  // for an answer to a question: volumes may have to be loaded first

@@ -30,10 +30,14 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-FoldersSeen Check(const CheckWatchedFolders& action) {
+FoldersSeen Check(const CheckWatchedFolders& action, FolderMemory& memory) {
   FoldersSeen seen;
   for (const std::string& folder : action.folders) {
-    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
+    if (!action.asked_for && memory.IsUnchanged(folder)) {
+      seen.unchanged.insert(folder);
+    } else {
+      seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return memory.Remember(folder, [&] { return ListFolder(folder); }); }));
+    }
   }
   return seen;
 }
@@ -154,7 +158,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CheckDatasetFiles& action) 
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action) {
   return Post(
-      checks_, "searching the watched folders", [action] { return News{Check(action)}; },
+      checks_, "searching the watched folders", [action, memory = folders_] { return News{Check(action, *memory)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};

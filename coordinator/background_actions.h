@@ -17,6 +17,7 @@
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/dataset_machine.h"
+#include "coordinator/folder_memory.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 #include "coordinator/upload_buffer.h"
@@ -79,6 +80,7 @@ class BackgroundActions {
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;  // the planning thread's, but for plans at hand
   VoxelServer& voxels_;
+  const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;   // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans_;  // under way: whether they are dropped
   BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_, counts_{1}, planning_{1};

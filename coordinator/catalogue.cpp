@@ -12,6 +12,7 @@
 
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
+#include "common/wire/limits.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/volume_reader.h"
@@ -128,6 +129,19 @@ Status AddFolder(FoundData& found, const std::string& path) {
   return Status::Ok();
 }
 
+// Those of folders for which the catalogue has no room.
+void LeaveOutMost(FoundData& found) {
+  std::size_t left_out = 0;
+  for (auto next = found.datasets.end(); next != found.datasets.begin() && found.datasets.size() > kMaxListed;) {
+    --next;
+    if (next->second.folder.empty()) continue;
+    next = found.datasets.erase(next);
+    ++left_out;
+  }
+  if (left_out == 0) return;
+  found.complaints.push_back(fmt::format("{} volumes of folders are left out: the catalogue has at most {}", left_out, kMaxListed));
+}
+
 // The files of a source, by its headers.
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   const Result<VolumeSource> source = ParseVolumeSource(data.path);
@@ -236,7 +250,13 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
       note(argument, AddNamed(found, *parsed));
     }
   }
+  if (found.datasets.size() > kMaxListed) {
+    found.errors.push_back(Status::InvalidArgument(
+        fmt::format("{}{} volumes are named, the catalogue has at most {}", prefix, found.datasets.size(), kMaxListed)));
+    return found;
+  }
   for (const auto& [argument, folder] : folders) note(argument, AddFolder(found, folder.path));
+  LeaveOutMost(found);
   return found;
 }
 

@@ -49,6 +49,7 @@ void DatasetMachine::State::On(const EndDatasets& event) {
 CheckId DatasetMachine::State::Seek(const std::string& name) {
   if (!datasets.IsListed(name)) {
     datasets.Await(name, folder_checks.Want());
+    folders_asked_for = true;
     CheckFolders();
     return 0;
   }
@@ -206,7 +207,11 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
   DatasetTable::Entry* const entry = datasets.FindLoad(event.name, event.load);
   if (entry == nullptr) return;
   entry->checks.End();
-  if (!event.changed.ok()) {
+  if (event.changed.status().code() == StatusCode::kResourceExhausted) {
+    // Says nothing about the files: what is loaded stays, and whoever asks again may have more luck.
+    Lose(event.name, event.changed.status(), nullptr);
+    CheckFilesOf(event.name);
+  } else if (!event.changed.ok()) {
     FailData(event.name, event.changed.status());
   } else if (*event.changed) {
     Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));
@@ -226,7 +231,7 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
 void DatasetMachine::State::CheckFolders() {
   if (!folder_checks.MustBegin()) return;
   folder_checks.Begin();
-  actions.emplace_back(CheckWatchedFolders{datasets.folders});
+  actions.emplace_back(CheckWatchedFolders{datasets.folders, std::exchange(folders_asked_for, false)});
 }
 
 // At the folders, if there are any, and the files of what is loaded.

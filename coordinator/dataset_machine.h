@@ -57,7 +57,7 @@ struct ClientAsked {
   ClientToDatasets message;
   Bytes payload = {};
 };
-// A request, question or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
+// A request, question, order or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
   PeerToken from = 0;
   CoordinatorToClient answer;
@@ -85,6 +85,7 @@ struct DatasetSeen {
 // The end of a CheckWatchedFolders.
 struct FoldersSeen {
   std::map<std::string, Result<FoundData>> folders;
+  std::set<std::string> unchanged = {};  // since the last one
 };
 // The end of a FindDatasets.
 struct DatasetsFound {
@@ -127,9 +128,11 @@ struct CheckDatasetFiles {
   LoadId load = 0;
   std::shared_ptr<const FileStamp> stamp;
 };
-// -> FoldersSeen: what lies in each of these folders.
+// -> FoldersSeen: what lies in each of these folders. Not asked for: it is only time for another check, so folders that the file system
+// says are unchanged need none. One at a time.
 struct CheckWatchedFolders {
   std::set<std::string> folders;
+  bool asked_for = false;
 };
 // -> DatasetsFound: what these arguments of an order mean, and whether it can be read.
 struct FindDatasets {

@@ -65,8 +65,9 @@ struct DatasetMachine::State {
   std::map<UploadId, OpenUpload> uploads;  // at most one of each client
   UploadId last_upload = 0;
   CheckCounter folder_checks;
-  Time next_round;                            // when the folders are looked through, if there are any
-  std::set<std::string> complaints;           // about what lies in the folders
+  Time next_round;                                          // when the folders are looked through, if there are any
+  std::map<std::string, std::set<std::string>> complaints;  // about what lies in each folder
+  bool folders_asked_for = false;                           // by a client, since the last check began
   std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
   RefusedRequests refused;                    // questions and uploads, and what could not be decoded
 
@@ -133,7 +134,7 @@ struct DatasetMachine::State {
   void AddData(const std::string& name, const DataSource& source);
   void RemoveData(const std::string& name, const std::string& why);
   void StopWatching(const std::string& folder);
-  void MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
+  std::size_t MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
   Status Remove(const std::vector<std::string>& items);
   Status Reload(const std::vector<std::string>& items);
   Status AddFound(const FoundData& found);

@@ -225,11 +225,25 @@ void FrameMachine::State::Advance() {
   DismissWorkers();
 }
 
+// A frame on trial waits until what the others have under way is over.
+bool FrameMachine::State::AwaitsTrial(const RunningFrame& frame) {
+  return frames.OnTrial() == &frame && frame.between_attempts() && frames.OthersWait(frame);
+}
+
+// Workers that hold what they have accumulated of other frames.
+std::set<WorkerId> FrameMachine::State::HoldersOf(const RunningFrame& frame) const {
+  std::set<WorkerId> holders;
+  for (const RunningFrame& other : frames) {
+    if (&other != &frame && other.groups_done() > 0) holders.insert(other.display());
+  }
+  return holders;
+}
+
 void FrameMachine::State::BeginAttempts() {
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
-    if (!frame.AttemptDue(now)) continue;
-    Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
+    if (!frame.AttemptDue(now) || AwaitsTrial(frame)) continue;
+    Status status = frame.BeginAttempt(roster.Refill(frame.roster()), HoldersOf(frame), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
       const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.resolved->summary);
@@ -307,8 +321,8 @@ Time FrameMachine::State::NextWake() {
   queue.ForEach(consider);
   for (const RunningFrame& frame : frames) {
     consider(frame.request());
-    const bool waits_for_workers = roster.staying() == 0 && frame.between_attempts();
-    if (!waits_for_workers) next = std::min(next, frame.NextWake());
+    const bool waits_for_others = (roster.staying() == 0 && frame.between_attempts()) || AwaitsTrial(frame);
+    if (!waits_for_others) next = std::min(next, frame.NextWake());
   }
   if (!roster.empty()) return std::min(next, next_ping);
   // Often enough that a coordinator that was held up notices how long.

@@ -119,6 +119,8 @@ struct FrameMachine::State {
   void Expire();
   void Advance();
   void BeginAttempts();
+  bool AwaitsTrial(const RunningFrame& frame);
+  std::set<WorkerId> HoldersOf(const RunningFrame& frame) const;
   void DismissWorkers();
   Time EndOfWait(const OpenRequest& request) const;
   Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;

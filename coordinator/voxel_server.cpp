@@ -21,6 +21,12 @@ std::string Text(const Box& box) {
   return fmt::format("[{}, {}) x [{}, {}) x [{}, {})", box.begin.x, box.end.x, box.begin.y, box.end.y, box.begin.z, box.end.z);
 }
 
+// What this process lacks, no worker lacks: another one would get the same answer, and the same one may get a better answer later.
+Status AsWorkersSee(const Status& failure) {
+  if (failure.code() != StatusCode::kResourceExhausted && failure.code() != StatusCode::kInternal) return failure;
+  return Status::Unavailable("the coordinator cannot send voxels: " + failure.message());
+}
+
 }  // namespace
 
 Result<std::unique_ptr<VoxelServer>> VoxelServer::Start(Context& context, const Place& place, Epoch epoch, Codec codec) {
@@ -152,7 +158,7 @@ void VoxelServer::Answer(const Incoming& incoming) {
   });
   if (served.ok()) return;
   complaints_.Warning(served.message());
-  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, served};
+  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, AsWorkersSee(served)};
   (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
 }
 

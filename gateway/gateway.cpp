@@ -62,8 +62,10 @@ class Gateway::Impl : public HttpApplication {
           fmt::format("--listen {} is not loopback: it needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
     }
     if (Status status = CheckToken(options_.token); !status.ok()) return status;
+    HttpLimits limits = options_.limits;
+    if (!options_.proxy_origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
     Result<std::unique_ptr<HttpServer>> server =
-        HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, options_.limits, *this);
+        HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, limits, *this);
     if (!server.ok()) return server.status();
     server_ = *std::move(server);
     port_ = server_->port();

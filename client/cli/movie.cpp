@@ -37,7 +37,13 @@ Status Movie::Put(const Picture& picture, const FrameJob&) {
   CHECK(picture.final && picture.size == options_.shape.size);
   const Result<ComposedPicture> composed = ComposedPicture::Make(picture.image, picture.size, options_.format, picture.geometry);
   if (!composed.ok()) return composed.status();
-  return OfFile(encoder_->Put(MovieFrame(*composed)));
+  last_ = MovieFrame(*composed);
+  return OfFile(encoder_->Put(last_));
+}
+
+Status Movie::Skip(const FrameJob&) {
+  CHECK(!last_.empty());
+  return OfFile(encoder_->Put(last_));
 }
 
 Status Movie::Finish() {

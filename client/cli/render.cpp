@@ -19,6 +19,7 @@
 #include "client/movie/turntable.h"
 #include "client/request/request_options.h"
 #include "common/base/files.h"
+#include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
@@ -69,10 +70,10 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
 }
 
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up.
+// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight) {
+                                                int in_flight, std::vector<Status>* failures) {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
@@ -84,6 +85,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.in_flight = in_flight;
   loop.pictures = pictures->get();
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
+  loop.failures = failures;
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
@@ -177,7 +179,8 @@ Status RunRender(const RenderOptions& options) {
   if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
   const auto open_pictures = [&] { return FilesOf(options.frame); };
-  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1);
+  const auto frames =
+      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -191,14 +194,19 @@ Status RunTurntable(const TurntableOptions& options) {
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
   if (!jobs.ok()) return jobs.status();
   const auto open_pictures = [&] { return OpenPictures(options); };
-  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight);
-  if (!frames.ok()) return frames.status();
+  std::vector<Status> failures;
+  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight, &failures);
+  const std::string who = "slabstream turntable";
+  if (!frames.ok()) {
+    failures.push_back(frames.status());
+    return ReportAll(who, failures);
+  }
   const ImageSize size = options.frame.request.size;
   const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)
                                                          : fmt::format("into {}", options.output.movie);
   std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
                            size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
-  return Status::Ok();
+  return ReportAll(who, failures);
 }
 
 }  // namespace slabstream

@@ -17,6 +17,7 @@
 #include "client/service/service_state.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
+#include "common/cli/program.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -177,7 +178,8 @@ Status RunView(const ViewOptions& options) {
     const Status opened = OpenBrowser(url);
     if (!opened.ok()) std::cout << fmt::format("No browser was opened, because {}: open this address in one.\n", opened.message());
   }
-  std::cout << "Ctrl-C ends it.\n" << std::flush;
+  std::cout << "Ctrl-C ends it.\n";
+  if (Status told = FlushOutput(); !told.ok()) return told;
   return WatchHelpers(*gateway, service);
 }
 

@@ -203,7 +203,7 @@ void Fields(auto& io, Is<KeysOrder> auto& m) {
   using P = v1::KeysOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kRevoke);
-  io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  if (m.action == KeysAction::kRotate) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Bytes("key", m.key, &P::key, &P::mutable_key, 0, kMaxKeyBytes);
 }
 

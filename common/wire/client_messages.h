@@ -193,7 +193,7 @@ enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3 };
 struct KeysOrder {
   std::uint64_t nonce = 0;
   KeysAction action = KeysAction::kList;
-  Role role = Role::kClient;  // kRotate: whose file gets a new key
+  Role role = Role::kClient;  // kRotate: whose file gets a new key; does not travel with other actions
   std::string key;            // kRevoke: a public one
   friend bool operator==(const KeysOrder&, const KeysOrder&) = default;
 };

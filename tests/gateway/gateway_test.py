@@ -336,7 +336,9 @@ class HttpTest(WithService):
         port = own.rsplit(":")[-1]
         for headers, status in [
             ({"Host": own}, 200), ({"Host": "localhost:" + port}, 200), ({"Host": "localhost:1"}, 200), ({"Host": "evil.example"}, 403),
-            ({"Host": "127.0.0.1.evil.example"}, 403), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
+            ({"Host": "127.0.0.1.evil.example"}, 403), ({"Host": f"127.0.0.1:{port}.evil.example"}, 403),
+            ({"Host": "localhost:evil.example"}, 403), ({"Host": f"[::1]:{port}.evil.example"}, 403), ({"Host": "127.0.0.1:65536"}, 403),
+            ({"Host": "[::1]:1"}, 200), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
             ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403)]:
             self.assertEqual(self.gateway.request("/livez", headers=headers)[0], status, headers)
             if status == 200:
@@ -671,6 +673,39 @@ class SlowReaderTest(WithService):
         # The largest picture is 64 MB of floats, the others 23: a few are on their way, but not 1200.
         self.assertLess(most - before, 400 << 20)
         self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
+
+
+class CrowdTest(WithService):
+    """Those who open connections and send next to nothing."""
+
+    def drip(self, source):
+        connection = self.gateway.connect(source=source)
+        self.addCleanup(connection.close)
+        connection.sendall(f"GET /livez HTTP/1.1\r\nHost: {self.gateway.authority}\r\nX: ".encode())
+        return connection
+
+    def answers(self, connection):
+        connection.sendall(b"x\r\nConnection: close\r\n\r\n")
+        try:
+            return connection.recv(65536).startswith(b"HTTP/1.1 200 ")
+        except OSError:
+            return False
+
+    def test_the_slowest_make_room_for_others(self):
+        page = self.page()
+        first = self.drip("127.0.0.1")
+        many = [self.drip("127.0.0.2") for _ in range(300)]
+        # As many as one address may have, and those are the latest of it: nobody waits for the others.
+        self.assertEqual(self.gateway.request("/livez")[0], 200)
+        self.assertIn(b'refusals_total{reason="connections"} 172\n', self.gateway.request("/metrics")[2])
+        self.assertFalse(self.answers(many[0]))
+        self.assertTrue(self.answers(many[-1]))
+        # Others fill what is left. The next ones take the places of the address that has most.
+        crowd = [self.drip(f"127.0.0.{3 + i % 100}") for i in range(200)]
+        self.assertEqual(self.gateway.request("/livez")[0], 200)
+        self.assertTrue(self.answers(first))
+        self.assertTrue(all(self.answers(connection) for connection in crowd))
+        page.final(page.view({"dataset": "a", "size": 16}))
 
 
 class ServiceLossTest(unittest.TestCase):

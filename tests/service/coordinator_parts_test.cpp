@@ -16,11 +16,13 @@
 #include "common/mesh/mesh_part.h"
 #include "common/transport/socket.h"
 #include "common/volume/sphere.h"
+#include "common/wire/limits.h"
 #include "common/wire/payload.h"
 #include "coordinator/answer_question.h"
 #include "coordinator/box_samples.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/dataset_id.h"
+#include "coordinator/folder_memory.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/voxel_server.h"
 #include "data/volume_io/volume_reader.h"
@@ -343,6 +345,46 @@ TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {
   EXPECT_EQ(found.datasets.at("head").folder, directory_.string());
   EXPECT_EQ(found.datasets.at("other").folder, "");
   EXPECT_FALSE(LoadSource(found.datasets.at("head")).ok()) << "loading a file that is no volume fails when it is tried, not before";
+}
+
+TEST_F(CatalogueTest, WhatAFolderHoldsBeyondTheLimitIsLeftOut) {
+  const std::string folder = directory_ / "many";
+  std::filesystem::create_directory(folder);
+  for (std::size_t i = 0; i < kMaxListed + 3; ++i) std::ofstream(folder + "/f" + std::to_string(i) + ".nrrd");
+  const FoundData found = FindData({"last=" + folder + "/f0.nrrd", folder});
+  EXPECT_THAT(found.errors, testing::IsEmpty());
+  EXPECT_EQ(found.datasets.size(), kMaxListed);
+  EXPECT_TRUE(found.datasets.contains("last"));
+  EXPECT_THAT(found.complaints, testing::ElementsAre("4 volumes of folders are left out: the catalogue has at most 65536"));
+}
+
+TEST_F(CatalogueTest, AFolderThatNobodyTouchesNeedsNoSearch) {
+  const std::string folder = directory_ / "watched";
+  std::filesystem::create_directory(folder);
+  std::ofstream(folder + "/a.nrrd") << "a";
+  FolderMemory memory;
+  const auto search = [&] { return ListFolder(folder); };
+  const auto age = [&] {
+    std::filesystem::last_write_time(folder, std::filesystem::file_time_type::clock::now() - std::chrono::minutes(1));
+  };
+  EXPECT_FALSE(memory.IsUnchanged(folder));
+  ASSERT_TRUE(memory.Remember(folder, search).ok());
+  EXPECT_FALSE(memory.IsUnchanged(folder)) << "it has just changed: another change might have the same time";
+  age();
+  ASSERT_TRUE(memory.Remember(folder, search).ok());
+  EXPECT_TRUE(memory.IsUnchanged(folder));
+  std::ofstream(folder + "/b.nrrd") << "b";
+  EXPECT_FALSE(memory.IsUnchanged(folder));
+  age();
+  ASSERT_TRUE(memory.Remember(folder, search).ok());
+  EXPECT_TRUE(memory.IsUnchanged(folder));
+  std::filesystem::remove(folder + "/a.nrrd");
+  EXPECT_FALSE(memory.IsUnchanged(folder));
+  // What is in a subfolder, or behind a link, changes without a trace.
+  std::filesystem::create_directory(folder + "/slices");
+  age();
+  ASSERT_TRUE(memory.Remember(folder, search).ok());
+  EXPECT_FALSE(memory.IsUnchanged(folder));
 }
 
 TEST_F(CatalogueTest, BadArgumentsAreNamed) {
