@@ -103,8 +103,8 @@ BackgroundActions::AtOnce BackgroundActions::Post(BackgroundTasks& tasks, const 
   return failed(begun);
 }
 
-Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action) {
-  const Result<LoadedSource> loaded = LoadSource(action.source);
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const std::function<void(int percent)>& tell) {
+  const Result<LoadedSource> loaded = LoadSource(action.source, tell);
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
@@ -127,7 +127,10 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
   return Post(
-      loads_, barrier.c_str(), [action] { return Load(action); },
+      loads_, barrier.c_str(),
+      [action, inbox = inbox_] {
+        return Load(action, [&](int percent) { inbox->Post(News{DatasetReading{action.name, action.load, percent}}); });
+      },
       [name = action.name, load = action.load](const Status& why) {
         return DatasetFailed{name, load, why};
       });

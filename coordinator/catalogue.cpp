@@ -14,6 +14,7 @@
 #include "common/frame/frame_request.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
+#include "data/volume_io/read_progress.h"
 #include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -140,9 +141,11 @@ Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   return files;
 }
 
-Result<LayeredVolume> ReadSource(const DataSource& data) {
-  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<void(int)>& tell) {
+  Result<VolumeSource> source = ParseVolumeSource(data.path);
   if (!source.ok()) return source.status();
+  ReadProgress progress(tell);
+  source->options.progress = &progress;
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
@@ -265,7 +268,7 @@ void CheckFiles(FoundData& found) {
   }
 }
 
-Result<LoadedSource> LoadSource(const DataSource& source) {
+Result<LoadedSource> LoadSource(const DataSource& source, const std::function<void(int percent)>& tell) {
   if (source.load) {
     Result<LayeredVolume> loaded = source.load();
     if (!loaded.ok()) return loaded.status();
@@ -278,7 +281,7 @@ Result<LoadedSource> LoadSource(const DataSource& source) {
     const Result<FileStamp> stamp = StampFiles(*std::move(files));
     if (!stamp.ok()) return stamp.status();
     AwaitRest(*stamp);
-    Result<LayeredVolume> read = ReadSource(source);
+    Result<LayeredVolume> read = ReadSource(source, tell);
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed) continue;
     if (!read.ok()) return read.status();

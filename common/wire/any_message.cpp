@@ -144,6 +144,7 @@ std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, 
     case Envelope::kSubmitFrame: return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
     case Envelope::kSummaryQuery: return OrderRefused{.nonce = envelope.summary_query().nonce(), .status = why};
     case Envelope::kSampleQuery: return OrderRefused{.nonce = envelope.sample_query().nonce(), .status = why};
+    case Envelope::kStatisticsQuery: return OrderRefused{.nonce = envelope.statistics_query().nonce(), .status = why};
     case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
     case Envelope::kAddVolume: return OrderRefused{.nonce = envelope.add_volume().nonce(), .status = why};
     case Envelope::kVolumePart: return OrderRefused{.nonce = envelope.volume_part().nonce(), .status = why};
