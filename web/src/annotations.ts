@@ -77,6 +77,8 @@ function crosshair(geometry: Geometry, width: number, height: number, { at, line
   return svg("path", { class: "crosshair", d: `M${x - reach} ${y}H${x - gap}M${x + gap} ${y}H${x + reach}M${x} ${y - reach}V${y - gap}M${x} ${y + gap}V${y + reach}` });
 }
 
+const LETTER = 8; // pixels across, on average
+
 // A measurement, as lines between points of the page. In a slice those that lie beside it are faint.
 function drawnMeasure(geometry: Geometry, width: number, height: number, { measure, label }: DrawnMeasure, slice: Annotations["slice"]): SVGElement {
   const { kind, points } = measure, corners = kind === "box" ? cornersOfBox(measure) : points;
@@ -89,8 +91,9 @@ function drawnMeasure(geometry: Geometry, width: number, height: number, { measu
   const line = (indices: readonly number[]): string => indices.map((index, i) => `${i === 0 ? "M" : "L"}${(at[index] as number[]).map(c => c.toFixed(1)).join(" ")}`).join("");
   const path = kind === "box" ? BOX_EDGES.map(line).join("") : line(points.map((_, i) => i));
   const [x, y] = kind === "angle" ? at[Math.min(1, at.length - 1)] as [number, number] : kind === "box" ? [Math.max(...at.map(p => p[0])), Math.min(...at.map(p => p[1]))] : at[at.length - 1] as [number, number];
+  const fits = x + 8 + LETTER * label.length < width;
   return svg("g", { class: `measure${beside ? " beside" : ""}` }, svg("path", { d: path, class: "halo" }), svg("path", { d: path }),
-    ...(kind === "box" ? [] : at.map(([cx, cy]) => svg("circle", { cx, cy, r: 3 }))), ...(beside ? [] : [svg("text", { x: x + 8, y: y - 6 }, label)]));
+    ...(kind === "box" ? [] : at.map(([cx, cy]) => svg("circle", { cx, cy, r: 3 }))), ...(beside ? [] : [svg("text", { x: fits ? x + 8 : x - 8, y: y - 6, "text-anchor": fits ? "start" : "end" }, label)]));
 }
 
 const LEGEND_ROW = 18, LEGEND_MOST = 14;
