@@ -651,6 +651,10 @@ class PageTest(unittest.TestCase):
         for at in ((-30, 0), (0, 0), (0, -30)):
             click("coronal", *at)
         self.assertEqual(viewer.until("document.querySelector('[data-measure=angle] .measure-text')?.textContent"), "90.0°")
+        viewer.keys("d")
+        viewer.keys(Keys.ENTER, Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ENTER, pane="axial")
+        viewer.until("[...document.querySelectorAll('[data-measure=distance] .measure-text')].pop().textContent === '4.0 mm'")
+        viewer.find("[aria-label='Remove measurement 3']").click()
         viewer.keys(Keys.ESCAPE)
         click("axial", 5, 5)
         viewer.until("location.hash.includes('at=')")  # a click moves the cross-hair again

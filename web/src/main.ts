@@ -236,6 +236,7 @@ class Page {
       ] },
       { title: "Measure", keys: [
         ...MEASURE_KINDS.map(({ kind, name, key }) => ({ keys: [key], label: key.toUpperCase(), does: name, run: () => this.measure(kind) })),
+        { keys: [], label: "Enter", does: "Point at the cross-hair, in a slice", run: () => undefined },
         { keys: ["Escape"], label: "Esc", does: "Put the tool away", run: () => this.measuring.take(null) },
       ] },
       { title: "Page", keys: [

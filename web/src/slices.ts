@@ -125,6 +125,7 @@ export class Slices {
       if (pane.shown && event.deltaY !== 0) this.moveBy(pane.shown.frame.header.geometry.forward, Math.sign(event.deltaY), event.timeStamp);
     }, { passive: false });
     canvas.addEventListener("keydown", event => {
+      if (event.key === "Enter" && this.measuring.tool) return this.measuring.place(this.at());
       const geometry = pane.shown?.frame.header.geometry, far = event.shiftKey ? 10 : 1;
       if (!geometry) return;
       const move = { ArrowRight: geometry.right, ArrowLeft: scale(geometry.right, -1), ArrowUp: geometry.up, ArrowDown: scale(geometry.up, -1), PageUp: scale(geometry.forward, -1), PageDown: geometry.forward }[event.key];
