@@ -63,14 +63,16 @@ struct OpenQuestion {
 
 struct Event {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> what;
+  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply,
+               DataReply>
+      what;
 };
 
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(Event event) {
   const auto what =
       Overloaded{[](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
-                 [](AnyOf<SummaryReply, SampleReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
+                 [](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
                    return QuestionReply(std::move(reply));
                  },
                  [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
@@ -206,18 +208,18 @@ bool Client::Impl::Receive() {
 }
 
 void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
-  const auto handle =
-      Overloaded{[&](const FrameProgress& progress) {
-                   if (open.contains(progress.request)) events.push_back({progress.request, progress});
-                 },
-                 [&](FrameReply& reply) { Handle(reply, payload); },
-                 [&](const FrameFailed& failed) { End(failed.request, failed.status); },
-                 [&](const ClientPong& pong) { Handle(pong); },
-                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
-                 [&](AnyOf<SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
-                   End(reply.nonce, std::move(reply));
-                 },
-                 [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
+  const auto handle = Overloaded{
+      [&](const FrameProgress& progress) {
+        if (open.contains(progress.request)) events.push_back({progress.request, progress});
+      },
+      [&](FrameReply& reply) { Handle(reply, payload); },
+      [&](const FrameFailed& failed) { End(failed.request, failed.status); },
+      [&](const ClientPong& pong) { Handle(pong); },
+      [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+      [&](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
+        End(reply.nonce, std::move(reply));
+      },
+      [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
 }
 
@@ -403,6 +405,12 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
     return Status::DataLoss("the service answered " + std::to_string(reply->samples.size()) + " of " + std::to_string(count) + " points");
   }
   return std::move(reply->samples);
+}
+
+Result<BoxStatistics> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline) {
+  Result<StatisticsReply> reply = impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box}, deadline));
+  if (!reply.ok()) return reply.status();
+  return reply->statistics;
 }
 
 Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Await<StatusReply>(impl_->Ask(StatusQuery{}, timeout)); }

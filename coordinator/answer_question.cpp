@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/percentiles.h"
 #include "coordinator/probe/pick.h"
 
@@ -37,6 +38,12 @@ Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
   SampleReply reply{.nonce = query.nonce};
   for (const Vec3& point : query.points) reply.samples.push_back(SampleAt(dataset.volume, *dataset.summary, point));
   return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
+  Result<BoxStatistics> statistics = StatisticsIn(dataset.volume.voxels, dataset.summary->description, query.box);
+  if (!statistics.ok()) return statistics.status();
+  return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = *statistics});
 }
 
 Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {

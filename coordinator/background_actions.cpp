@@ -118,8 +118,8 @@ BackgroundActions::AtOnce BackgroundActions::PostResult(BackgroundTasks& tasks, 
       tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
 }
 
-Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action) {
-  const Result<LoadedSource> loaded = LoadSource(action.source);
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const std::function<void(int percent)>& tell) {
+  const Result<LoadedSource> loaded = LoadSource(action.source, tell);
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
@@ -142,7 +142,11 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
   return Post(
-      loads_, barrier.c_str(), [action] { return Load(action); }, EndOf<DatasetFailed>(action.name, action.load));
+      loads_, barrier.c_str(),
+      [action, inbox = inbox_] {
+        return Load(action, [&](int percent) { inbox->Post(News{DatasetReading{action.name, action.load, percent}}); });
+      },
+      EndOf<DatasetFailed>(action.name, action.load));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {

@@ -69,7 +69,7 @@ class BackgroundActions {
     VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
-  static Result<News> Load(const LoadDataset& action);
+  static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(BackgroundTasks& tasks, const char* what, auto make, auto failed);
   // Where the event holds a result: that of `find`, or the error.

@@ -15,6 +15,7 @@
 #include "common/wire/limits.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
+#include "data/volume_io/read_progress.h"
 #include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -154,9 +155,11 @@ Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   return files;
 }
 
-Result<LayeredVolume> ReadSource(const DataSource& data) {
-  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<void(int)>& tell) {
+  Result<VolumeSource> source = ParseVolumeSource(data.path);
   if (!source.ok()) return source.status();
+  ReadProgress progress(tell);
+  source->options.progress = &progress;
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
@@ -285,7 +288,7 @@ void CheckFiles(FoundData& found) {
   }
 }
 
-Result<LoadedSource> LoadSource(const DataSource& source) {
+Result<LoadedSource> LoadSource(const DataSource& source, const std::function<void(int percent)>& tell) {
   if (source.load) {
     Result<LayeredVolume> loaded = source.load();
     if (!loaded.ok()) return loaded.status();
@@ -298,7 +301,7 @@ Result<LoadedSource> LoadSource(const DataSource& source) {
     const Result<FileStamp> stamp = StampFiles(*std::move(files));
     if (!stamp.ok()) return stamp.status();
     AwaitRest(*stamp);
-    Result<LayeredVolume> read = ReadSource(source);
+    Result<LayeredVolume> read = ReadSource(source, tell);
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed) continue;
     if (!read.ok()) return read.status();

@@ -76,7 +76,7 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   if (entry.state == DatasetState::kReady) {
     news.uses[id] = DatasetReady{entry.id, entry.summary, entry.checks.IsOver(use.check)};
   } else {
-    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading};
+    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
   }
 }
 
@@ -124,6 +124,12 @@ void DatasetMachine::State::LoadData(const std::string& name) {
   const LoadId load = datasets.BeginLoad(name, now);
   actions.emplace_back(LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source});
   TellUses(name);
+}
+
+void DatasetMachine::State::On(const DatasetReading& event) {
+  if (!datasets.IsLoading(event.name, event.load)) return;
+  datasets.Find(event.name)->percent = event.percent;
+  TellUses(event.name);
 }
 
 void DatasetMachine::State::On(const DatasetLoaded& event) {

@@ -71,6 +71,11 @@ struct DatasetLoaded {
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
 };
+struct DatasetReading {  // not the end yet
+  std::string name;
+  LoadId load = 0;
+  int percent = 0;  // of its samples that have been read, [1, 100]
+};
 struct DatasetFailed {
   std::string name;
   LoadId load = 0;
@@ -108,8 +113,8 @@ struct UploadFinished {
   Result<DataSource> source;
 };
 struct DatasetTick {};
-using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetFailed, DatasetSeen, FoldersSeen,
-                                  DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
+using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetReading, DatasetFailed, DatasetSeen,
+                                  FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
 
 // ---- actions
 // -> DatasetLoaded or DatasetFailed

@@ -89,6 +89,7 @@ struct DatasetMachine::State {
   void On(const ClientAsked& event);
   void On(const BadRequest& event);
   void On(const DatasetLoaded& event);
+  void On(const DatasetReading& event);
   void On(const DatasetFailed& event);
   void On(const DatasetSeen& event);
   void On(const FoldersSeen& event);
@@ -102,6 +103,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const DataOrder& message, const Bytes&);
   void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);

@@ -30,14 +30,14 @@ void FrameMachine::State::On(const DatasetNews& event) {
     if (const auto* awaited = std::get_if<DatasetAwaited>(&news->second)) {
       const bool first = std::holds_alternative<OpenRequest::Submitted>(request.state);
       request.state = OpenRequest::AwaitsDataset{};  // DropPlans drops a plan that it had
-      if (first) SendQueued(request, awaited->loading);
+      if (first || awaited->percent > 0) SendQueued(request, awaited);
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
                request.dataset() != nullptr && request.dataset()->volume().dataset() == ready.dataset) {
       request.dataset()->seen = ready.seen;
     } else if (const Status suits = Resolve(request, ready); suits.ok()) {
-      SendQueued(request, false);
+      SendQueued(request, nullptr);
     } else {
       lost[request.use] = {suits, &RefusedRequests::bad_request};
     }
@@ -136,11 +136,13 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& mess
   StopAll(Stop{.epoch = config.epoch}, "the service was shut down");
 }
 
-void FrameMachine::State::SendQueued(const OpenRequest& request, bool loading) {
+void FrameMachine::State::SendQueued(const OpenRequest& request, const DatasetAwaited* awaited) {
+  const bool loading = awaited != nullptr && awaited->loading;
   SendClient(request.client, FrameProgress{.request = request.submit.request,
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
-                                           .workers = std::uint32_t(roster.staying())});
+                                           .workers = std::uint32_t(roster.staying()),
+                                           .read_percent = loading ? std::uint32_t(awaited->percent) : 0});
 }
 
 void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {

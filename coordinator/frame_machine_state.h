@@ -107,7 +107,7 @@ struct FrameMachine::State {
   bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
   Status WithinQuota(PeerToken client) const;
   Status Resolve(OpenRequest& request, const DatasetReady& ready) const;
-  void SendQueued(const OpenRequest& request, bool loading);
+  void SendQueued(const OpenRequest& request, const DatasetAwaited* awaited);  // null: its dataset is there
   void EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload);
   // `as`: it is refused; else it has failed.
   void FailRequest(const OpenRequest& request, const Status& status, RefusedAs as = nullptr);

@@ -214,6 +214,8 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/histogram"] = {.handle = bind(questions_, &QuestionRequests::Histogram)};
     routes["/api/v1/labels"] = {.handle = bind(questions_, &QuestionRequests::Labels)};
     routes["/api/v1/value"] = {.handle = bind(questions_, &QuestionRequests::Value)};
+    routes["/api/v1/profile"] = {.handle = bind(questions_, &QuestionRequests::Profile)};
+    routes["/api/v1/statistics"] = {.handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.takes_post = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.handle = bind(questions_, &QuestionRequests::Transfer)};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};

@@ -227,6 +227,25 @@ class HttpTest(WithService):
         outside = self.ask("value", dataset="b", at="-1,1e9,0")
         self.assertEqual((outside["inside"], outside["voxel"], outside["value"]), (False, None, None))
 
+    def test_profiles_and_boxes(self):
+        profile = self.ask("profile", **{"dataset": "b", "from": "-2.25,9.5,9.5", "to": "9.25,9.5,9.5", "samples": 24})
+        self.assertEqual((profile["length"], profile["from"], profile["to"]), (11.5, [-2.25, 9.5, 9.5], [9.25, 9.5, 9.5]))
+        self.assertEqual(len(profile["values"]), 24)
+        self.assertEqual(profile["values"][:4], [None] * 4, "the volume begins at -0.5")
+        for i, value in list(enumerate(profile["values"]))[4:]:  # every 0.5
+            self.assertAlmostEqual(value, self.ask("value", dataset="b", at=f"{-2.25 + 0.5 * i},9.5,9.5")["interpolated"], 6)
+        between = [self.ask("value", dataset="b", at=f"{x},9,9") for x in (3, 3.5, 4)]
+        self.assertAlmostEqual(between[1]["interpolated"], (between[0]["value"] + between[2]["value"]) / 2, 9)
+
+        values = [self.ask("value", dataset="b", at=f"{x},9,{z}")["value"] for x in range(3, 7) for z in (9, 10)]
+        box = self.ask("statistics", dataset="b", box="2.5:6,8.5:9.4,9:10")
+        mean = sum(values) / len(values)
+        self.assertEqual((box["voxels"], box["non_finite"], box["least"], box["largest"]), (8, 0, min(values), max(values)))
+        self.assertAlmostEqual(box["mean"], mean, 9)
+        self.assertAlmostEqual(box["deviation"], (sum((value - mean) ** 2 for value in values) / len(values)) ** 0.5, 9)
+        empty = self.ask("statistics", dataset="b", box="100:101,0:1,0:1")
+        self.assertEqual(empty, {"voxels": 0, "non_finite": 0, "mean": None, "deviation": None, "least": None, "largest": None})
+
     def test_pixels_show_points(self):
         # The ball's surface, seen along +y: from its geometry by hand.
         options = {"dataset": "b", "renderer": "zbuffer", "size": 100}
@@ -267,6 +286,11 @@ class HttpTest(WithService):
             ("value", {"dataset": "a", "at": "1,2"}, 400, "1,2"),
             ("value", {"dataset": "a", "at": "1,2,nan"}, 400, "nan"),
             ("value", {"dataset": "x" * 300, "at": "1,2,3"}, 400, "300 bytes"),
+            ("profile", {"dataset": "a", "from": "0,0,0"}, 400, "to is missing"),
+            ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
+            ("statistics", {"dataset": "a"}, 400, "box is missing"),
+            ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),
+            ("statistics", {"dataset": "nonesuch", "box": "0:1,0:1,0:1"}, 404, "nonesuch"),
             ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
             ("pick", {"dataset": "a", "x": 33, "y": 1, "size": 32}, 400, "out of range"),
             ("pick", {"dataset": "a", "x": 3, "y": 1, "zoom": -1}, 400, "zoom"),

@@ -5,16 +5,12 @@ import { button, choice, colorField, iconButton, numberField, slider } from "./c
 import { copyText, download, h, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
+import { presetChoices } from "./offers";
 import { editPoints } from "./point_gestures";
 import { LOOK } from "./state";
 import { type ColorMap, colorAt, hexOf, opacityAt, parseParaView, rangeOf, rgbOf, toParaView } from "./transfer";
 import { clamp, rounded } from "./vec";
 
-export const PRESETS = ["auto", "gray-ramp", "window", "opaque", "ct-bone", "ct-soft-tissue", "ct-skin", "mri-brain", "mri-head", "angiography", "simulation"] as const;
-const PRESET_NAMES: Record<string, string> = {
-  "auto": "Automatic", "gray-ramp": "Grey ramp", "window": "Window", "opaque": "Opaque", "ct-bone": "CT bone", "ct-soft-tissue": "CT soft tissue",
-  "ct-skin": "CT skin", "mri-brain": "MRI brain", "mri-head": "MRI head", "angiography": "Angiography", "simulation": "Simulation",
-};
 const MOST_BYTES = 1 << 20;
 
 interface Selected { kind: "color" | "opacity"; index: number }
@@ -82,7 +78,7 @@ export class TransferEditor {
 
   refresh(): void {
     const { state } = this.context.store, map = this.source.current(), scale = this.scale(map), custom = state.map !== null;
-    this.presets.fill([...PRESETS.map(name => [name, PRESET_NAMES[name] ?? name] as const), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
+    this.presets.fill([...presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
     this.presets.set(custom ? "" : state.preset);
     const height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
     this.plot.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
