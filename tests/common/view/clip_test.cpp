@@ -157,7 +157,7 @@ TEST(Clip, CornersAreThoseOfWhatIsLeftOfABox) {
         p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
         direction[axis] = random.Real(-1, 1);
       }
-      if (!region.Keeps(p)) continue;
+      if (!Keeps(region, p)) continue;
       any = true;
       EXPECT_TRUE(std::ranges::any_of(corners, [&](const Vec3& corner) { return Dot(direction, corner) >= Dot(direction, p) - 1e-6; }));
     }
