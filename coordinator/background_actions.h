@@ -1,5 +1,5 @@
 // BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets or
-// take memory for uploads, up to kLooksAtOnce look at files, two answer questions about voxels, one counts occupied voxels, one plans. None
+// take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, one counts occupied voxels, one plans. None
 // waits for another. An exception in one fails only what it was doing. What they find comes back as events for the machines.
 //
 // One thread uses an object of this class: the one that runs the machines.
@@ -20,8 +20,8 @@
 #include "coordinator/dataset_machine.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
-#include "coordinator/slab_server.h"
 #include "coordinator/upload_buffer.h"
+#include "coordinator/voxel_server.h"
 
 namespace slabstream {
 
@@ -32,19 +32,19 @@ using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const Clas
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
-inline constexpr std::size_t kLooksAtOnce = 4;  // so one file system that does not answer leaves the others alone
+inline constexpr std::size_t kChecksAtOnce = 4;  // so one file system that does not answer leaves the others alone
 
 class BackgroundActions {
  public:
-  // `slabs` serves the voxels of the datasets that are loaded, and must outlive this.
-  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, SlabServer& slabs);
+  // `voxels` serves the voxels of the datasets that are loaded, and must outlive this.
+  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, VoxelServer& voxels);
 
   // Each begins an action. An event: the action is over already, or could not begin.
   using AtOnce = std::optional<CoordinatorEvent>;
   AtOnce Perform(LoadDataset& action);
   AtOnce Perform(UnloadDataset& action);
-  AtOnce Perform(LookAtDataset& action);
-  AtOnce Perform(LookAtFolders& action);
+  AtOnce Perform(CheckDatasetFiles& action);
+  AtOnce Perform(CheckWatchedFolders& action);
   AtOnce Perform(FindDatasets& action);
   AtOnce Perform(AnswerQuestion& action);
   AtOnce Perform(BeginUpload& action);
@@ -66,7 +66,7 @@ class BackgroundActions {
   struct News {
     CoordinatorEvent event;
     DatasetId dataset = 0;
-    SlabServer::Samples samples = {};
+    VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
   static Result<News> Load(const LoadDataset& action);
@@ -77,10 +77,10 @@ class BackgroundActions {
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;  // the planning thread's, but for plans at hand
-  SlabServer& slabs_;
+  VoxelServer& voxels_;
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;   // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans_;  // under way: whether they are dropped
-  BackgroundTasks loads_{kLoadsAtOnce}, looks_{kLooksAtOnce}, answers_, counts_{1}, planning_{1};
+  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_, counts_{1}, planning_{1};
 };
 
 }  // namespace slabstream

@@ -96,7 +96,7 @@ class SimulatedService {
   void Perform(auto& action) { conditions_.Perform(action); }
 
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
-  void Perform(Node, AnyOf<ConnectSlabs, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups> auto&) {}
+  void Perform(Node, AnyOf<ConnectVoxels, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups> auto&) {}
   void Perform(Node node, CancelRender& action);
   void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
   void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) { Order(node, action); }

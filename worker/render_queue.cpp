@@ -6,14 +6,14 @@ namespace slabstream {
 
 void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
                       const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions) {
-  const Box voxels = SlabBox(placement.box, *setup);
-  waiting_[{key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+  const Box voxels = PaddedBox(placement.box, *setup);
+  waiting_[{key, rank}] = {placement, setup, hidden, boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
   std::erase_if(waiting_, [&](const auto& entry) {
     if (entry.first.first != key) return false;
-    slabs_.Release(entry.second.slab);
+    boxes_.Release(entry.second.padded);
     return true;
   });
   if (running_ && running_->key == key && !running_->dropped) {
@@ -24,22 +24,22 @@ void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
 
 void RenderQueue::StartNext(WorkerActions& actions) {
   if (running_) return;
-  const auto next = std::ranges::find_if(waiting_, [&](const auto& entry) { return slabs_.complete(entry.second.slab); });
+  const auto next = std::ranges::find_if(waiting_, [&](const auto& entry) { return boxes_.complete(entry.second.padded); });
   if (next == waiting_.end()) return;
   running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
   waiting_.erase(next);
-  actions.push_back(StartRender{running_->key, running_->rank, slabs_.key(running_->job.slab), running_->job.placement, running_->job.setup,
-                                running_->job.hidden, running_->image});
+  actions.push_back(StartRender{running_->key, running_->rank, boxes_.key(running_->job.padded), running_->job.placement,
+                                running_->job.setup, running_->job.hidden, running_->image});
 }
 
 std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions) {
   if (!running_ || running_->image != done.image) return std::nullopt;
   const Running job = *std::exchange(running_, std::nullopt);
-  const SlabFetcher::Generation slab = job.job.slab;
-  if (done.status.ok()) slabs_.Rendered(slab);
-  slabs_.SetBytes(slab, done.slab_bytes);  // a cancelled frame derives data too
+  const BoxFetcher::Generation padded = job.job.padded;
+  if (done.status.ok()) boxes_.Rendered(padded);
+  boxes_.SetBytes(padded, done.box_bytes);  // a cancelled frame derives data too
   if (job.dropped) {
-    slabs_.Release(slab);
+    boxes_.Release(padded);
     actions.push_back(ReleaseImage{done.image});
     return std::nullopt;
   }
@@ -48,26 +48,26 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   report.group = job.key.group;
   report.rank = job.rank;
   report.box = job.job.placement.id;
-  const SlabFetcher::FetchReport fetched = slabs_.TakeReport(slab);
+  const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
   report.voxel_bytes = fetched.voxel_bytes;
   if (fetched.voxel_bytes > 0) {
     AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
   }
-  slabs_.Release(slab);
+  boxes_.Release(padded);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
   return report;
 }
 
-std::vector<SlabFetcher::Generation> RenderQueue::SlabsInOrder() const {
-  std::vector<SlabFetcher::Generation> slabs;
-  for (const auto& [name, job] : waiting_) slabs.push_back(job.slab);
-  return slabs;
+std::vector<BoxFetcher::Generation> RenderQueue::BoxesInOrder() const {
+  std::vector<BoxFetcher::Generation> boxes;
+  for (const auto& [name, job] : waiting_) boxes.push_back(job.padded);
+  return boxes;
 }
 
-std::set<GroupKey> RenderQueue::GroupsOn(SlabFetcher::Generation slab) const {
+std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation padded) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.slab == slab) groups.insert(name.first);
+    if (job.padded == padded) groups.insert(name.first);
   }
   return groups;
 }

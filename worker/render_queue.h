@@ -1,5 +1,5 @@
 // RenderQueue: the ranks that this worker has yet to render, in order of frame, group and rank, and the one that it renders now. The first
-// rank with a complete slab goes next; only one is rendered at a time. Each job pins its slab.
+// rank with a complete padded box goes next; only one is rendered at a time. Each job pins its padded box.
 #pragma once
 
 #include <map>
@@ -9,26 +9,26 @@
 #include <utility>
 #include <vector>
 
-#include "worker/slab_fetcher.h"
+#include "worker/box_fetcher.h"
 
 namespace slabstream {
 
 class RenderQueue {
  public:
   // Both must outlive the queue.
-  RenderQueue(SlabFetcher& slabs, ImageNames& names) : slabs_(slabs), names_(names) {}
+  RenderQueue(BoxFetcher& boxes, ImageNames& names) : boxes_(boxes), names_(names) {}
 
   void Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
            const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions);
   void DropGroup(const GroupKey& key, WorkerActions& actions);  // its running render is cancelled
-  void StartNext(WorkerActions& actions);                       // if nothing is rendered and a slab is complete
+  void StartNext(WorkerActions& actions);                       // if nothing is rendered and a padded box is complete
 
   // Call when the running render ends. Returns the executor's report with identities and fetch figures filled in, or nothing if the group
   // was dropped (the image is then released).
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions);
 
-  std::vector<SlabFetcher::Generation> SlabsInOrder() const;  // of waiting jobs
-  std::set<GroupKey> GroupsOn(SlabFetcher::Generation slab) const;
+  std::vector<BoxFetcher::Generation> BoxesInOrder() const;  // of waiting jobs
+  std::set<GroupKey> GroupsOn(BoxFetcher::Generation padded) const;
   std::size_t size() const { return waiting_.size() + (running_ ? 1 : 0); }
 
  private:
@@ -36,7 +36,7 @@ class RenderQueue {
     Placement placement;
     std::shared_ptr<const FrameSetup> setup;
     std::shared_ptr<const OcclusionMask> hidden;
-    SlabFetcher::Generation slab = 0;
+    BoxFetcher::Generation padded = 0;
   };
   struct Running {
     GroupKey key;
@@ -46,7 +46,7 @@ class RenderQueue {
     bool dropped = false;
   };
 
-  SlabFetcher& slabs_;
+  BoxFetcher& boxes_;
   ImageNames& names_;
   std::map<std::pair<GroupKey, Rank>, Job> waiting_;
   std::optional<Running> running_;
