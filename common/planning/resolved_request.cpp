@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "common/base/find_named.h"
+#include "common/classification/color_maps.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {
@@ -93,6 +95,10 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
+  const auto* const preset = std::get_if<std::string>(&request.transfer.choice);
+  if (request.clipping.slab && preset != nullptr && FindNamed(NamedColorMaps(), *preset) != nullptr) {
+    transfer->opacities = {{double(summary.range.min), 1}};
+  }
   Brighten(request.brightness, *transfer);
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
   if (!clip.ok()) return clip.status();

@@ -2,8 +2,12 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import os
 import pathlib
+import shutil
+import subprocess
+import sys
 import tempfile
 from typing import Any
 
@@ -180,6 +184,21 @@ class Image:
                     raise
         except OSError as error:
             raise Unavailable(f"cannot write '{file}': {error.strerror}") from None
+
+    def show(self) -> None:
+        """Shows the picture: in a notebook below the cell, elsewhere in the desktop's viewer of pictures, from a file that stays until the
+        system clears its temporary files."""
+        ipython = sys.modules.get("IPython")  # a notebook has loaded it
+        if ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
+            importlib.import_module("IPython.display").display(self)
+            return
+        opener = next((found for found in map(shutil.which, ("xdg-open", "open")) if found is not None), None)
+        if opener is None or not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")):
+            raise Unavailable("there is no desktop to show the picture on; save() writes it to a file")
+        with tempfile.NamedTemporaryFile(prefix="slabstream-", suffix=".png", delete=False) as file:
+            file.write(self.png(8))
+        subprocess.Popen([opener, file.name], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                         start_new_session=True)
 
     def _repr_png_(self) -> bytes:
         """For notebooks."""

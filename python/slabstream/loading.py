@@ -93,7 +93,7 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     """Brings a volume to a service, for any number of pictures.
 
     `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
-    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too; row i of `direction` is where the array's axis i points to,
+    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.

@@ -238,13 +238,14 @@ TEST_F(DataOrders, WhatIsAddedIsThereAtOnceAndWhatIsRemovedIsNot) {
   EXPECT_EQ(script.QueryStatus().refused.unknown_dataset, 1U);
 }
 
-TEST_F(DataOrders, TimesOfAFileAreOrderedByTheirName) {
+TEST_F(DataOrders, TimesOfAFileAreOrderedByTheirNumbers) {
   FoundData times;
-  for (const char* name : {"beat@0", "beat@1", "beat@10"}) times.datasets[name] = DataSource("/data/beat.npy", "");
+  for (const char* name : {"beat@0", "beat@2", "beat@10"}) times.datasets[name] = DataSource("/data/beat.npy", "");
   EXPECT_THAT(Listed(Found(Order(DataAction::kAdd, {"beat=/data/beat.npy?time=0:2"}), times)),
-              ElementsAre("beat@0", "beat@1", "beat@10", "block", "other"));
-  EXPECT_THAT(Refused(Order(DataAction::kRemove, {"bea"})).message(), HasSubstr("no dataset \"bea\": the catalogue has beat@0, beat@1"));
-  EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat@1"})), ElementsAre("beat@0", "beat@10", "block", "other"));
+              ElementsAre("beat@0", "beat@2", "beat@10", "block", "other"));
+  EXPECT_THAT(Refused(Order(DataAction::kRemove, {"bea"})).message(),
+              HasSubstr("no dataset \"bea\": the catalogue has beat@0, beat@2, beat@10"));
+  EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat@2"})), ElementsAre("beat@0", "beat@10", "block", "other"));
   EXPECT_THAT(Listed(Order(DataAction::kReload, {"beat"})), ElementsAre("beat@0", "beat@10", "block", "other"));
   EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat", "beat@0"})), ElementsAre("block", "other"));
 }

@@ -11,6 +11,7 @@ import os
 import shutil
 import sys
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -21,6 +22,7 @@ import slabstream as ss  # noqa: E402
 from slabstream import drafts, schema  # noqa: E402
 from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
 from slabstream.options import COMMANDS  # noqa: E402
+from slabstream.volumes import check_spacing  # noqa: E402
 
 
 def load_update():
@@ -320,6 +322,25 @@ class Requests(unittest.TestCase):
             with self.subTest(given=given), self.assertRaises(ss.InvalidArgument) as caught:
                 slice_drafts_of("a", given)
             self.assertTrue(str(caught.exception).startswith(sentence), str(caught.exception))
+
+
+class Names(unittest.TestCase):
+    def test_presets_are_those_of_the_command_line(self) -> None:
+        presets = ss.presets()
+        self.assertIn("mri-head", presets)
+        self.assertIn("bones", presets["ct-bone"])
+
+    def test_one_number_is_a_spacing(self) -> None:
+        self.assertEqual(check_spacing(2), check_spacing((2, 2, 2)))
+        self.assertEqual(check_spacing(np.float32(0.5)), (0.5, 0.5, 0.5))
+        self.assertRaises(ss.InvalidArgument, check_spacing, 0)
+        self.assertRaises(ss.InvalidArgument, check_spacing, (1, 2))
+
+    def test_without_a_desktop_show_says_what_to_do(self) -> None:
+        image = ss.Image(np.zeros((2, 2, 4), np.float32))
+        with unittest.mock.patch.dict(os.environ, {"DISPLAY": "", "WAYLAND_DISPLAY": ""}), self.assertRaises(ss.Unavailable) as caught:
+            image.show()
+        self.assertIn("save()", str(caught.exception))
 
 
 class Pictures(unittest.TestCase):
