@@ -892,6 +892,7 @@ class PageTest(unittest.TestCase):
         viewer.save(SHOTS, "narrow-settings")
 
     def test_nothing_is_asked_of_other_hosts(self):
+        self.driver.get_log("browser")  # forgets what pages of other tests said
         viewer = self.viewer(layout="quad", machine=1)
         viewer.settled()
         viewer.keys("k")

@@ -79,8 +79,11 @@ function crosshair(geometry: Geometry, width: number, height: number, { at, line
 
 const LETTER = 8; // pixels across, on average
 
+// A slice through this point, half as thick on either side.
+interface Cut { at: Vec3; half: number }
+
 // A measurement, as lines between points of the page. In a slice those that lie beside it are faint.
-function drawnMeasure(geometry: Geometry, width: number, height: number, { measure, label }: DrawnMeasure, slice: Annotations["slice"]): SVGElement {
+function drawnMeasure(geometry: Geometry, width: number, height: number, { measure, label }: DrawnMeasure, slice: Cut | undefined): SVGElement {
   const { kind, points } = measure, corners = kind === "box" ? cornersOfBox(measure) : points;
   const at = corners.map(p => project(geometry, width, height, p));
   let beside = false;
@@ -111,7 +114,7 @@ export interface LegendEntry { name: string; color: string }
 interface Crosshair { at: Vec3; lines: boolean }
 export interface Annotations {
   marker: boolean; scaleBar: boolean; sides: boolean; crosshair: Crosshair | null; measures: readonly DrawnMeasure[]; legend: readonly LegendEntry[];
-  slice?: { at: Vec3; half: number }; // through this point, half as thick on either side: measurements beside it are faint
+  slice?: Cut; // measurements beside it are faint
 }
 
 // Lies over a pane. While a view turns, most of it stays; only the parts that change are made anew.
