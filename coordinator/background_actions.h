@@ -11,13 +11,13 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <variant>
 #include <vector>
 
 #include "common/base/background_tasks.h"
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/dataset_machine.h"
+#include "coordinator/folder_memory.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 #include "coordinator/upload_buffer.h"
@@ -69,15 +69,18 @@ class BackgroundActions {
     VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
-  static Result<News> Load(const LoadDataset& action);
+  static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(BackgroundTasks& tasks, const char* what, auto make, auto failed);
+  // Where the event holds a result: that of `find`, or the error.
+  AtOnce PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end);
 
   const std::shared_ptr<Mailbox<News>> inbox_ = std::make_shared<Mailbox<News>>();  // tasks that outlive this share it
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;  // the planning thread's, but for plans at hand
   VoxelServer& voxels_;
+  const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;   // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans_;  // under way: whether they are dropped
   BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_, counts_{1}, planning_{1};

@@ -54,7 +54,17 @@ std::size_t FramesInFlight::Room(std::size_t workers) const {
   return frames - std::min(frames, frames_.size());
 }
 
+RunningFrame* FramesInFlight::OnTrial() {
+  const auto frame = std::ranges::find_if(frames_, &RunningFrame::has_suspects);
+  return frame == frames_.end() ? nullptr : &*frame;
+}
+
+bool FramesInFlight::OthersWait(const RunningFrame& frame) const {
+  return std::ranges::any_of(frames_, [&](const RunningFrame& other) { return &other != &frame && other.waiting(); });
+}
+
 FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
+  if (RunningFrame* const tried = OnTrial()) return tried->CanHandOut() ? Choice{Step::kHandOut, tried} : Choice{};
   const FrameWindow window = Window(workers);
   std::uint32_t unfinished = 0;
   for (const RunningFrame& frame : frames_) unfinished += frame.unfinished_groups();

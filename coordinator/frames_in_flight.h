@@ -26,6 +26,10 @@ class FramesInFlight {
   };
   // What `workers` workers should be given next: a group of a frame that runs, another frame, or nothing for now.
   Choice Next(std::size_t workers);
+  // The oldest frame that has suspects: until it has none, nothing else is handed out or started. Null: there is none.
+  RunningFrame* OnTrial();
+  // Whether any frame but this one waits for workers.
+  bool OthersWait(const RunningFrame& frame) const;
   // How many more frames `workers` workers may have under way.
   std::size_t Room(std::size_t workers) const;
   // Whether the workers' memory has room for a frame of this plan beside those that run.

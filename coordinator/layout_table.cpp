@@ -56,11 +56,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   }
   const bool known = learnt != nullptr && learnt->cost.any();
   LayoutRequest make{.summary = request.summary,
-                     .transfer = &request.volume->transfer(),
+                     .volume = request.volume,
                      .policy = &policy,
-                     .renderer = request.volume->renderer(),
-                     .clip = &request.volume->clip(),
-                     .looks = &request.volume->looks(),
                      .slots = request.slots,
                      .known = {.occupied = request.occupied.get()}};
   std::optional<WorkField> cost;

@@ -28,33 +28,31 @@ double RenderSeconds(std::span<const RankReport> reports) {
 }  // namespace
 
 PolicyTable::Kind PolicyTable::KindOf(const PlanRequest& request) {
-  const FrameRequest& frame = request.frame;
+  const FrameRequest& frame = request.resolved->frame;
   return {.projection = frame.view.projection,
-          .traversal_axis = MakeCamera(frame.view, frame.size, request.summary->description.geometry).traversal_axis,
+          .traversal_axis = MakeCamera(frame.view, frame.size, request.resolved->summary->description.geometry).traversal_axis,
           .zoom_octave = std::ilogb(frame.view.zoom),
           .size = frame.size,
           .parameters = frame.parameters};
 }
 
 PolicyTable::Key PolicyTable::KeyOf(const PlanRequest& request) {
-  return {request.volume, SettledPolicy(request.frame, request.summary->description.geometry), std::uint32_t(request.roster.slots.size())};
+  return {request.resolved->volume, request.resolved->frame.policy, std::uint32_t(request.roster.slots.size())};
 }
 
-Result<ChosenPolicy> PolicyTable::Choose(const PlanRequest& request, LayoutTable& layouts, Entry& entry, const Policy& open,
-                                         const ResolvedPolicy* now) {
-  const std::optional<WorkField> cost = entry.by_cost ? layouts.KnownCost(request.volume) : std::nullopt;
-  FrameRequest frame = request.frame;
-  frame.policy = open;
-  const Result<PolicyChoice> choice = ChoosePolicy({.frame = &frame,
-                                                    .summary = request.summary.get(),
-                                                    .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
-                                                    .slots = entry.key.slots,
-                                                    .machine = &entry.machine,
-                                                    .render_scale = entry.render_scale,
-                                                    .now = now,
-                                                    .least_gain = kRevisitGain});
-  if (!choice.ok()) return choice.status();
-  const ChosenPolicy chosen{choice->policy, choice->prediction, entry.render_scale};
+ChosenPolicy PolicyTable::Choose(const PlanRequest& request, const FrameSetup& setup, LayoutTable& layouts, Entry& entry,
+                                 const Policy& open, const ResolvedPolicy* now) {
+  const std::optional<WorkField> cost = entry.by_cost ? layouts.KnownCost(request.resolved->volume) : std::nullopt;
+  const PolicyChoice choice = ChoosePolicy({.open = &open,
+                                            .resolved = request.resolved.get(),
+                                            .setup = &setup,
+                                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
+                                            .slots = entry.key.slots,
+                                            .machine = &entry.machine,
+                                            .render_scale = entry.render_scale,
+                                            .now = now,
+                                            .least_gain = kRevisitGain});
+  const ChosenPolicy chosen{choice.policy, choice.prediction, entry.render_scale};
   const Kind kind = KindOf(request);
   entry.choices.remove_if([&](const Choice& same) { return same.kind == kind; });
   entry.choices.push_front({kind, chosen, entry.frames_seen});
@@ -62,15 +60,14 @@ Result<ChosenPolicy> PolicyTable::Choose(const PlanRequest& request, LayoutTable
   return chosen;
 }
 
-Result<ChosenPolicy> PolicyTable::Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts) {
+ChosenPolicy PolicyTable::Find(const PlanRequest& request, const FrameSetup& setup, const MachineModel& machine, LayoutTable& layouts) {
   Key key = KeyOf(request);
   const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end() || found->machine != machine) {
     if (found != entries_.end()) entries_.erase(found);
     Entry entry{.key = std::move(key), .machine = machine};
-    entry.by_cost = layouts.KnowsCost(request.volume);
-    Result<ChosenPolicy> chosen = Choose(request, layouts, entry, entry.key.asked, nullptr);
-    if (!chosen.ok()) return chosen;
+    entry.by_cost = layouts.KnowsCost(request.resolved->volume);
+    ChosenPolicy chosen = Choose(request, setup, layouts, entry, entry.key.asked, nullptr);
     entries_.push_front(std::move(entry));
     KeepFirst(entries_, kMaxKept);
     return chosen;
@@ -78,25 +75,24 @@ Result<ChosenPolicy> PolicyTable::Find(const PlanRequest& request, const Machine
   entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = entries_.front();
   const ResolvedPolicy holds = entry.choices.front().chosen.policy;
-  if (!entry.by_cost && layouts.KnowsCost(request.volume)) {
+  if (!entry.by_cost && layouts.KnowsCost(request.resolved->volume)) {
     entry.by_cost = true;
     entry.render_scale = 1;  // costs are seconds now
     entry.frames_seen = 0;
-    entry.choices.clear();
-    Result<ChosenPolicy> chosen = Choose(request, layouts, entry, entry.key.asked, &holds);
-    if (!chosen.ok()) entries_.pop_front();
+    ChosenPolicy chosen = Choose(request, setup, layouts, entry, entry.key.asked, &holds);
+    KeepFirst(entry.choices, 1);
     return chosen;
   }
   const auto choice = std::ranges::find(entry.choices, KindOf(request), &Choice::kind);
   if (choice == entry.choices.end()) {
     Policy open = AskFor(holds);
     open.combine = entry.key.asked.combine;
-    return Choose(request, layouts, entry, open, nullptr);
+    return Choose(request, setup, layouts, entry, open, nullptr);
   }
   const int seen = entry.frames_seen;
   const int due =
       seen < kMostFramesAPrediction ? int(std::bit_floor(unsigned(seen))) : seen / kMostFramesAPrediction * kMostFramesAPrediction;
-  if (choice->made_after < due) return Choose(request, layouts, entry, AskFor(choice->chosen.policy), nullptr);
+  if (choice->made_after < due) return Choose(request, setup, layouts, entry, AskFor(choice->chosen.policy), nullptr);
   entry.choices.splice(entry.choices.begin(), entry.choices, choice);
   return choice->chosen;
 }

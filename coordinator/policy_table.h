@@ -9,13 +9,11 @@
 #pragma once
 
 #include <list>
-#include <memory>
 #include <optional>
 #include <span>
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
-#include "common/volume/occupancy_grid.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/tuning/choose_policy.h"
@@ -37,8 +35,7 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
 
   // The policy for the frame of `request`, which leaves a choice. `machine`: of its workers. `layouts`: the source of measured costs.
-  // Errors as of ChoosePolicy.
-  Result<ChosenPolicy> Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
+  ChosenPolicy Find(const PlanRequest& request, const FrameSetup& setup, const MachineModel& machine, LayoutTable& layouts);
 
   // Learns from a finished frame, if it had a prediction.
   void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
@@ -74,8 +71,8 @@ class PolicyTable {
   };
   static Kind KindOf(const PlanRequest& request);
   static Key KeyOf(const PlanRequest& request);
-  static Result<ChosenPolicy> Choose(const PlanRequest& request, LayoutTable& layouts, Entry& entry, const Policy& open,
-                                     const ResolvedPolicy* now);
+  static ChosenPolicy Choose(const PlanRequest& request, const FrameSetup& setup, LayoutTable& layouts, Entry& entry, const Policy& open,
+                             const ResolvedPolicy* now);
 
   std::list<Entry> entries_;  // most recently used first
 };

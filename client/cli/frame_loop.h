@@ -23,13 +23,16 @@ struct FrameLoopOptions {
   int in_flight = 1;
   PictureSink* pictures = nullptr;  // where they go; null: nowhere
   bool keep_reports = false;
+  // Where frames go that fail though others do not, with their numbers and outputs: the loop goes on with the next one. A failure before
+  // the first picture and the third one in a row end it all the same. Null: each does.
+  std::vector<Status>* failures = nullptr;
   bool progress = false;  // on stderr
   std::string label;      // begins each line of progress
 };
 
 // Renders `jobs`; pictures are put while the next frames render. At most in_flight frames are open, and at most as many more wait to be put
-// or are being put: so a slow sink stops requests, and pictures do not pile up. The records are in the order of the jobs. The first
-// failure cancels the open frames and is returned; Ctrl-C does the same with Cancelled.
+// or are being put: so a slow sink stops requests, and pictures do not pile up. The records of the pictures are in the order of the jobs. A
+// failure that ends the loop cancels the open frames and is returned; Ctrl-C does the same with Cancelled.
 Result<std::vector<FrameRecord>> RenderFrames(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options);
 
 }  // namespace slabstream

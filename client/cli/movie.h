@@ -1,8 +1,10 @@
 // Movie: where the frames of a sequence go that become one movie in a file.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "client/cli/picture_sink.h"
 #include "client/image_io/composed_picture.h"
@@ -33,6 +35,7 @@ class Movie : public PictureSink {
 
   bool in_order() const override { return true; }
   Status Put(const Picture& picture, const FrameJob& job) override;
+  Status Skip(const FrameJob& job) override;  // the frame before it stays for as long
   Status Finish() override;
   void Abandon() override { encoder_->Abandon(); }
 
@@ -43,6 +46,7 @@ class Movie : public PictureSink {
   const MovieOptions options_;
   OutputFile file_;
   const std::unique_ptr<MovieEncoder> encoder_;
+  std::vector<std::byte> last_;  // the frame that was put last
 };
 
 }  // namespace slabstream

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
-#include <vector>
 
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"

@@ -3,13 +3,11 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
-#include "client/image_io/image_writer.h"
 #include "client/request/slice_request.h"
 #include "client/service/service_choice.h"
 #include "common/base/time.h"

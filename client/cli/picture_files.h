@@ -17,6 +17,7 @@ class PictureFiles : public PictureSink {
 
   bool in_order() const override { return false; }
   Status Put(const Picture& picture, const FrameJob& job) override;
+  Status Skip(const FrameJob&) override { return Status::Ok(); }
   Status Finish() override { return Status::Ok(); }
   void Abandon() override {}  // files wait for nobody
 

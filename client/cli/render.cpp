@@ -1,7 +1,6 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iostream>
@@ -9,7 +8,6 @@
 #include <memory>
 #include <optional>
 #include <utility>
-#include <variant>
 
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
@@ -26,7 +24,6 @@
 #include "common/base/files.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
-#include "common/planning/frame_plan.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
 
@@ -88,10 +85,10 @@ void WarnOf(Client& client, const FrameRequest& request, const FrameRecord& fram
 }
 
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up.
+// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight) {
+                                                int in_flight, std::vector<Status>* failures) {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
@@ -105,6 +102,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.in_flight = in_flight;
   loop.pictures = pictures->get();
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
+  loop.failures = failures;
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
@@ -166,7 +164,7 @@ Status CheckTurntable(const TurntableOptions& options) {
   } else if (options.frames_per_second) {
     return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
                                                *options.frames_per_second, MovieEndings(), first_output));
-  } else if (Status status = CheckPicturePath(first_output); !status.ok()) {
+  } else if (Status status = CheckCanWritePicture(first_output); !status.ok()) {
     return status;
   }
   return CheckPaths(options.frame, first_output);
@@ -197,10 +195,11 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
 
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
   const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key); };
-  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1);
+  const auto frames =
+      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -214,14 +213,19 @@ Status RunTurntable(const TurntableOptions& options) {
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
   if (!jobs.ok()) return jobs.status();
   const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
-  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight);
-  if (!frames.ok()) return frames.status();
+  std::vector<Status> failures;
+  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight, &failures);
+  const std::string who = "slabstream turntable";
+  if (!frames.ok()) {
+    failures.push_back(frames.status());
+    return ReportAll(who, failures);
+  }
   const ImageSize size = options.frame.request.size;
   const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)
                                                          : fmt::format("into {}", options.output.movie);
   std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
                            size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
-  return Status::Ok();
+  return ReportAll(who, failures);
 }
 
 }  // namespace slabstream

@@ -88,7 +88,7 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();
   opened.service_ = *std::move(service);
-  Result<Client> client = Client::Connect(*opened.context_, opened.service_->endpoint());
+  Result<Client> client = opened.service_->Connect();
   if (!client.ok()) return client.status();
   opened.client_ = std::make_unique<Client>(*std::move(client));
   return opened;

@@ -36,7 +36,7 @@ void WarnOf(Client& client, const SliceRequest& slice, const FrameRequest& frame
 }  // namespace
 
 Status RunSlice(const SliceOptions& options) {
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
   if (Status status = CheckCanDraw(options.slice.format.annotations); !status.ok()) return status;
   SliceRequest slice = options.slice;

@@ -12,7 +12,7 @@
 #include "client/image_io/ink.h"
 #include "common/classification/color_maps.h"
 #include "common/mesh/lattice.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 
 namespace slabstream {
 namespace {

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -18,6 +17,7 @@
 #include "client/service/service_state.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
+#include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
 #include "data/layers/layer_reader.h"
 #include "data/volume_io/read_options.h"
@@ -117,11 +117,16 @@ Result<std::string> EndpointOfUp(Helper& up) {
   return line->substr(from, line->find(' ', from) - from);
 }
 
-void OpenBrowser(const std::string& url) {
-  const char *x11 = std::getenv("DISPLAY"), *wayland = std::getenv("WAYLAND_DISPLAY");
+bool IsSet(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != 0;
+}
+
+Status OpenBrowser(const std::string& url) {
+  if (!IsSet("DISPLAY") && !IsSet("WAYLAND_DISPLAY")) return Status::Unavailable("there is no display here");
   const std::string opener = ProgramInPath("xdg-open");
-  if ((x11 == nullptr && wayland == nullptr) || opener.empty()) return;
-  (void)Child::Start({.command = {opener, url}, .log_path = "/dev/null", .outlives_us = true});
+  if (opener.empty()) return Status::NotFound("there is no xdg-open in $PATH (Debian package xdg-utils)");
+  return Child::Start({.command = {opener, url}, .log_path = "/dev/null", .outlives_us = true}).status();
 }
 
 // Until Ctrl-C (Ok), or one of the children ends.
@@ -195,8 +200,13 @@ Status RunView(const ViewOptions& options) {
   const std::string url =
       fmt::format("{}&dataset={}{}{}", line->substr(line->find(' ') + 1), dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
                   options.layers.overlay.empty() ? "" : "&overlay=1");
-  std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url) << std::flush;
-  if (options.browser) OpenBrowser(url);
+  std::cout << fmt::format("{} is at {}\n", dataset, url);
+  if (options.browser) {
+    const Status opened = OpenBrowser(url);
+    if (!opened.ok()) std::cout << fmt::format("No browser was opened, because {}: open this address in one.\n", opened.message());
+  }
+  std::cout << "Ctrl-C ends it.\n";
+  if (Status told = FlushOutput(); !told.ok()) return told;
   return WatchHelpers(*gateway, service);
 }
 

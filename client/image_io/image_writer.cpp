@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -80,7 +79,10 @@ Result<const PictureEncoder*> FindEncoder() {
   static const Result<const PictureEncoder*> encoder = []() -> Result<const PictureEncoder*> {
     void* const module = dlopen("libslabstream-pictures.so", RTLD_NOW | RTLD_LOCAL);
     void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
-    if (entry == nullptr) return Status::Unavailable(fmt::format("pictures cannot be written: {}", dlerror()));
+    if (entry == nullptr) {
+      return Status::Unavailable(fmt::format(
+          "pictures cannot be written: {} (libslabstream-pictures.so lies beside the program and needs libopenimageio2.4)", dlerror()));
+    }
     return reinterpret_cast<PictureEncoderEntry>(entry)();
   }();
   return encoder;
@@ -118,6 +120,11 @@ std::string FirstLine(const std::string& reason) {
 Status CheckPicturePath(const std::string& path) {
   if (TypeOf(path) != FileType::kOther) return Status::Ok();
   return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
+}
+
+Status CheckCanWritePicture(const std::string& path) {
+  const Status status = CheckPicturePath(path);
+  return status.ok() ? FindEncoder().status() : status;
 }
 
 Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,

@@ -31,6 +31,10 @@ inline constexpr char kRecordName[] = "slabstream";
 // InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
 
+// The same, and Unavailable where libslabstream-pictures.so (picture_encoder.h) or a library that it needs is missing: for before the
+// picture is made.
+Status CheckCanWritePicture(const std::string& path);
+
 // `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that writing
 // needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
 // NotFound: the font of annotations.

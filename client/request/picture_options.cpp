@@ -12,7 +12,6 @@
 #include "client/request/layer_options.h"
 #include "client/request/value_window.h"
 #include "client/request/values.h"
-#include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"

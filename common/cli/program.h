@@ -10,12 +10,17 @@
 
 namespace slabstream {
 
-// Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). For main alone.
+// Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). Fails if standard output cannot be
+// written. For main alone.
 int RunMain(const std::string& name, const std::function<int()>& program);
 
 // Unless the status is ok, writes "who: message" as one line to stderr. Returns the exit status. 0: ok. 1: the service or the frame failed.
 // 2: bad arguments or input. 130: stopped by Ctrl-C.
 int Finish(const std::string& who, const Status& status);
+
+// Writes out what standard output holds back, by std::cout or printf. Unavailable if that fails, or if it failed before. A program that
+// goes on after it has said something that somebody waits for calls this; RunMain does so at the end of all programs.
+Status FlushOutput();
 
 // Writes all of them but the last one as Finish does, and returns that one. Ok if there is none.
 Status ReportAll(const std::string& who, const std::vector<Status>& failures);

@@ -72,7 +72,10 @@ Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number,
   if (kind(*header) != kind(wanted)) {
     return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(*header), kind(wanted)));
   }
-  return options.headers_only ? Status::Ok() : slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+  if (options.headers_only) return Status::Ok();
+  const Status status = slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+  if (options.progress != nullptr) options.progress->Add(header->sample_bytes());
+  return status;
 }
 
 Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<std::string>& paths, OpenSlice open,

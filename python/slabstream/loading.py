@@ -1,11 +1,11 @@
 """Arrays and files as volumes of a service on this machine: load() and render()."""
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import pathlib
 import tempfile
-import types
 import weakref
 from typing import Any, Callable, Iterator
 
@@ -22,7 +22,7 @@ from .volumes import Volume as VolumeData
 _TAKE_AWAY_SECONDS = 5.0
 
 
-class Volume:
+class Volume(contextlib.AbstractContextManager["Volume"]):
     """A volume at a service, made by load(). A context manager: leaving it takes the volume away again."""
 
     def __init__(self, service: Service, name: str, shows: dict[str, Any], files: list[pathlib.Path]):
@@ -55,10 +55,7 @@ class Volume:
         """As Service.slice."""
         return self.service.slice(self.name, **self._shows | options)
 
-    def __enter__(self) -> Volume:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:

@@ -2,11 +2,11 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import copy
 import dataclasses
 import math
 import os
-import types
 from typing import Any, Callable, Iterator
 
 from . import schema
@@ -44,7 +44,7 @@ def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
         yield turned
 
 
-class Service:
+class Service(contextlib.AbstractContextManager["Service"]):
     """Made by connect(). A context manager: leaving it closes the connection, which cancels what is open."""
 
     def __init__(self, connection: Connection):
@@ -176,10 +176,7 @@ class Service:
     def close(self) -> None:
         self._connection.close()
 
-    def __enter__(self) -> Service:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
