@@ -114,7 +114,7 @@ void DeclareMeasure(const CommandLine& line) {
   AddRepeated(*sub, "--angle", options->angles, "Angle at the second of three points")->type_name("X,Y,Z:X,Y,Z:X,Y,Z");
   AddRepeated(*sub, "--profile", options->profiles, "Values from one point to another, interpolated between voxels")
       ->type_name("X,Y,Z:X,Y,Z");
-  AddInteger(*sub, "--samples", options->samples, 2, kMaxProfileSamples, "Values of each profile")->default_str("one for each voxel");
+  AddInteger(*sub, "--samples", options->samples, 2, int(kMaxSamplePoints), "Values of each profile")->default_str("one for each voxel");
   AddRepeated(*sub, "--box", options->boxes,
               "Mean, standard deviation and extremes of the voxels with their centres in a box, given as for --clip-box of `render`")
       ->type_name("X0:X1,Y0:Y1,Z0:Z1");

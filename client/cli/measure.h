@@ -9,9 +9,6 @@
 
 namespace slabstream {
 
-inline constexpr int kMaxProfileSamples = 4096;
-inline constexpr std::int64_t kMaxMeasuredVoxels = std::int64_t{1} << 24;  // of one box
-
 // Texts as measure.cpp parses them; points are X,Y,Z of the world, separated by ':'.
 struct MeasureOptions {
   ConnectionOptions connection;
@@ -20,7 +17,7 @@ struct MeasureOptions {
   std::vector<std::string> angles;     // three points; the angle is at the second one
   std::vector<std::string> profiles;   // two points
   std::vector<std::string> boxes;      // as ParseClipBox takes them
-  int samples = 0;                     // of each profile, [2, kMaxProfileSamples]; 0: one for each voxel that the line passes
+  int samples = 0;                     // of each profile, [2, kMaxSamplePoints]; 0: one for each voxel that the line passes
   bool json = false;
 };
 

@@ -45,13 +45,13 @@ TEST_F(MeasureTest, DistancesAndAnglesAreThoseOfTheWorld) {
 
 TEST_F(MeasureTest, ProfilesInterpolateBetweenVoxels) {
   const json found = Measure({"--profile", "10,20,30:16,26,35", "--samples", "5"});
-  const json& samples = found[0]["samples"];
-  ASSERT_EQ(samples.size(), 5U);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(samples[std::size_t(i)]["value"], (3 + 20 + 100) * i / 4.0, 1e-9) << i;
-  EXPECT_NEAR(samples[4]["distance"], std::sqrt(36 + 36 + 25), 1e-12);
-  const json beyond = Measure({"--profile", "0,20,30:10,20,30", "--samples", "2"})[0]["samples"];
-  EXPECT_TRUE(beyond[0]["value"].is_null());
-  EXPECT_EQ(beyond[1]["value"], 0);
+  const json& values = found[0]["values"];
+  ASSERT_EQ(values.size(), 5U);
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(values[std::size_t(i)], (3 + 20 + 100) * i / 4.0, 1e-9) << i;
+  EXPECT_NEAR(found[0]["length"], std::sqrt(36 + 36 + 25), 1e-12);
+  const json beyond = Measure({"--profile", "0,20,30:10,20,30", "--samples", "2"})[0]["values"];
+  EXPECT_TRUE(beyond[0].is_null());
+  EXPECT_EQ(beyond[1], 0);
 }
 
 TEST_F(MeasureTest, BoxesHaveTheMeanAndDeviationOfTheirVoxels) {
@@ -61,8 +61,8 @@ TEST_F(MeasureTest, BoxesHaveTheMeanAndDeviationOfTheirVoxels) {
   EXPECT_EQ(all["unit"], "mm^3");
   EXPECT_NEAR(all["mean"], 1.5 + 10 + 50, 1e-9);
   EXPECT_NEAR(all["deviation"], std::sqrt(1.25 + 200 / 3.0 + 2500), 1e-9);
-  EXPECT_EQ(all["min"], 0);
-  EXPECT_EQ(all["max"], 123);
+  EXPECT_EQ(all["least"], 0);
+  EXPECT_EQ(all["largest"], 123);
   for (const char* box : {"1:3,:,0:1v", "11:15,:,:31", "25:75,:,:50%"}) {
     const json part = Measure({"--box", box})[0];
     EXPECT_EQ(part["voxels"], 6) << box;
