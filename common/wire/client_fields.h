@@ -344,6 +344,7 @@ void Fields(auto& io, Is<StatisticsQuery> auto& m) {
   io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
   io.Message("box", m.box, &P::box, &P::mutable_box);
 }
+inline void Read(const v1::StatisticsQuery& in, StatisticsQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
 
 v1::StatisticsReply ProtoOf(const StatisticsReply&);
 void Fields(auto& io, Is<StatisticsReply> auto& m) {

@@ -32,7 +32,7 @@ TEST_F(UnwritableOutputTest, HelpAndVersions) {
     ExpectFailure(program, {"--help"});
     ExpectFailure(program, {"--version"});
   }
-  EXPECT_NE(Run("slabstream", {"--version"}).err.find("written: No space left on device"), std::string::npos);
+  EXPECT_NE(Run("slabstream", {"--help"}).err.find("written: No space left on device"), std::string::npos);
   std::istringstream commands(MustRun({"help"}).out.substr(MustRun({"help"}).out.find("Commands:")));
   int count = 0;
   for (std::string line; std::getline(commands, line);) {
@@ -56,7 +56,7 @@ TEST_F(UnwritableOutputTest, Commands) {
       {"info", "picture.png", "--json"},
       {"transfer", "gray-ramp", sphere},
       {"sphere", "--class", "1", "--size", "8", "-o", "other.nrrd"},
-      {"convert", sphere, "-o", "sphere.nhdr"},
+      {"convert", sphere, "sphere.nhdr"},
       {"render", sphere, "--local=1", "--size", "16", "-o", "again.png"},
       {"slice", sphere, "--local=1", "-o", "slice.png"},
       {"turntable", sphere, "--local=1", "--size", "16", "--frames", "2", "-o", "frame_%d.png"},
