@@ -97,7 +97,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (!transfer.ok()) return transfer.status();
   const auto* const preset = std::get_if<std::string>(&request.transfer.choice);
   if (request.clipping.slab && preset != nullptr && FindNamed(NamedColorMaps(), *preset) != nullptr) {
-    transfer->opacities = {{double(summary.range.min), 1}};
+    transfer->opacities = {{double(summary->range.min), 1}};
   }
   Brighten(request.brightness, *transfer);
   Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
