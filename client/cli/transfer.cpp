@@ -6,11 +6,14 @@
 #include <cmath>
 #include <iostream>
 #include <string>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
+#include "client/image_io/image_writer.h"
 #include "client/image_io/ink.h"
 #include "common/classification/color_maps.h"
+#include "common/image/local_image.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/resolved_request.h"
 
@@ -84,7 +87,7 @@ Status DrawMaps(const std::string& path) {
 
 Status List(const TransferOptions& options) {
   if (!options.preview.empty()) {
-    if (Status status = CheckPicturePath(options.preview); !status.ok()) return status;
+    if (Status status = CheckCanWritePicture(options.preview); !status.ok()) return status;
     if (Status status = DrawMaps(options.preview); !status.ok()) return status;
   }
   std::cout << ListText(::isatty(STDOUT_FILENO) == 1);
