@@ -49,8 +49,8 @@ struct ServiceAddress {
 
 struct ClientTiming {
   Duration ping = std::chrono::seconds(1);  // between pings while requests are open
-  // Without an answer to a ping for so long, the service counts as gone. One in the same process (inproc) cannot be lost, only slow: it
-  // counts as gone when it has ended.
+  // If a ping has had no answer for this long, the service counts as gone. A service in the same process (inproc) cannot be lost, only be
+  // slow: it counts as gone when it has ended.
   Duration silence = std::chrono::seconds(5);
 };
 

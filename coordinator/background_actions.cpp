@@ -171,7 +171,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
   return PostResult(
-      checks_, "a check of files", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
+      checks_, "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {

@@ -133,8 +133,8 @@ struct CheckDatasetFiles {
   LoadId load = 0;
   std::shared_ptr<const FileStamp> stamp;
 };
-// -> FoldersSeen: what lies in each of these folders. Not asked for: it is only time for another check, so folders that the file system
-// says are unchanged need none. One at a time.
+// -> FoldersSeen: what is in each of these folders. If nobody has asked for the check (it is only time for another one), folders that have
+// not changed are not searched (FolderMemory). One at a time.
 struct CheckWatchedFolders {
   std::set<std::string> folders;
   bool asked_for = false;
@@ -175,7 +175,7 @@ using DatasetAction = std::variant<DatasetNews, ToClient, LoadDataset, UnloadDat
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0.
 struct DatasetSizes {
   std::size_t uses = 0;
-  std::size_t orders = 0, awaited = 0;  // that wait for a check of files; names that do
+  std::size_t orders = 0, awaited = 0;  // that wait for a file check; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
   std::size_t questions = 0, uploads = 0;
 };

@@ -34,7 +34,7 @@ struct DatasetMachine::State {
     CheckId check = 0;              // at its files, which must be over before a frame begins; 0: none
     std::optional<DatasetId> kept;  // its frame has begun with these voxels
   };
-  // An order that waits for a check of files. kList: for that at the folders and those at datasets.
+  // An order that waits for a file check. kList: for the one of the folders and those of the datasets.
   struct OpenOrder {
     PeerToken client = 0;
     DataOrder order;

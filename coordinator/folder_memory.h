@@ -1,6 +1,6 @@
-// FolderMemory: which watched folders are as they were when they were searched last, by the times that the file system gives them. So a
-// folder of many files that nobody touches costs one question a round. It knows folders of nothing but files: what is in their subfolders
-// may change without a trace in them, and so may what their links lead to. One thread at a time.
+// FolderMemory: which watched folders have not changed since they were last searched, by their modification times. So a folder of many
+// files that does not change costs one look a round. It remembers only folders that hold nothing but files: the contents of subfolders, and
+// what links lead to, may change without changing the folder's time. One thread at a time.
 #pragma once
 
 #include <sys/stat.h>
@@ -16,7 +16,7 @@ class FolderMemory {
   // Nothing came, went or was renamed.
   bool IsUnchanged(const std::string& folder) const;
 
-  // `search` searches the folder: what comes meanwhile, or at about the same time, counts as a change later.
+  // `search` searches the folder. What comes during the search, or at about that time, counts as a change at the next one.
   template <class Search>
   auto Remember(const std::string& folder, Search&& search) {
     const std::optional<Stamp> before = StampOf(folder);

@@ -225,7 +225,7 @@ Status RunningFrame::NoteDeath(WorkerId worker) {
   }
   const std::optional<std::string> guilty = suspects_.OnDeath(held);
   if (!guilty) return Status::Ok();
-  return Status::Unavailable(fmt::format("{} was lost with {} of the frame, as two workers before it: the frame may be what ends them",
+  return Status::Unavailable(fmt::format("{} was lost with {} of the frame, as two workers before it: the frame may be what kills them",
                                          WorkerName(worker), *guilty));
 }
 

@@ -88,8 +88,8 @@ class RunningFrame {
   bool AttemptDue(Time now) const;
   bool between_attempts() const { return std::holds_alternative<BetweenAttempts>(state_); }
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
-  // changes; the Status is the last such worker's reason, or Unavailable if there is none. `busy` workers are not those on which suspects
-  // are tried, if there are others.
+  // changes; the Status is the last such worker's reason, or Unavailable if there is none. Suspects are not tried on `busy` workers if
+  // there are others.
   Status BeginAttempt(const Roster& roster, const std::set<WorkerId>& busy, Time now);
   // While it has suspects, no other frame may have anything under way.
   bool has_suspects() const { return suspects_.any(); }

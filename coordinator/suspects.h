@@ -1,6 +1,6 @@
-// Suspects: the parts of a frame that may be what ends workers. One death proves nothing, and neither do two: workers are also killed for
+// Suspects: the parts of a frame that may be what kills workers. One death proves nothing, and neither do two: workers are also killed for
 // other reasons, with whatever they hold. So a part that two workers have died with is tried once more, alone: on a worker that renders
-// nothing else, while no other frame has anything under way. If that one dies, too, the frame is to blame.
+// nothing else, while no other frame has anything under way. If this worker dies too, the frame is to blame.
 #pragma once
 
 #include <map>
@@ -17,7 +17,7 @@ class Suspects {
  public:
   using Part = std::optional<BoxId>;  // nullopt: the picture
 
-  // A worker has died with these in its hands. Nullopt: it may be chance; else the text of a part that two others have died with before.
+  // A worker has died while it held these. Nullopt: it may be chance; else the name of a part that two other workers have died with before.
   std::optional<std::string> OnDeath(const std::vector<Part>& held);
   // A group was finished for the first time.
   void Acquit() { deaths_.clear(); }

@@ -575,7 +575,7 @@ class Server final : public HttpServer {
     }
     shared_->application.CountRefusal("connections");
     shared_->log.Warning(
-        fmt::format("a connection was closed: {} has {}, and there are {}", address.to_string(), counts[address], shared_->open.size()));
+        fmt::format("a connection was closed: {} has {} of {} open ones", address.to_string(), counts[address], shared_->open.size()));
     if (slowest == nullptr) return false;
     shared_->open.erase(slowest);  // at once, not when it has heard of it
     slowest->CloseNow();

@@ -149,7 +149,7 @@ Json OpenApi() {
       {"/api/v1/profile", "The values of a dataset along a line, interpolated between its voxels", "application/json", false,
        With(dataset,
             {field("from", kLineHelp, "X,Y,Z"), field("to", kLineHelp, "X,Y,Z"),
-             field("samples", "Points along the line, both ends among them: 2 to 4096", "N", fmt::format("{}", kProfileSamples))})},
+             field("samples", "Number of points along the line, both ends included: 2 to 4096", "N", fmt::format("{}", kProfileSamples))})},
       {"/api/v1/statistics", "Mean, deviation and range of the values in a box", "application/json", false,
        With(dataset, {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,

@@ -23,8 +23,8 @@ struct FrameLoopOptions {
   int in_flight = 1;
   PictureSink* pictures = nullptr;  // where they go; null: nowhere
   bool keep_reports = false;
-  // Where frames go that fail though others do not, with their numbers and outputs: the loop goes on with the next one. A failure before
-  // the first picture and the third one in a row end it all the same. Null: each does.
+  // If set, the loop goes on after a frame that fails, and adds the failure here, with the frame's number and output. A failure before the
+  // first picture, or the third failure in a row, still ends the loop. Null: every failure ends it.
   std::vector<Status>* failures = nullptr;
   bool progress = false;  // on stderr
   std::string label;      // begins each line of progress

@@ -35,7 +35,7 @@ class Movie : public PictureSink {
 
   bool in_order() const override { return true; }
   Status Put(const Picture& picture, const FrameJob& job) override;
-  Status Skip(const FrameJob& job) override;  // the frame before it stays for as long
+  Status Skip(const FrameJob& job) override;  // shows the frame before it in its place
   Status Finish() override;
   void Abandon() override { encoder_->Abandon(); }
 

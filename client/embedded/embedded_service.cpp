@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMaxEmbeddedWorkers = 256;
 
-// Threads of one process are not lost one by one, and what they send arrives. So silence only says that the machine is busy.
+// A process does not lose single threads, and what they send arrives. So silence only means that the machine is busy.
 constexpr Duration kPatience = std::chrono::minutes(10);  // what a Welcome can say at most
 
 // Names within one process: several embedded services may share a context.

@@ -15,7 +15,7 @@ namespace slabstream {
 
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
-  CoordinatorOptions coordinator;  // endpoints and limits of silence are filled in; the catalogue is used
+  CoordinatorOptions coordinator;  // endpoints and time-outs are filled in; the catalogue is used
   WorkerConfig worker;             // of each; threads and budgets are used
 };
 

@@ -81,7 +81,7 @@ Result<const PictureEncoder*> FindEncoder() {
     void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
     if (entry == nullptr) {
       return Status::Unavailable(fmt::format(
-          "pictures cannot be written: {} (libslabstream-pictures.so lies beside the program and needs libopenimageio2.4)", dlerror()));
+          "pictures cannot be written: {} (libslabstream-pictures.so belongs beside the program and needs libopenimageio2.4)", dlerror()));
     }
     return reinterpret_cast<PictureEncoderEntry>(entry)();
   }();

@@ -31,7 +31,7 @@ inline constexpr char kRecordName[] = "slabstream";
 // InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
 
-// The same, and Unavailable where libslabstream-pictures.so (picture_encoder.h) or a library that it needs is missing: for before the
+// The same, and Unavailable if libslabstream-pictures.so (picture_encoder.h) or a library that it needs is missing. To be called before the
 // picture is made.
 Status CheckCanWritePicture(const std::string& path);
 

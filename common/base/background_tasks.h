@@ -1,6 +1,6 @@
 // BackgroundTasks: tasks that may take long, on threads of their own. At most `most_threads` run at a time, in the order in which they were
 // posted. Unlike TaskThread it does not wait for a running task when it is destroyed, so that a service can end at once. The first thread
-// begins with the object, so that no later lack of memory keeps tasks from running; with too little for more threads, fewer run at a time.
+// begins with the object, so a later lack of memory does not keep tasks from running. Without memory for more threads, fewer run at a time.
 #pragma once
 
 #include <atomic>
@@ -21,7 +21,7 @@ namespace slabstream {
 
 class BackgroundTasks {
  public:
-  // Throws std::system_error if there can be no thread.
+  // Throws std::system_error if no thread can be started.
   explicit BackgroundTasks(std::size_t most_threads) : shared_(std::make_shared<Shared>()), most_threads_(most_threads) { StartThread(); }
   // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
   ~BackgroundTasks() {

@@ -18,11 +18,11 @@ int RunMain(const std::string& name, const std::function<int()>& program);
 // 2: bad arguments or input. 130: stopped by Ctrl-C.
 int Finish(const std::string& who, const Status& status);
 
-// Writes out what standard output holds back, by std::cout or printf. Unavailable if that fails, or if it failed before. A program that
-// goes on after it has said something that somebody waits for calls this; RunMain does so at the end of all programs.
+// Flushes standard output, of std::cout and of printf. Unavailable if this fails or has failed before. A program calls this when it has
+// printed something that somebody waits for and then goes on; RunMain calls it at the end of every program.
 Status FlushOutput();
 
-// Writes all of them but the last one as Finish does, and returns that one. Ok if there is none.
+// Writes every failure but the last one, as Finish does, and returns the last one. Ok if there is no failure.
 Status ReportAll(const std::string& who, const std::vector<Status>& failures);
 
 // What a user should know of a command that goes on: one line to stderr, "slabstream: note: message" or "slabstream: warning: message".

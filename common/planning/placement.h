@@ -13,7 +13,7 @@ Roster RosterOf(std::uint32_t workers);
 // Groups of `plan.slots` boxes of its layout that show something, in visibility order; at least one group.
 void PlaceBoxes(FramePlan& plan);
 
-// Boxes that one worker renders, and nothing else of their groups. If there is another worker, it is not the display worker either.
+// Boxes for one worker that renders nothing else of their groups. It is not the display worker either, unless it is the only worker.
 struct SetApart {
   std::set<BoxId> boxes;
   WorkerId worker = 0;  // in the roster, if there are boxes

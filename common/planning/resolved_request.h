@@ -1,5 +1,5 @@
-// ResolvedRequest: a request with all that it says about its dataset looked up: transfer function, clip region, labels and policy. A
-// request is resolved once, when its dataset is there, and what plans, counts and answers takes the result. So planning meets no unknown
+// ResolvedRequest: a request in which all that it says about its dataset has been looked up: transfer function, clip region, labels and
+// policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they meet no unknown
 // name.
 #pragma once
 

@@ -8,8 +8,8 @@
 
 namespace slabstream {
 
-// What `region`, which is kept (ClipMode::kKeep), leaves of the voxels of `box` (not empty) is convex: its corners, in data space, in no
-// order, some perhaps more than once. None: nothing is left.
+// The corners of the convex part of the voxels of `box` that `region` leaves, in data space, in no order, some perhaps more than once.
+// None: nothing is left. The region is kept (ClipMode::kKeep), and the box is not empty.
 std::vector<Vec3> CornersOf(const ClipRegion& region, const Box& box);
 
 }  // namespace slabstream

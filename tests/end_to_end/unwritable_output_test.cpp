@@ -56,7 +56,7 @@ TEST_F(UnwritableOutputTest, Commands) {
       {"info", "picture.png", "--json"},
       {"transfer", "gray-ramp", sphere},
       {"sphere", "--class", "1", "--size", "8", "-o", "other.nrrd"},
-      {"convert", sphere, "sphere.nhdr"},
+      {"convert", sphere, "copy.mha"},
       {"render", sphere, "--local=1", "--size", "16", "-o", "again.png"},
       {"slice", sphere, "--local=1", "-o", "slice.png"},
       {"turntable", sphere, "--local=1", "--size", "16", "--frames", "2", "-o", "frame_%d.png"},
