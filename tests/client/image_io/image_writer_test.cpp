@@ -279,7 +279,7 @@ TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
 TEST_F(ImageWriterTest, AFrameOfAMovieLiesOverItsBackgroundAndThatOverBlack) {
   const LocalImage image = TwoPixels(PixelFormat::kRgba);
   const auto frame = [&](const StraightColor& background) {
-    return MovieFrame(ComposedPicture::Make(image, {6, 4}, {.background = background}, {}).value());
+    return MovieFrame(ComposedPicture::Make(image, {6, 4}, {.background = background}, PictureGeometry{}).value());
   };
   const auto pixel = [](const std::vector<std::byte>& bytes, std::size_t x, std::size_t y) {
     const std::size_t at = 3 * (6 * y + x);

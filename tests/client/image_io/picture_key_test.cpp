@@ -16,9 +16,9 @@ namespace {
 
 using testing::ElementsAre;
 
-constexpr ImageSize kSize = {300, 200};
+constexpr ImageSize kKeySize = {300, 200};
 
-struct Drawing {
+struct KeyDrawing {
   ImageSize size;
   std::vector<float> rgba;  // on black
   std::array<float, 3> At(int x, int y) const {
@@ -37,11 +37,11 @@ struct Drawing {
   }
 };
 
-Drawing Draw(const Annotations& annotations, const PictureKey& key, const std::vector<PictureGeometry>& panes = {{}},
-             ImageSize size = kSize) {
+KeyDrawing DrawKey(const Annotations& annotations, const PictureKey& key, const std::vector<PictureGeometry>& panes = {{}},
+                   ImageSize size = kKeySize) {
   const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, panes, key);
   EXPECT_TRUE(layers.ok()) << layers.status().message();
-  Drawing drawing{size, {}};
+  KeyDrawing drawing{size, {}};
   const std::array<float, 4> black = {0, 0, 0, 1};
   for (int i = 0; i < size.width * size.height; ++i) drawing.rgba.insert(drawing.rgba.end(), black.begin(), black.end());
   const std::size_t row = 4 * std::size_t(size.width);
@@ -66,11 +66,11 @@ TEST(TicksOf, AreRoundNumbersInTheRange) {
 }
 
 TEST(ColorBar, StandsOnTheRightWithTheGreatestValueOnTop) {
-  const Drawing drawing = Draw({.color_bar = ""}, {.bar = RedToBlue(), .entries = {}});
+  const KeyDrawing drawing = DrawKey({.color_bar = ""}, {.bar = RedToBlue(), .entries = {}});
   EXPECT_FALSE(drawing.AnyIn(0, 200));
-  int first = kSize.height, last = 0;
-  const int x = kSize.width - 12;  // inside of the bar
-  for (int y = 0; y < kSize.height; ++y) {
+  int first = kKeySize.height, last = 0;
+  const int x = kKeySize.width - 12;  // inside of the bar
+  for (int y = 0; y < kKeySize.height; ++y) {
     const auto [r, g, b] = drawing.At(x, y);
     if (g != 0 || r + b < 0.9F) continue;
     first = std::min(first, y);
@@ -82,19 +82,19 @@ TEST(ColorBar, StandsOnTheRightWithTheGreatestValueOnTop) {
     EXPECT_NEAR(r, share, 0.02);
     EXPECT_NEAR(b, 1 - share, 0.02);
   }
-  EXPECT_FALSE(Draw({.color_bar = ""}, {}).AnyIn(0, kSize.width)) << "there is nothing to show";
-  EXPECT_FALSE(Draw({}, {.bar = RedToBlue(), .entries = {}}).AnyIn(0, kSize.width)) << "nobody asked for it";
+  EXPECT_FALSE(DrawKey({.color_bar = ""}, {}).AnyIn(0, kKeySize.width)) << "there is nothing to show";
+  EXPECT_FALSE(DrawKey({}, {.bar = RedToBlue(), .entries = {}}).AnyIn(0, kKeySize.width)) << "nobody asked for it";
 }
 
 TEST(Legend, NamesWhatThereIsRoomFor) {
   PictureKey key;
   for (int i = 0; i < 100; ++i) key.entries.push_back({"Precentral", {0, 1, 0}});
-  const Drawing drawing = Draw({.legend = true}, key);
+  const KeyDrawing drawing = DrawKey({.legend = true}, key);
   int green = 0;
-  for (int y = 0; y < kSize.height; ++y) green += drawing.At(8, y) == std::array<float, 3>{0, 1, 0} ? 1 : 0;
+  for (int y = 0; y < kKeySize.height; ++y) green += drawing.At(8, y) == std::array<float, 3>{0, 1, 0} ? 1 : 0;
   EXPECT_GT(green, 20);
   EXPECT_LT(green, 120);
-  EXPECT_FALSE(drawing.AnyIn(kSize.width / 2, kSize.width));
+  EXPECT_FALSE(drawing.AnyIn(kKeySize.width / 2, kKeySize.width));
 }
 
 TEST(Panes, HaveSidesAndBarsOfTheirOwn) {
@@ -104,7 +104,7 @@ TEST(Panes, HaveSidesAndBarsOfTheirOwn) {
   axial.forward = {0, 0, 1};
   const std::vector<PictureGeometry> panes(3, axial);
   const ImageSize size = {600, 200};
-  const Drawing drawing = Draw({.scale_bar = true, .orientation_marker = true, .sides_only = true}, {}, panes, size);
+  const KeyDrawing drawing = DrawKey({.scale_bar = true, .orientation_marker = true, .sides_only = true}, {}, panes, size);
   for (int pane = 0; pane < 3; ++pane) {
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < 200; ++x) ASSERT_EQ(drawing.At(x, y), drawing.At(x + 200 * pane, y)) << x << ", " << y;
