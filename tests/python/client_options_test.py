@@ -116,6 +116,7 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
     ({"plane": "coronal", "index": 9, "interpolation": "nearest"}, ["--plane", "coronal", "--index", "9", "--interpolation", "nearest"]),
     ({"plane": "anatomical", "scale_bar": True, "orientation_marker": True, "title": "Three"},
      ["--plane", "anatomical", "--scale-bar", "--orientation-marker", "--title", "Three"]),
+    ({"plane": "coronal", "color_bar": "HU", "legend": True}, ["--plane", "coronal", "--color-bar=HU", "--legend"]),
     ({"plane": "axial", "window": "brain"}, ["--plane", "axial", "--window", "brain"]),
     ({"plane": "axial", "window": "soft-tissue", "level": 90}, ["--plane", "axial", "--window", "soft-tissue", "--level", "90"]),
     ({"plane": "sagittal", "window": 150}, ["--plane", "sagittal", "--window", "150"]),
