@@ -15,6 +15,7 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
+#include "client/request/picture_record.h"
 #include "common/planning/resolved_request.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
@@ -64,18 +65,24 @@ double ObliqueDegrees(const Orientation& orientation) {
   return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * (180 / std::numbers::pi);
 }
 
+// " mm", or nothing if the file states no unit.
+std::string UnitText(const VolumeGeometry& geometry) {
+  const LengthUnit unit = UnitOf(geometry);
+  return unit > LengthUnit::kFile ? fmt::format(" {}", NameOf(unit)) : "";
+}
+
 constexpr const char* kStoredAxes[] = {"stored_x", "stored_y", "stored_z"};
 
 std::string OrientationText(const VolumeFileInfo& info) {
   const VolumeGeometry& geometry = info.description.geometry;
   const Orientation& orientation = geometry.orientation;
   const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
-  std::string text = fmt::format("extent       {:.6g} x {:.6g} x {:.6g}{}\n", extent.x, extent.y, extent.z,
-                                 orientation.world == World::kPatient ? " mm" : "");
+  std::string text = fmt::format("extent       {:.6g} x {:.6g} x {:.6g}{}\n", extent.x, extent.y, extent.z, UnitText(geometry));
   if (orientation.world == World::kVoxels) return text + "orientation  unknown: x, y and z are the axes of the voxels\n";
   text += fmt::format("orientation  {}\n", orientation.world == World::kPatient ? "patient: x to the right, y to anterior, z to superior"
                                                                                 : "scene: the file's own axes");
-  text += fmt::format("origin       {:.6g} {:.6g} {:.6g}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z);
+  text += fmt::format("origin       {:.6g} {:.6g} {:.6g}{}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z,
+                      UnitText(geometry));
   for (std::size_t i = 0; i < 3; ++i) {
     text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, info.steps[i]));
   }
@@ -98,7 +105,7 @@ std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, c
   text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
                       d.mapping.offset);
   if (info.labels) text += "labels       yes: values are numbers of structures, not measurements\n";
-  text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}\n", spacing.x, spacing.y, spacing.z);
+  text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
   text += OrientationText(info);
   text += fmt::format("values       {:g} ... {:g}\n", summary.range.min, summary.range.max);
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
@@ -182,6 +189,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                  {"spacing", VectorJson(d.geometry.spacing)},
+                                 {"unit", kRecordedUnits.at(std::size_t(UnitOf(d.geometry)) - 1)},
                                  {"orientation", world},
                                  {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
                                  {"non_finite", summary.non_finite},

@@ -17,6 +17,7 @@
 #include "client/request/json_value.h"
 #include "client/request/values.h"
 #include "common/math/points_along.h"
+#include "common/view/picture_geometry.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
@@ -50,10 +51,7 @@ std::optional<double> AngleDegrees(const Vec3& a, const Vec3& vertex, const Vec3
 class Measurer {
  public:
   Measurer(Client& client, std::string dataset, const VolumeGeometry& geometry)
-      : client_(client),
-        dataset_(std::move(dataset)),
-        spacing_(geometry.spacing),
-        unit_(geometry.orientation.world == World::kPatient ? "mm" : "units") {}
+      : client_(client), dataset_(std::move(dataset)), spacing_(geometry.spacing), unit_(NameOf(UnitOf(geometry))) {}
 
   Json Distance(const Points& p) const {
     return {

@@ -10,9 +10,7 @@ namespace slabstream {
 namespace {
 
 bool IsShown(const Label& label, const LabelChoice& choice) {
-  return choice.shown.empty() || std::ranges::any_of(choice.shown, [&](const LabelRange& range) {
-           return range.first <= label.value && label.value <= range.last;
-         });
+  return choice.shown.empty() || std::ranges::any_of(choice.shown, [&](const LabelRange& range) { return Covers(range, label); });
 }
 
 // As the picture has it (FrameRequest::brightness).

@@ -130,9 +130,8 @@ bool IsPlain(std::string_view word) {
 }  // namespace
 
 Json GeometryJson(const PictureGeometry& geometry) {
-  static constexpr std::array<const char*, 3> kUnits = {"voxel", "unknown", "mm"};
   return {{"world", NameOf(geometry.world)},
-          {"unit", kUnits.at(std::size_t(geometry.unit) - 1)},
+          {"unit", kRecordedUnits.at(std::size_t(geometry.unit) - 1)},
           {"projection", NameOf(geometry.projection)},
           {"right", VectorJson(geometry.right)},
           {"up", VectorJson(geometry.up)},

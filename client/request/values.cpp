@@ -225,6 +225,14 @@ Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, s
 Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text) {
   std::vector<LabelRange> ranges;
   for (const std::string_view item : Split(text, ',')) {
+    if (item.find_first_not_of("0123456789-") != std::string_view::npos) {
+      if (item.size() > kMaxNameBytes) {
+        return Status::InvalidArgument(
+            fmt::format("{} has a name of {} bytes, at most {} are possible", option, item.size(), kMaxNameBytes));
+      }
+      ranges.push_back({.name = std::string(item)});
+      continue;
+    }
     const std::size_t hyphen = item.find('-');
     const Result<int> first = ParseInteger(option, item.substr(0, hyphen), 1, int(kMaxLabelValue));
     if (!first.ok()) return first.status();
@@ -274,6 +282,11 @@ std::string TextOf(const std::vector<LabelOpacity>& opacities) {
 }
 std::string TextOf(const std::vector<LabelRange>& ranges) {
   return Joined(ranges, [](const LabelRange& range) {
+    if (!range.name.empty()) {  // a comma would end it
+      std::string pattern = range.name;
+      std::ranges::replace(pattern, ',', '?');
+      return pattern;
+    }
     return range.first == range.last ? fmt::format("{}", range.first) : fmt::format("{}-{}", range.first, range.last);
   });
 }

@@ -45,7 +45,7 @@ Result<std::vector<GradientOpacityPoint>> ParseGradientOpacities(std::string_vie
 
 // "3=0.5,7=0": labels and their opacities in [0, 1].
 Result<std::vector<LabelOpacity>> ParseLabelOpacities(std::string_view option, std::string_view text);
-// "1,5-9".
+// "1,5-9,Precentral_L,Temporal_*": what is neither a number nor a range is a name.
 Result<std::vector<LabelRange>> ParseLabelRanges(std::string_view option, std::string_view text);
 
 // The other way round: the text that is parsed as the value.

@@ -5,14 +5,9 @@ namespace slabstream {
 std::vector<LabelUse> UsesOf(const LabelLook& look) {
   constexpr float kLeastOpacity = 0.5F;
   std::vector<LabelUse> uses = {LabelUse::kAsVolume};
-  const bool tint = look.mode == LabelMode::kTint;
+  const LabelUse drawn = look.mode == LabelMode::kSurface ? LabelUse::kOpaque : LabelUse::kAsVolume;
   for (const LabelLook::Entry& entry : look.entries) {
-    const bool clear = entry.opacity < kLeastOpacity;
-    if (tint) {
-      uses.push_back(!entry.shown || clear ? LabelUse::kClear : LabelUse::kAsVolume);
-    } else {
-      uses.push_back(!entry.shown ? LabelUse::kAsVolume : clear ? LabelUse::kClear : LabelUse::kOpaque);
-    }
+    uses.push_back(!entry.shown ? LabelUse::kAsVolume : entry.opacity < kLeastOpacity ? LabelUse::kClear : drawn);
   }
   return uses;
 }

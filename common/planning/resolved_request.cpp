@@ -22,8 +22,21 @@ std::string Span(const LabelTable& table) {
   return fmt::format("it has {} from {} to {}", table.labels.size(), table.labels.front().value, table.labels.back().value);
 }
 
+Status NoneNamed(const std::string& name, const LabelTable& table) {
+  constexpr std::size_t kMostShown = 8;
+  std::vector<std::string> names;
+  for (const Label& label : table.labels) {
+    if (!label.name.empty()) names.push_back(label.name);
+  }
+  const std::string more = names.size() > kMostShown ? fmt::format(" and {} more", names.size() - kMostShown) : "";
+  names.resize(std::min(names.size(), kMostShown));
+  return Status::InvalidArgument(fmt::format("labels.shown: no label is named '{}'; {}{}", name,
+                                             names.empty() ? "none has a name" : fmt::format("there are {}", fmt::join(names, ", ")),
+                                             more));
+}
+
 Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table) {
-  LabelLook look{.mode = choice.mode, .tint = choice.tint};
+  LabelLook look{.mode = choice.mode == LabelMode::kHighlight ? LabelMode::kTint : choice.mode, .tint = choice.tint};
   for (const Label& label : table.labels) {
     look.entries.push_back({.color = {label.color[0], label.color[1], label.color[2]}, .opacity = 1, .shown = choice.shown.empty()});
   }
@@ -31,11 +44,13 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
     return std::size_t(std::ranges::lower_bound(table.labels, value, {}, &Label::value) - table.labels.begin());
   };
   for (const LabelRange& range : choice.shown) {
-    const std::size_t begin = first_from(range.first), end = first_from(range.last + 1);
-    if (begin == end) {
-      return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
+    bool any = false;
+    for (std::size_t i = 0; i < table.labels.size(); ++i) {
+      if (Covers(range, table.labels[i])) look.entries[i].shown = any = true;
     }
-    for (std::size_t i = begin; i < end; ++i) look.entries[i].shown = true;
+    if (any) continue;
+    if (!range.name.empty()) return NoneNamed(range.name, table);
+    return Status::InvalidArgument(fmt::format("labels.shown: no label from {} to {}; {}", range.first, range.last, Span(table)));
   }
   for (const auto& [value, opacity] : choice.opacities) {
     const std::size_t i = first_from(value);
@@ -43,6 +58,9 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
       return Status::InvalidArgument(fmt::format("labels.opacities: no label {}; {}", value, Span(table)));
     }
     look.entries[i].opacity = float(opacity);
+  }
+  for (LabelLook::Entry& entry : look.entries) {
+    if (choice.mode == LabelMode::kTint && !entry.shown) entry = {.color = entry.color, .opacity = 0};
   }
   return look;
 }

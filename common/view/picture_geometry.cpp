@@ -1,15 +1,13 @@
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
-namespace {
 
 LengthUnit UnitOf(const VolumeGeometry& volume) {
+  if (volume.orientation.unit) return *volume.orientation.unit;
   if (volume.orientation.world == World::kPatient) return LengthUnit::kMillimetre;
   const bool bare = volume.orientation.world == World::kVoxels && volume.spacing == Vec3{1, 1, 1};
   return bare ? LengthUnit::kVoxel : LengthUnit::kFile;
 }
-
-}  // namespace
 
 PictureGeometry GeometryOf(const Camera& camera, const VolumeGeometry& volume) {
   const Orientation& orientation = volume.orientation;

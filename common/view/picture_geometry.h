@@ -6,19 +6,10 @@
 // with k = 1 for orthographic pictures and k = d / target_depth for perspective ones.
 #pragma once
 
-#include <cstdint>
-
 #include "common/view/camera.h"
 #include "common/volume/orientation.h"
 
 namespace slabstream {
-
-// Of lengths in a volume's world.
-enum class LengthUnit : std::uint8_t {
-  kVoxel = 1,       // nothing is known: the distance of neighbouring voxels
-  kFile = 2,        // of the file's spacing, which states none
-  kMillimetre = 3,  // of patients
-};
 
 struct PictureGeometry {
   World world = World::kVoxels;  // whose axes these are
@@ -31,6 +22,9 @@ struct PictureGeometry {
   double pixel_size = 1;    // > 0: side of a pixel at the target's depth; in orthographic pictures at any depth
   friend bool operator==(const PictureGeometry&, const PictureGeometry&) = default;
 };
+
+// Of lengths in the volume's world.
+LengthUnit UnitOf(const VolumeGeometry& volume);
 
 // Of the finished picture, without supersampling. `camera` is of a view of `volume`.
 PictureGeometry GeometryOf(const Camera& camera, const VolumeGeometry& volume);

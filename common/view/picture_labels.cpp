@@ -12,13 +12,9 @@ namespace slabstream {
 namespace {
 
 std::string LengthText(double length, LengthUnit unit) {
-  const bool one = length == 1;
-  switch (unit) {
-    case LengthUnit::kMillimetre: return fmt::format("{:g} mm", length);
-    case LengthUnit::kVoxel: return fmt::format("{:g} voxel{}", length, one ? "" : "s");
-    case LengthUnit::kFile: break;
-  }
-  return fmt::format("{:g} unit{}", length, one ? "" : "s");
+  std::string_view name = NameOf(unit);
+  if (length == 1 && unit <= LengthUnit::kFile) name.remove_suffix(1);  // one voxel, one unit
+  return fmt::format("{:g} {}", length, name);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "common/math/vec.h"
@@ -15,14 +16,33 @@ namespace slabstream {
 enum class World : std::uint8_t {
   kVoxels = 1,   // no orientation is known: x, y and z are those of the voxels, in the unit of the spacing
   kScene = 2,    // axes of the file's own, right-handed
-  kPatient = 3,  // x to the patient's right, y to anterior, z to superior (RAS); mm
+  kPatient = 3,  // x to the patient's right, y to anterior, z to superior (RAS); mm unless stated
 };
 constexpr std::string_view NameOf(World world) { return world == World::kVoxels ? "voxels" : world == World::kScene ? "scene" : "patient"; }
+
+// Of lengths in a world.
+enum class LengthUnit : std::uint8_t {
+  kVoxel = 1,       // nothing is known: the distance of neighbouring voxels
+  kFile = 2,        // of the file's spacing, which states none
+  kMillimetre = 3,  // of patients, and of files that state it, like those below
+  kMicrometre = 4,
+  kNanometre = 5,
+  kAngstrom = 6,
+  kCentimetre = 7,
+  kMetre = 8,
+};
+// As it stands behind a number, in UTF-8.
+constexpr std::string_view NameOf(LengthUnit unit) {
+  constexpr std::array<std::string_view, 8> kNames = {"voxels", "units", "mm", "\u00b5m", "nm", "\u00c5", "cm", "m"};
+  return kNames.at(std::size_t(unit) - 1);
+}
 
 struct Orientation {
   World world = World::kVoxels;
   Vec3 origin;                                                               // of the centre of voxel 0, 0, 0; finite
   std::array<Vec3, 3> axes = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};  // unit, at right angles, right-handed
+  // Of the world, as the file states it: kMillimetre or below in the list. None: it states none, or a patient's mm.
+  std::optional<LengthUnit> unit = {};
 
   // A direction of the world as seen from the voxels' axes, and back. Lengths stay.
   Vec3 FromWorld(const Vec3& direction) const { return {Dot(axes[0], direction), Dot(axes[1], direction), Dot(axes[2], direction)}; }

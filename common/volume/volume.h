@@ -1,7 +1,7 @@
 // What a volume is: geometry (dimensions, spacing, orientation), how stored samples map to data values, and the voxels of a box.
 //
 // Order: x fastest, then y, then z. A voxel's centre has integer data-space coordinates; the volume fills
-// [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the file (mm for scans).
+// [-0.5, size - 0.5) along each axis. Spacing is the distance of neighbouring centres, in the unit of the world (mm for scans).
 #pragma once
 
 #include <cstddef>

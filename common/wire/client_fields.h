@@ -8,7 +8,7 @@ namespace slabstream {
 
 static_assert(v1::FramePhase_MAX == static_cast<int>(FramePhase::kRunning));
 static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
-static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMillimetre));
+static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMetre));
 static_assert(v1::DataAction_MAX == static_cast<int>(DataAction::kReload));
 
 v1::SubmitFrame ProtoOf(const SubmitFrame&);
@@ -65,7 +65,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
 void Fields(auto& io, Is<PictureGeometry> auto& m) {
   using P = v1::PictureGeometry;
   io.OneOf("world", m.world, &P::world, &P::set_world, World::kVoxels, World::kPatient);
-  io.OneOf("unit", m.unit, &P::unit, &P::set_unit, LengthUnit::kVoxel, LengthUnit::kMillimetre);
+  io.OneOf("unit", m.unit, &P::unit, &P::set_unit, LengthUnit::kVoxel, LengthUnit::kMetre);
   io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
   io.Message("right", m.right, &P::right, &P::mutable_right);
   io.Message("up", m.up, &P::up, &P::mutable_up);

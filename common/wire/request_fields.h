@@ -11,7 +11,7 @@ namespace slabstream {
 static_assert(v1::Projection_MAX == static_cast<int>(Projection::kPerspective));
 static_assert(v1::ClipUnit_MAX == static_cast<int>(ClipUnit::kPercent));
 static_assert(v1::ClipMode_MAX == static_cast<int>(ClipMode::kCutAway));
-static_assert(v1::LabelMode_MAX == static_cast<int>(LabelMode::kSurface));
+static_assert(v1::LabelMode_MAX == static_cast<int>(LabelMode::kHighlight));
 static_assert(v1::AxisChoice_MAX == static_cast<int>(AxisChoice::kView) + 1);
 
 // The order is that of help texts. Limits stand in the schema; Validate checks them, once for the whole FrameRequest. Checked here: what a
@@ -137,6 +137,7 @@ void Fields(auto& io, Is<LabelRange> auto& m) {
   using P = v1::LabelRange;
   io.Any("first", m.first, &P::first, &P::set_first);
   io.Any("last", m.last, &P::last, &P::set_last);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxNameBytes);
 }
 
 void Fields(auto& io, Is<LabelOpacity> auto& m) {
@@ -147,7 +148,7 @@ void Fields(auto& io, Is<LabelOpacity> auto& m) {
 
 void Fields(auto& io, Is<LabelChoice> auto& m) {
   using P = v1::LabelChoice;
-  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, LabelMode::kTint, LabelMode::kSurface);
+  io.OneOf("mode", m.mode, &P::mode, &P::set_mode, LabelMode::kTint, LabelMode::kHighlight);
   io.Finite("tint", m.tint, &P::tint, &P::set_tint);
   io.Messages("opacities", m.opacities, &P::opacities, &P::mutable_opacities, kMaxLabels);
   io.Messages("shown", m.shown, &P::shown, &P::mutable_shown, kMaxLabelRanges);

@@ -49,7 +49,8 @@ class SchemaCheck {
   template <class T>
   void Member(const Field& field, const T& value, std::size_t most, const Limits& limits) {
     if constexpr (std::is_same_v<T, std::string>) {
-      Name(value);
+      const v1::About& about = AboutOf(field);
+      Text(value, about.most() > 0 ? about.least() : 1, about.most() > 0 ? about.most() : kMaxNameBytes);
     } else if constexpr (std::is_arithmetic_v<T>) {
       if (!AboutOf(field).ability().empty() && fmt::format("{}", value) != AboutOf(field).standard()) Given(field);
       if (limits.least != 0 || limits.most != 0) Number(double(value), limits);
@@ -65,7 +66,7 @@ class SchemaCheck {
       if (value.has_value()) Given(field), Members(*value, limits);
     } else if constexpr (requires { value.index(); }) {
       if (const auto* name = std::get_if<std::string>(&value)) {
-        Name(*name);
+        Text(*name, 1, kMaxNameBytes);
       } else {
         Keep(Validate(std::get<TransferFunction>(value)));
       }
@@ -96,9 +97,9 @@ class SchemaCheck {
                                              unit.empty() ? "" : " ", unit)));
   }
 
-  void Name(const std::string& name) {
-    if (!name.empty() && name.size() <= kMaxNameBytes) return;
-    Keep(Status::InvalidArgument(fmt::format("{} has {} bytes, but must have 1 to {}", path_, name.size(), kMaxNameBytes)));
+  void Text(const std::string& text, double least, double most) {
+    if (double(text.size()) >= least && double(text.size()) <= most) return;
+    Keep(Status::InvalidArgument(fmt::format("{} has {} bytes, but must have {} to {}", path_, text.size(), least, most)));
   }
 
   void Given(const Field& field) {
@@ -198,7 +199,7 @@ Status CheckRules(const LabelChoice& labels) {
   for (const auto& [value, opacity] : labels.opacities) {
     if (!named.insert(value).second) return Status::InvalidArgument(fmt::format("labels.opacities names label {} twice", value));
   }
-  for (const auto& [first, last] : labels.shown) {
+  for (const auto& [first, last, name] : labels.shown) {
     if (first > last) return Status::InvalidArgument(fmt::format("labels.shown has the range {} to {}, but must rise", first, last));
   }
   return Status::Ok();

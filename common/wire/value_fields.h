@@ -106,6 +106,18 @@ void Fields(auto& io, Is<Orientation> auto& m) {
   });
 }
 
+// The unit is left out if the file states none.
+inline void Write(const Orientation& in, v1::Orientation& out) {
+  WriteFields(in, out);
+  if (in.unit) out.set_unit(v1::LengthUnit(*in.unit));
+}
+inline void Read(const v1::Orientation& in, Orientation& out, Checker& check) {
+  ReadFields(in, out, check);
+  if (in.unit() == v1::LENGTH_UNIT_UNSPECIFIED) return;
+  out.unit = check.OneOf("unit", in.unit(), LengthUnit::kVoxel, LengthUnit::kMetre);
+  check.That(*out.unit > LengthUnit::kFile, "unit", "none that a file states");
+}
+
 void Fields(auto& io, Is<VolumeDescription> auto& m) {
   using P = v1::VolumeDescription;
   io.Message("size", m.geometry.size, &P::size, &P::mutable_size);

@@ -138,11 +138,8 @@ class Matter {
       const std::size_t number = volume_.LabelNumberAt(Max(bounds.begin, Min(VoxelAt(p), bounds.end - Uniform(1))));
       if (number > 0 && number <= look->entries.size()) {
         const LabelLook::Entry& entry = look->entries[number - 1];
-        if (look->mode == LabelMode::kTint) {
-          factor = entry.shown ? double(entry.opacity) : 0;
-        } else if (entry.shown) {
-          return -std::log1p(-double(entry.opacity));
-        }
+        if (entry.shown && look->mode == LabelMode::kSurface) return -std::log1p(-double(entry.opacity));
+        if (entry.shown) factor = double(entry.opacity);
       }
     }
     if (!std::isfinite(stored)) return 0;

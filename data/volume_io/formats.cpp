@@ -84,10 +84,12 @@ std::string WritableEndings() {
 }
 
 std::string WhatIsLost(const VolumeFormat& format, const VolumeGeometry& geometry) {
-  const auto& [spacing, axes, patient, scene] = format.keeps;
+  const auto& [spacing, axes, patient, scene, units] = format.keeps;
   const World world = geometry.orientation.world;
   std::vector<std::string> lost;
   if (!spacing && geometry.spacing != Vec3{1, 1, 1}) lost.push_back("the spacing " + Numbers(geometry.spacing, ","));
+  const std::optional<LengthUnit> unit = geometry.orientation.unit;
+  if (unit && std::ranges::count(units, *unit) == 0) lost.push_back(fmt::format("the unit {}", NameOf(*unit)));
   if (!axes && world != World::kVoxels) lost.emplace_back("the origin and the directions of the axes");
   if (axes && !patient && world == World::kPatient) lost.emplace_back("that the axes are a patient's: right, anterior, superior");
   if (axes && !scene && world == World::kScene) lost.emplace_back("that the axes are not a patient's");

@@ -19,6 +19,9 @@ struct KeptGeometry {
   bool spacing = true;
   bool axes = true;                   // directions and origin
   bool patient = true, scene = true;  // that they are a patient's, or that they are not
+  // Which units a file can state.
+  std::vector<LengthUnit> units = {LengthUnit::kMillimetre, LengthUnit::kMicrometre, LengthUnit::kNanometre,
+                                   LengthUnit::kAngstrom,   LengthUnit::kCentimetre, LengthUnit::kMetre};
 };
 
 struct VolumeFormat {

@@ -10,6 +10,7 @@
 
 #include "common/base/parse_number.h"
 #include "data/volume_io/formats.h"
+#include "data/volume_io/length_names.h"
 #include "data/volume_io/output.h"
 #include "data/volume_io/text_header.h"
 
@@ -68,6 +69,7 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   }
   header.type = *type;
   header.steps = StepsOf(Triple(*spacing));
+  header.unit = LengthUnitNamed(text.Find("DistanceUnits").value_or(""));
   std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
   for (std::size_t i = 0; i < 3 && !directions->empty(); ++i) axes[i] = Triple(*directions, i * count);
   // Only files about a patient name the directions of the axes; their space is left, posterior, superior. Others have no orientation
@@ -114,12 +116,13 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 // axes lie near those of World.
 std::string SpaceLines(const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
-  if (orientation.world == World::kVoxels) return "";
+  const std::string unit = orientation.unit ? fmt::format("DistanceUnits = {}\n", FileNameOf(*orientation.unit)) : "";
+  if (orientation.world == World::kVoxels) return unit;
   const bool patient = orientation.world == World::kPatient;
   const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
   const auto axis = [&](std::size_t i) { return Numbers(signs * orientation.axes[i]); };
-  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\n{}", axis(0), axis(1), axis(2), Numbers(signs * orientation.origin),
-                     patient ? "AnatomicalOrientation = LPI\n" : "");
+  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\n{}{}", axis(0), axis(1), axis(2), Numbers(signs * orientation.origin),
+                     patient ? "AnatomicalOrientation = LPI\n" : "", unit);
 }
 
 std::string HeaderOf(const FileSamples& samples, const std::string& data_file) {

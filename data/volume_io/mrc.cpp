@@ -83,6 +83,7 @@ Result<RawHeader> HeaderOf(const BinaryHeader& fields, SampleType type, const st
   const std::array<Vec3, 3> steps = CellSteps(fields);
   header.world = World::kScene;
   header.matrix = "cell";
+  if (Floats(fields, 11) != Vec3{}) header.unit = LengthUnit::kAngstrom;  // there is a cell
   const Index3 starts = Integers(fields, 5);
   for (int i = 0; i < 3; ++i) {
     if (axes[i] < 1 || axes[i] > 3 || seen[axes[i] - 1]++ != 0) {

@@ -77,6 +77,15 @@ std::optional<SampleType> ToSampleType(int data_type) {
   return found == kTypes.end() ? std::nullopt : std::optional(found->second);
 }
 
+// NIFTI_UNITS_...
+struct Unit {
+  int code;
+  LengthUnit unit;
+  double millimetres;
+};
+constexpr std::array<Unit, 3> kUnits = {
+    {{1, LengthUnit::kMetre, 1000}, {2, LengthUnit::kMillimetre, 1}, {3, LengthUnit::kMicrometre, 0.001}}};
+
 // Steps and origin in the patient's space, which is that of NIfTI. Like ITK, takes the affine matrix if it leads to the scanner's axes,
 // else the quaternion. Without either, only the spacing is known.
 void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
@@ -120,9 +129,9 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path,
   if (Status status = SetSize(header, path, std::move(sizes), options); !status.ok()) return status;
   constexpr int kLabels = 1002;  // NIFTI_INTENT_LABEL
   header.labels = fields.intent_code() == kLabels;
-  constexpr int kMetres = 1, kMicrometres = 3;  // NIFTI_UNITS_...
-  const double millimetres = fields.space_unit() == kMetres ? 1000 : fields.space_unit() == kMicrometres ? 0.001 : 1;
-  ReadOrientation(fields, millimetres, header);
+  const auto* const unit = std::ranges::find(kUnits, fields.space_unit(), &Unit::code);
+  ReadOrientation(fields, unit == kUnits.end() ? 1 : unit->millimetres, header);
+  if (unit != kUnits.end()) header.unit = LengthUnit::kMillimetre;
   // A slope of 0 means that there is none.
   if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
     header.rescale = {fields.slope(), fields.intercept()};
@@ -181,11 +190,12 @@ std::string HeaderOf(const FileSamples& samples) {
   put(76, 1.0F);  // a right-handed quaternion
   put(108, float(kUsualOffset));
   put(112, 1.0F);
+  const bool patient = orientation.world == World::kPatient;
+  const std::optional<LengthUnit> length = patient && !orientation.unit ? LengthUnit::kMillimetre : orientation.unit;
+  const auto* const unit = std::ranges::find(kUnits, length, &Unit::unit);
+  if (unit != kUnits.end()) bytes[123] = char(unit->code);
   if (orientation.world != World::kVoxels) {
-    constexpr char kMillimetres = 2;
     constexpr std::int16_t kScannerAxes = 1, kOtherAxes = 2;
-    const bool patient = orientation.world == World::kPatient;
-    if (patient) bytes[123] = kMillimetres;
     for (const std::size_t code : {252, 254}) put(code, patient ? kScannerAxes : kOtherAxes);
     const std::array<double, 3> quaternion = QuaternionOf(orientation.axes);
     for (int row = 0; row < 3; ++row) {
@@ -230,7 +240,7 @@ VolumeFormat Nifti() {
           .read = Read,
           .written_endings = {".nii", ".nii.gz"},
           .write = Write,
-          .keeps = {.scene = false}};
+          .keeps = {.scene = false, .units = {LengthUnit::kMillimetre, LengthUnit::kMicrometre, LengthUnit::kMetre}}};
 }
 
 }  // namespace slabstream

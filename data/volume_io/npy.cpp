@@ -157,7 +157,7 @@ VolumeFormat Npy() {
           .read = Read,
           .written_endings = {".npy"},
           .write = Write,
-          .keeps = {.spacing = false, .axes = false}};
+          .keeps = {.spacing = false, .axes = false, .units = {}}};
 }
 
 }  // namespace slabstream

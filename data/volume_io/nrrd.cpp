@@ -2,11 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "data/volume_io/formats.h"
+#include "data/volume_io/length_names.h"
 #include "data/volume_io/output.h"
 #include "data/volume_io/text_header.h"
 
@@ -58,6 +60,19 @@ Space SpaceNamed(std::string name) {
   return {World::kScene, {1, 1, 1}};
 }
 
+// The unit of three axes from number `first` on, of "mm" "mm" "mm": a name in quotes for each axis. None unless it is the same for all.
+std::optional<LengthUnit> UnitOf(std::string_view text, std::size_t first) {
+  std::vector<std::string_view> names;
+  for (std::size_t open = text.find('"'); open != std::string_view::npos; open = text.find('"')) {
+    const std::size_t close = text.find('"', open + 1);
+    if (close == std::string_view::npos) break;
+    names.push_back(text.substr(open + 1, close - open - 1));
+    text.remove_prefix(close + 1);
+  }
+  if (names.size() < first + 3 || names[first + 1] != names[first] || names[first + 2] != names[first]) return std::nullopt;
+  return LengthUnitNamed(names[first]);
+}
+
 Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options) {
   const std::optional<SampleType> type = ToSampleType(*text.Find("type"));
   if (!type) return text.NotAVolume("type '" + *text.Find("type") + "' is not supported");
@@ -86,6 +101,8 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   }
 
   header.steps = StepsOf(Triple(*spacings, first));
+  const auto of_space = text.Find("space units");
+  header.unit = of_space ? UnitOf(*of_space, 0) : UnitOf(text.Find("units").value_or(""), first);
   const std::string name = ToLower(text.Find("space").value_or(""));
   if (directions->empty() && name.empty()) return header;
   const Space space = SpaceNamed(name);
@@ -131,11 +148,12 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 // The header's lines about the spacing and, if it is known, the orientation.
 std::string SpaceLines(const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
-  if (orientation.world == World::kVoxels) return fmt::format("spacings: {}\n", Numbers(geometry.spacing));
+  const std::string units = orientation.unit ? fmt::format("units: \"{0}\" \"{0}\" \"{0}\"\n", FileNameOf(*orientation.unit)) : "";
+  if (orientation.world == World::kVoxels) return fmt::format("spacings: {}\n{}", Numbers(geometry.spacing), units);
   const auto step = [&](int i) { return Numbers(geometry.spacing[i] * orientation.axes[std::size_t(i)], ","); };
-  return fmt::format("space: {}\nspace directions: ({}) ({}) ({})\nspace origin: ({})\n",
-                     orientation.world == World::kPatient ? "right-anterior-superior" : "3D-right-handed", step(0), step(1), step(2),
-                     Numbers(orientation.origin, ","));
+  return fmt::format("space: {}\n{}{}space directions: ({}) ({}) ({})\nspace origin: ({})\n",
+                     orientation.world == World::kPatient ? "right-anterior-superior" : "3D-right-handed", units.empty() ? "" : "space ",
+                     units, step(0), step(1), step(2), Numbers(orientation.origin, ","));
 }
 
 Status Write(const FileSamples& samples, const std::string& path) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,8 +31,9 @@ struct RawHeader {
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
   std::array<Vec3, 3> steps = {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}};
-  Vec3 origin;                // of the centre of the first voxel
-  std::string_view matrix{};  // the file's name for the steps, for messages; lives as long as the program
+  Vec3 origin;                       // of the centre of the first voxel
+  std::optional<LengthUnit> unit{};  // of steps and origin, if the file states it
+  std::string_view matrix{};         // the file's name for the steps, for messages; lives as long as the program
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
   bool labels = false;   // samples are numbers of structures, not measurements

@@ -50,7 +50,10 @@ bool IsStackOfPictures(const std::string& folder, const std::vector<std::string_
 Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
                                       const ReadOptions& options) {
   if (Status status = SetSize(slice, path, {double(slice.size.x), double(slice.size.y), double(count)}, {}); !status.ok()) return status;
-  if (options.spacing) slice.steps = StepsOf(*options.spacing);
+  if (options.spacing) {
+    slice.steps = StepsOf(*options.spacing);
+    slice.unit.reset();  // whoever gives the distances says no unit
+  }
   // More than LZW (1400), deflate (1032), JPEG (512) and LZMA (7000) reach; a file that claims more is damaged.
   constexpr std::int64_t kMaxRatio = 8192;
   const std::int64_t needed = slice.sample_bytes();

@@ -189,7 +189,10 @@ Result<RawVolume> ReadPages(const std::string& path, const ReadOptions& options)
   if (!pages.ok()) return pages.status();
   const Result<PageOrder> order = file.ReadPageOrder(*pages, options);
   if (!order.ok()) return order.status();
-  if (order->spacing) first->steps = StepsOf(*order->spacing);
+  if (order->spacing) {
+    first->steps = StepsOf(*order->spacing);
+    first->unit = LengthUnit::kMicrometre;
+  }
   if (order->count == 1) return Status::InvalidArgument(path + ": has 2 dimensions, must have 3 (a page for each slice)");
   ReadOptions rest = options;
   if (order->of_channel) rest.channel.reset();

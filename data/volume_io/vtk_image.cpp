@@ -113,7 +113,7 @@ VolumeFormat VtkImage() {
           .read = Read,
           .written_endings = {".vti"},
           .write = Write,
-          .keeps = {.patient = false}};
+          .keeps = {.patient = false, .units = {}}};
 }
 
 }  // namespace slabstream

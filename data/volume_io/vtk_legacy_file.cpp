@@ -19,28 +19,28 @@ constexpr std::string_view kFirstLine = "# vtk DataFile Version";
 
 std::optional<SampleType> ToSampleType(std::string_view name) {
   // VTK writes its own type of numbers of points and cells as int.
-  static constexpr std::array<std::pair<std::string_view, SampleType>, 20> kNames = {{{"char", SampleType::kInt8},
-                                                                                      {"signed_char", SampleType::kInt8},
-                                                                                      {"unsigned_char", SampleType::kUint8},
-                                                                                      {"short", SampleType::kInt16},
-                                                                                      {"unsigned_short", SampleType::kUint16},
-                                                                                      {"int", SampleType::kInt32},
-                                                                                      {"unsigned_int", SampleType::kUint32},
-                                                                                      {"long", SampleType::kInt64},
-                                                                                      {"unsigned_long", SampleType::kUint64},
-                                                                                      {"vtkidtype", SampleType::kInt32},
-                                                                                      {"vtktypeint8", SampleType::kInt8},
-                                                                                      {"vtktypeuint8", SampleType::kUint8},
-                                                                                      {"vtktypeint16", SampleType::kInt16},
-                                                                                      {"vtktypeuint16", SampleType::kUint16},
-                                                                                      {"vtktypeint32", SampleType::kInt32},
-                                                                                      {"vtktypeuint32", SampleType::kUint32},
-                                                                                      {"vtktypeint64", SampleType::kInt64},
-                                                                                      {"vtktypeuint64", SampleType::kUint64},
-                                                                                      {"float", SampleType::kFloat32},
-                                                                                      {"double", SampleType::kFloat64}}};
-  const auto* const found = std::ranges::find(kNames, name, [](const auto& entry) { return entry.first; });
-  return found == kNames.end() ? std::nullopt : std::optional(found->second);
+  static constexpr std::array<std::pair<std::string_view, SampleType>, 20> kTypeNames = {{{"char", SampleType::kInt8},
+                                                                                          {"signed_char", SampleType::kInt8},
+                                                                                          {"unsigned_char", SampleType::kUint8},
+                                                                                          {"short", SampleType::kInt16},
+                                                                                          {"unsigned_short", SampleType::kUint16},
+                                                                                          {"int", SampleType::kInt32},
+                                                                                          {"unsigned_int", SampleType::kUint32},
+                                                                                          {"long", SampleType::kInt64},
+                                                                                          {"unsigned_long", SampleType::kUint64},
+                                                                                          {"vtkidtype", SampleType::kInt32},
+                                                                                          {"vtktypeint8", SampleType::kInt8},
+                                                                                          {"vtktypeuint8", SampleType::kUint8},
+                                                                                          {"vtktypeint16", SampleType::kInt16},
+                                                                                          {"vtktypeuint16", SampleType::kUint16},
+                                                                                          {"vtktypeint32", SampleType::kInt32},
+                                                                                          {"vtktypeuint32", SampleType::kUint32},
+                                                                                          {"vtktypeint64", SampleType::kInt64},
+                                                                                          {"vtktypeuint64", SampleType::kUint64},
+                                                                                          {"float", SampleType::kFloat32},
+                                                                                          {"double", SampleType::kFloat64}}};
+  const auto* const found = std::ranges::find(kTypeNames, name, [](const auto& entry) { return entry.first; });
+  return found == kTypeNames.end() ? std::nullopt : std::optional(found->second);
 }
 
 // VTK writes letters that would end a name as a per cent sign and two hexadecimal digits.

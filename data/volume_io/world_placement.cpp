@@ -152,6 +152,8 @@ std::string InBrackets(const Vec3& v) { return fmt::format("({:g}, {:g}, {:g})",
 Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& path) {
   WorldPlacement placed;
   VolumeGeometry& geometry = placed.geometry;
+  const bool usual = header.world == World::kPatient && header.unit == LengthUnit::kMillimetre;
+  if (!usual) geometry.orientation.unit = header.unit;
   if (header.world == World::kVoxels) {
     // Axes may be stored in another order, but not backwards: the sign of a spacing only tells how the scanner moved.
     const bool in_order = header.steps[0].y == 0 && header.steps[0].z == 0;

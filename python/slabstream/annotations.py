@@ -3,6 +3,7 @@ those of the command line."""
 from __future__ import annotations
 
 import dataclasses
+import fnmatch
 import json
 import subprocess
 from typing import Any, Sequence
@@ -32,6 +33,12 @@ class Annotations:
         return self.color_bar is not None or self.legend
 
 
+def _covers(each: Any, label: Any) -> bool:
+    if each.name:  # * and ? are all that a pattern knows
+        return fnmatch.fnmatchcase(label.name, each.name.replace("[", "[[]"))
+    return bool(each.first <= label.value <= each.last)
+
+
 def key_of(frame: Any, summary: Any) -> dict[str, Any]:
     """What colour bar and legend say, from the frame's request and the dataset's summary under its transfer function, as
     client/request/key_of_picture.h has it."""
@@ -48,7 +55,7 @@ def key_of(frame: Any, summary: Any) -> dict[str, Any]:
     if frame.HasField("labels"):
         shown = frame.labels.shown
         for label in summary.labels:
-            if not shown or any(each.first <= label.value <= each.last for each in shown):
+            if not shown or any(_covers(each, label) for each in shown):
                 entries.append({"name": label.name or str(label.value), "color": [label.red, label.green, label.blue]})
     entries += [{"name": f"{surface.value:g}", "color": bright(surface)} for surface in frame.transfer.isosurfaces]
     if entries:
@@ -58,7 +65,7 @@ def key_of(frame: Any, summary: Any) -> dict[str, Any]:
 
 def _geometry_fields(geometry: Any) -> dict[str, Any]:
     """As records of pictures have it."""
-    units = {"file": "unknown", "millimetre": "mm"}
+    units = {"file": "unknown", "millimetre": "mm", "micrometre": "µm", "nanometre": "nm", "angstrom": "Å", "centimetre": "cm", "metre": "m"}
     return {
         "world": geometry.world, "unit": units.get(geometry.unit, "voxel"),
         "projection": "perspective" if geometry.perspective else "orthographic",

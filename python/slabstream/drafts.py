@@ -17,8 +17,6 @@ from .errors import InvalidArgument, NotFound, UnknownOption
 from .image import PictureFormat
 from .options import COMMANDS, Option
 
-_MOST_NAME_BYTES = 256
-
 
 @dataclasses.dataclass
 class Draft:
@@ -98,8 +96,11 @@ def _label_opacities(opacities: Any, name: str, value: Any) -> None:
 
 
 def _label_ranges(ranges: Any, name: str, value: Any) -> None:
-    for first, last in values.label_ranges(name, value):
-        ranges.add(first=first, last=last)
+    for item in values.label_ranges(name, value):
+        if isinstance(item, str):
+            ranges.add(name=item)
+        else:
+            ranges.add(first=item[0], last=item[1])
 
 
 #: By the type of the field's messages.
@@ -112,8 +113,8 @@ _MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
 def _text(option: Option, value: Any) -> str:
     if option.choices:
         values.choice(option.name, value, option.choices)
-    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _MOST_NAME_BYTES:
-        raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {_MOST_NAME_BYTES} bytes")
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= values.MOST_NAME_BYTES:
+        raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {values.MOST_NAME_BYTES} bytes")
     return value
 
 
@@ -315,8 +316,8 @@ def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     _check("render", given)
     draft = Draft()
     frame = draft.frame
-    if not isinstance(dataset, str) or not 1 <= len(dataset.encode()) <= _MOST_NAME_BYTES:
-        raise InvalidArgument(f"dataset {dataset!r} must be a name of 1 to {_MOST_NAME_BYTES} bytes")
+    if not isinstance(dataset, str) or not 1 <= len(dataset.encode()) <= values.MOST_NAME_BYTES:
+        raise InvalidArgument(f"dataset {dataset!r} must be a name of 1 to {values.MOST_NAME_BYTES} bytes")
     frame.dataset = dataset
     _put_all(draft, "render", given)
     if "isovalue" in given and "transfer" not in given:

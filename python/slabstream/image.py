@@ -39,7 +39,7 @@ class Geometry:
     """How a picture shows the world of its volume. Vectors are x, y, z of the world, as on the command line."""
 
     world: str          # "voxels", "scene" or "patient" (x to the patient's right, y to anterior, z to superior)
-    unit: str           # of lengths: "voxel", "file" (that of its spacing, which is not known) or "millimetre"
+    unit: str           # of lengths: "voxel", "file" (that of its spacing, which is not known), or "millimetre", "micrometre", ...
     perspective: bool
     right: Vector       # to the right in the picture; the three are unit vectors at right angles
     up: Vector          # upwards in the picture
@@ -69,13 +69,20 @@ class Statistics:
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 
+_UNITS = {
+    schema.LENGTH_UNIT_FILE: "file", schema.LENGTH_UNIT_MILLIMETRE: "millimetre", schema.LENGTH_UNIT_MICROMETRE: "micrometre",
+    schema.LENGTH_UNIT_NANOMETRE: "nanometre", schema.LENGTH_UNIT_ANGSTROM: "angstrom", schema.LENGTH_UNIT_CENTIMETRE: "centimetre",
+    schema.LENGTH_UNIT_METRE: "metre",
+}
+
+
 def geometry_of(message: Any) -> Geometry:
     def vector(v: Any) -> Vector:
         return (v.x, v.y, v.z)
 
     return Geometry(
         world={schema.WORLD_SCENE: "scene", schema.WORLD_PATIENT: "patient"}.get(message.world, "voxels"),
-        unit={schema.LENGTH_UNIT_FILE: "file", schema.LENGTH_UNIT_MILLIMETRE: "millimetre"}.get(message.unit, "voxel"),
+        unit=_UNITS.get(message.unit, "voxel"),
         perspective=message.projection == schema.PROJECTION_PERSPECTIVE,
         right=vector(message.right),
         up=vector(message.up),

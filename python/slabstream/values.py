@@ -21,6 +21,7 @@ MOST_COORDINATE = 1e9  # of the world; a bound of a clip box that is left out
 MOST_SCALAR = 1e300
 MOST_SIDE = 16384      # pixels
 MOST_LABEL = 1 << 24
+MOST_NAME_BYTES = 256
 MOST_ISOSURFACES = 8
 
 # Of isosurfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
@@ -229,14 +230,21 @@ def label_opacities(name: str, value: object) -> list[tuple[int, float]]:
     return [(integer(name, label, 1, MOST_LABEL), number(name, opacity, 0, 1)) for label, opacity in pairs]
 
 
-def label_ranges(name: str, value: object) -> list[tuple[int, int]]:
-    """First and last of each, both included: [1, (5, 9)], 3, or "1,5-9"."""
+def label_ranges(name: str, value: object) -> list[tuple[int, int] | str]:
+    """First and last of each, both included, or a name or a pattern: [1, (5, 9), "Temporal_*"], 3, or "1,5-9,Temporal_*"."""
     if isinstance(value, str):
-        items: list[Any] = [item.split("-") if "-" in item else item for item in value.split(",")]
+        items: list[Any] = value.split(",")
     else:
         items = list(value) if isinstance(value, Iterable) else [value]
-    found = []
+    found: list[tuple[int, int] | str] = []
     for item in items:
+        if isinstance(item, str) and item.strip("0123456789-"):
+            if len(item.encode()) > MOST_NAME_BYTES:
+                raise InvalidArgument(f"{name} has a name of {len(item.encode())} bytes, at most {MOST_NAME_BYTES} are possible")
+            found.append(item)
+            continue
+        if isinstance(item, str) and "-" in item:
+            item = item.split("-", 1)
         ends = [item] if isinstance(item, str) or not isinstance(item, Iterable) else list(item)
         if len(ends) not in (1, 2):
             raise InvalidArgument(f"{name} {item!r} is not LABEL[-LABEL]")

@@ -56,7 +56,7 @@ class AtAService(WithAService):
         np.testing.assert_array_equal(histogram.counts, np.histogram(values, bins=256, range=(low, high))[0])
         self.assertEqual(histogram.edges.shape, (257,))
         found = self.service.labels("head")
-        self.assertEqual([(label.value, label.name) for label in found], [(value, "") for value in np.unique(labels[labels > 0])])
+        self.assertEqual([(label.value, label.name) for label in found], [(1, "left_1"), (2, "left_2"), (3, "right_2")])
         self.assertTrue(all(0 <= share <= 1 for label in found for share in label.color))
         with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
             self.service.labels("nothing")

@@ -41,7 +41,8 @@ def write_volumes(folder: pathlib.Path) -> str:
     grid = dict(spacing=(2, 1.5, 1.25), origin=(-10, 5, 20), direction=((1, 0, 0), (0, 1, 0), (0, 0, 1)), world="patient")
     for name, array in zip(("head", "labels", "overlay"), volume_arrays()):
         volumes.write_nrrd(volumes.volume_of(array, **grid), folder / f"{name}.nrrd")
-    return f"head={folder}/head.nrrd,labels={folder}/labels.nrrd,overlay={folder}/overlay.nrrd"
+    (folder / "names.txt").write_text("1 left_1 200 60 40 0\n2 left_2 60 190 130 0\n3 right_2 50 100 255 0\n")
+    return f"head={folder}/head.nrrd,labels={folder}/labels.nrrd:{folder}/names.txt,overlay={folder}/overlay.nrrd"
 
 
 class RunningService:

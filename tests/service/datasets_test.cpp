@@ -133,6 +133,20 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   request.dataset = "layered";
   request.labels->shown = {{3, 9}};
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("no label from 3 to 9; it has 2 from 1 to 2"));
+  request.labels->shown = {{.name = "none*"}};
+  EXPECT_THAT(client_->Render(request).status().message(),
+              testing::HasSubstr("labels.shown: no label is named 'none*'; there are left, right"));
+  // By name as by number.
+  const auto shown = [&](LabelRange range, LabelMode mode) {
+    request.labels = LabelChoice{.mode = mode, .tint = 1, .shown = {std::move(range)}};
+    return client_->Render(request).value().image;
+  };
+  for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface, LabelMode::kHighlight}) {
+    const LocalImage by_number = shown({2, 2}, mode);
+    EXPECT_LE(LargestDifference(shown({.name = "right"}, mode), by_number, request.size), AllowedDifference(request));
+    EXPECT_LE(LargestDifference(shown({.name = "*ght"}, mode), by_number, request.size), AllowedDifference(request));
+    EXPECT_GT(LargestDifference(shown({.name = "l*"}, mode), by_number, request.size), 0.1);
+  }
   request.renderer = "splat";
   request.labels->shown.clear();
   EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: zbuffer, raycast"));

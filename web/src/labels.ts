@@ -4,8 +4,38 @@ import type { LabelName } from "./api";
 import type { Context } from "./context";
 import { can } from "./offers";
 
-// "1,5-9" as a set; empty text: all.
-export const isListed = (list: string, label: number): boolean => list === "" || list.split(",").some(part => { const [first, last] = part.split("-").map(Number); return label >= (first ?? 0) && label <= (last ?? first ?? 0); });
+// Whether * (any characters, also none) and ? (one) in the pattern can stand for what the name has there.
+function matches(name: string, pattern: string): boolean {
+  const letters = [...name], signs = [...pattern];
+  let n = 0, p = 0, star = -1, taken = 0; // the last star stands for what ends before `taken`
+  while (n < letters.length) {
+    if (signs[p] === "*") { star = p++; taken = n; }
+    else if (p < signs.length && (signs[p] === "?" || signs[p] === letters[n])) { p++; n++; }
+    else if (star >= 0) { p = star + 1; n = ++taken; }
+    else return false;
+  }
+  return signs.slice(p).every(sign => sign === "*");
+}
+
+// "1,5-9,Precentral_L,Temporal_*" as a set; empty text: all.
+export const isListed = (list: string, { value, name }: LabelName): boolean => list === "" || list.split(",").some(part => {
+  if (/[^\d-]/.test(part)) return matches(name ?? "", part);
+  const [first, last] = part.split("-").map(Number);
+  return value >= (first ?? 0) && value <= (last ?? first ?? 0);
+});
+
+// The list of these of all labels, both in ascending order, with ranges where labels follow one another.
+export function listOf(shown: readonly LabelName[], all: readonly LabelName[]): string {
+  const parts: [number, number][] = [];
+  let before = -2; // of the last one, its place among all
+  for (const label of shown) {
+    const place = all.indexOf(label), last = parts[parts.length - 1];
+    if (last && place === before + 1) last[1] = label.value; else parts.push([label.value, label.value]);
+    before = place;
+  }
+  return parts.map(([first, last]) => (first === last ? `${first}` : `${first}-${last}`)).join(",");
+}
+
 export const labelText = ({ name, value }: LabelName): string => name || `Label ${value}`;
 
 export class Labels {
@@ -26,9 +56,9 @@ export class Labels {
     if (!this.names.some(known => known.value === label.value)) this.set([...this.names, label].sort((a, b) => a.value - b.value));
   }
 
-  shows({ value }: LabelName): boolean {
+  shows(label: LabelName): boolean {
     const { labelsShown, labelOpacities } = this.context.store.state;
-    return isListed(labelsShown, value) && labelOpacities[value] !== 0;
+    return isListed(labelsShown, label) && labelOpacities[label.value] !== 0;
   }
 
   // Of the picture, if it is wanted.

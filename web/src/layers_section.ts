@@ -3,7 +3,7 @@ import type { LabelName } from "./api";
 import type { Context } from "./context";
 import { choice, colorField, optionalField, row, section, segmented, slider, textField, toggle } from "./controls";
 import { h } from "./dom";
-import { isListed, type Labels, labelText } from "./labels";
+import { isListed, type Labels, labelText, listOf } from "./labels";
 import { can, presetChoices, rendererThatCan, titlesThatCan } from "./offers";
 import { LOOK, ONE_COLOR } from "./state";
 import { rounded } from "./vec";
@@ -12,16 +12,20 @@ import { rounded } from "./vec";
 function labelList({ store }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
   const element = h("div", { class: "labels", role: "group", "aria-label": "Labels" });
   let made: readonly LabelName[] = [];
-  // The opacity 0 hides one of all labels; a list of what is shown is changed as such.
-  const setShown = (label: number, on: boolean): void => {
-    const { labelsShown, labelOpacities } = store.state;
-    if (!isListed(labelsShown, label)) return store.update({ labelsShown: `${labelsShown},${label}` }, "label");
-    const rest = Object.fromEntries(Object.entries(labelOpacities).filter(([key]) => key !== String(label)));
-    store.update({ labelOpacities: on ? rest : { ...rest, [label]: 0 } }, "label");
+  // The opacity 0 hides one of all labels and, but for highlights, what is in it; a list of what is shown is changed as such.
+  const setShown = (label: LabelName, on: boolean): void => {
+    const { labels: mode, labelsShown, labelOpacities } = store.state;
+    if (!isListed(labelsShown, label)) return store.update({ labelsShown: `${labelsShown},${label.value}` }, "label");
+    if (!on && mode === "highlight") {
+      const rest = listOf(labels.names.filter(known => known !== label && isListed(labelsShown, known)), labels.names);
+      return store.update(rest ? { labelsShown: rest } : { labels: "off" }, "label");
+    }
+    const rest = Object.fromEntries(Object.entries(labelOpacities).filter(([key]) => key !== String(label.value)));
+    store.update({ labelOpacities: on ? rest : { ...rest, [label.value]: 0 } }, "label");
   };
   const make = (label: LabelName): HTMLElement => {
     const name = labelText(label);
-    const box: HTMLInputElement = h("input", { type: "checkbox", "aria-label": `Show ${name}`, onchange: () => setShown(label.value, box.checked) });
+    const box: HTMLInputElement = h("input", { type: "checkbox", "aria-label": `Show ${name}`, onchange: () => setShown(label, box.checked) });
     const opacity: HTMLInputElement = h("input", { type: "range", min: 0, max: 1, step: 0.05, "aria-label": `Opacity of ${name}`, oninput: () => store.update({ labelOpacities: { ...store.state.labelOpacities, [label.value]: rounded(Number(opacity.value)) } }, `opacity ${label.value}`) });
     const only = h("button", { type: "button", class: "only", "aria-label": `Show only ${name}`, onclick: () => store.update({ labelsShown: store.state.labelsShown === String(label.value) ? "" : String(label.value) }, "only") }, "only");
     const swatch = h("span", { class: "swatch", "aria-hidden": "true" });
@@ -43,9 +47,9 @@ function labelList({ store }: Context, labels: Labels): { element: HTMLElement; 
 
 export function layersSection(context: Context, labels: Labels): HTMLElement {
   const { store } = context, list = labelList(context, labels);
-  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
+  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
   const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
-  const which = textField("Shown", "all, or 1,5-9", "[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*", value => store.update({ labelsShown: value }, "labels shown"));
+  const which = textField("Shown", "all, or 1,5-9,Frontal_*", "[^,]+(,[^,]+)*", value => store.update({ labelsShown: value }, "labels shown"));
   const legend = toggle("Legend", on => store.update({ legend: on }));
   const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: rendererThatCan("overlay") } : {}) }, "overlay"));
   const overlayPreset = choice("Overlay’s function", [...presetChoices(), [ONE_COLOR, "One colour"]], value => store.update({ overlayPreset: value }, "overlay preset"));
@@ -77,7 +81,7 @@ export function layersSection(context: Context, labels: Labels): HTMLElement {
     ends.forEach((end, i) => end.set(typed[i] ?? null));
     weight.set(state.overlayWeight);
     (mode.element.parentElement as HTMLElement).hidden = !any;
-    tint.element.hidden = !any || state.labels !== "tint";
+    tint.element.hidden = !any || (state.labels !== "tint" && state.labels !== "highlight");
     which.element.hidden = list.element.hidden = legend.element.hidden = !on;
     hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
     hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;

@@ -108,7 +108,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
-  labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,
+  labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: opacities,
   overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
   measures, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),

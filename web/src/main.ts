@@ -144,7 +144,7 @@ class Page {
       element.hidden = !volume;
       if (!volume) return;
       const fact = (name: string, value: string): HTMLElement => h("div", {}, h("dt", {}, name), h("dd", {}, value));
-      const unit = volume.unit === "mm" ? " mm" : "";
+      const unit = volume.unit === "voxel" || volume.unit === "unknown" ? "" : ` ${volume.unit}`;
       list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), ...(volume.cells > 0 ? [fact("Cells", `${volume.cells}`)] : []), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`),
         fact("World", volume.world === "patient" ? "a patient’s (R, A, S)" : volume.world === "scene" ? "a scene’s" : "the voxels’"), fact("Memory", `${(volume.memoryBytes / 1e6).toFixed(1)} MB`));
     };

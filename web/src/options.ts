@@ -19,7 +19,7 @@ function transferOptions(state: State): Options {
 
 function labelOptions(state: State, opacities: boolean): Options {
   const options: Options = { "label-mode": state.labels };
-  if (state.labels === "tint") options["label-tint"] = state.labelTint;
+  if (state.labels !== "surface") options["label-tint"] = state.labelTint;
   if (state.labelsShown) options["labels-shown"] = state.labelsShown;
   const each = Object.entries(state.labelOpacities);
   if (opacities && each.length > 0) options["label-opacity"] = each.map(([label, opacity]) => `${label}=${opacity}`).join(",");

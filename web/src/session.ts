@@ -4,7 +4,7 @@ import type { Vec3 } from "./vec";
 
 export interface Geometry {
   right: Vec3; up: Vec3; forward: Vec3; target: Vec3; target_depth: number; pixel_size: number;
-  projection: "orthographic" | "perspective"; world: string; unit: "voxel" | "unknown" | "mm";
+  projection: "orthographic" | "perspective"; world: string; unit: string; // "voxel", "unknown" or a unit's symbol
 }
 export interface Span { worker: number; group: number; stage: string; begin_ms: number; end_ms: number }
 export interface Statistics {

@@ -37,9 +37,9 @@ export interface State {
   clipBox: ClipBox | null;
   clipPlanes: readonly ClipPlane[];
   clipMode: "keep" | "cut-away";
-  labels: "off" | "tint" | "surface";
+  labels: "off" | "tint" | "highlight" | "surface";
   labelTint: number;
-  labelsShown: string; // as 1,5-9; empty: all
+  labelsShown: string; // as 1,5-9,Precentral_L,Temporal_*; empty: all
   labelOpacities: Readonly<Record<string, number>>;
   overlay: boolean;
   overlayPreset: string; // or ONE_COLOR

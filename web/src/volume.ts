@@ -30,4 +30,5 @@ export function centreOf(token: string, dataset: string): Promise<{ centre: Vec3
   });
 }
 
-export const unitName = (unit: string): string => (unit === "mm" ? "mm" : unit === "voxel" ? "voxels" : "units");
+// As it stands behind a number: "mm", "µm", or if the file states none, "voxels" or "units".
+export const unitName = (unit: string): string => (unit === "voxel" ? "voxels" : unit === "unknown" || unit === "" ? "units" : unit);

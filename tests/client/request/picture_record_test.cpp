@@ -79,6 +79,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--transfer", "gray-ramp", "--scalar-range=-5.5:100"},
     {"--renderer", "raycast", "--label-mode", "tint"},
     {"--renderer", "raycast", "--label-mode", "surface", "--label-opacity", "3=0.30000000000000004,7=0", "--labels-shown", "1,5-9"},
+    {"--renderer", "raycast", "--label-mode", "highlight", "--labels-shown", "Temporal_*,7,H\xC3\xB6hle ?"},
     {"--renderer", "raycast", "--label-tint", "0.1", "--overlay-transfer", "gray-ramp", "--overlay-range=-3:1e-3", "--overlay-weight",
      "0.5"},
     {"--renderer", "raycast", "--labels", "atlas.nii", "--overlay", "map.nii"},

@@ -64,6 +64,18 @@ TEST(ParseClipBox, TakesBoundsInThreeUnits) {
   }
 }
 
+TEST(ParseLabelRanges, TakesNumbersAndNames) {
+  EXPECT_EQ(*ParseLabelRanges("--labels-shown", "3,5-9,Precentral_L,Temporal_*,4th ventricle,-x"),
+            (std::vector<LabelRange>{
+                {3, 3}, {5, 9}, {.name = "Precentral_L"}, {.name = "Temporal_*"}, {.name = "4th ventricle"}, {.name = "-x"}}));
+  EXPECT_EQ(TextOf(std::vector<LabelRange>{{3, 3}, {5, 9}, {.name = "Gyrus, left"}}), "3,5-9,Gyrus? left");
+  for (const char* text : {"", "1,", "0", "9-5", "5-", "-5", "1-2-3", "16777217"}) {
+    EXPECT_EQ(ParseLabelRanges("--labels-shown", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+  EXPECT_EQ(ParseLabelRanges("--labels-shown", std::string(257, 'x')).status().message(),
+            "--labels-shown has a name of 257 bytes, at most 256 are possible");
+}
+
 TEST(ParseValueWindow, TakesAWidthOrAName) {
   EXPECT_EQ(*ParseValueWindow("--window", "80"), (ValueWindow{80, 40}));
   EXPECT_EQ(*ParseValueWindow("--window", "lung"), (ValueWindow{1500, -600}));

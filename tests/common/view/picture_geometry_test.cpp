@@ -76,6 +76,10 @@ TEST(PictureGeometryTest, UnitsFollowFromWhatTheFileStates) {
   EXPECT_EQ(unit(World::kScene, {1, 1, 1}), LengthUnit::kFile);
   EXPECT_EQ(unit(World::kVoxels, {1, 1, 2}), LengthUnit::kFile);
   EXPECT_EQ(unit(World::kVoxels, {1, 1, 1}), LengthUnit::kVoxel);
+  for (const World world : {World::kVoxels, World::kScene, World::kPatient}) {
+    const VolumeGeometry stated = {{8, 8, 8}, {1, 1, 1}, {.world = world, .unit = LengthUnit::kMicrometre}};
+    EXPECT_EQ(GeometryOf(MakeCamera({}, kSize, stated), stated).unit, LengthUnit::kMicrometre);
+  }
 }
 
 }  // namespace

@@ -182,6 +182,11 @@ TEST(PictureLabels, AScaleBarNamesItsUnit) {
   EXPECT_EQ(label(LengthUnit::kMillimetre, 0.5), "50 mm");
   EXPECT_EQ(label(LengthUnit::kMillimetre, 0.5, Projection::kPerspective), "50 mm at target");
   EXPECT_EQ(label(LengthUnit::kMillimetre, 0.0003), "0.02 mm");
+  EXPECT_EQ(label(LengthUnit::kMicrometre, 0.2), "20 \u00b5m");
+  EXPECT_EQ(label(LengthUnit::kNanometre, 0.01), "1 nm");
+  EXPECT_EQ(label(LengthUnit::kAngstrom, 2), "200 \u00c5");
+  EXPECT_EQ(label(LengthUnit::kCentimetre, 0.01), "1 cm");
+  EXPECT_EQ(label(LengthUnit::kMetre, 0.01, Projection::kPerspective), "1 m at target");
   EXPECT_EQ(label(LengthUnit::kFile, 2), "200 units");
   EXPECT_EQ(label(LengthUnit::kFile, 0.01), "1 unit");
   EXPECT_EQ(label(LengthUnit::kVoxel, 0.01), "1 voxel");

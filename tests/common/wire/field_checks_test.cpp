@@ -310,7 +310,7 @@ TEST(FieldChecks, Clients) {
        },
        "FrameReply.runs.image.bounds: not inside the picture"},
       {[&](auto& e) { geometry(e)->clear_world(); }, "FrameReply.geometry.world: not set"},
-      {[&](auto& e) { geometry(e)->set_unit(v1::LengthUnit(4)); }, "FrameReply.geometry.unit: unknown value 4"},
+      {[&](auto& e) { geometry(e)->set_unit(v1::LengthUnit(9)); }, "FrameReply.geometry.unit: unknown value 9"},
       {[&](auto& e) { geometry(e)->clear_projection(); }, "FrameReply.geometry.projection: not set"},
       {[&](auto& e) { geometry(e)->mutable_right()->set_x(1.1); },
        "FrameReply.geometry.right: not of three right-handed unit vectors at right angles"},

@@ -285,10 +285,14 @@ std::vector<SubmitFrame> SamplesOf() {
   surfaces.transfer.gradient_opacities = {{1e-3, 0.5}, {7, 0}};
   FrameRequest layers = Request();
   layers.renderer = "raycast";
-  layers.labels = LabelChoice{
-      .mode = LabelMode::kSurface, .tint = 1, .opacities = {{1, 0}, {kMaxLabelValue, 0.25}}, .shown = {{1, kMaxLabelValue}, {7, 7}}};
+  layers.labels = LabelChoice{.mode = LabelMode::kSurface,
+                              .tint = 1,
+                              .opacities = {{1, 0}, {kMaxLabelValue, 0.25}},
+                              .shown = {{1, kMaxLabelValue}, {7, 7}, {.name = kUmlaut}}};
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
-  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}};
+  FrameRequest highlights = layers;
+  highlights.labels->mode = LabelMode::kHighlight;
+  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}, {1, 2, highlights}};
 }
 
 template <>
@@ -313,9 +317,12 @@ std::vector<FrameReply> SamplesOf() {
                                    1e300};
   const PictureGeometry behind_the_eye_plane{
       World::kScene, LengthUnit::kFile, Projection::kOrthographic, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {}, -7.5, 0.25};
+  PictureGeometry in_metres = of_patient;
+  in_metres.unit = LengthUnit::kMetre;
   return {{1, {1, 1}, 0, 1, NoRuns(), {}, {}},
           {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics, of_patient},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane}};
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane},
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, in_metres}};
 }
 
 template <>

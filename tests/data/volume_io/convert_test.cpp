@@ -131,6 +131,36 @@ TEST(Convert, SaysWhatAFormatDoesNotKeep) {
   EXPECT_EQ(lost("v.vti", patient), "that the axes are a patient's: right, anterior, superior");
 }
 
+TEST(Convert, KeepsTheUnitWhereAFileCanStateIt) {
+  const TemporaryDirectory directory;
+  Volume volume = MakeTestVolume({2, 2, 2}, ScalarType::kUint8, [](const Index3&) { return 1; });
+  VolumeGeometry& geometry = volume.description.geometry;
+  geometry.spacing = {0.5, 1, 2};
+  const auto unit_after = [&](const std::string& file) {
+    EXPECT_TRUE(WriteVolume(volume, directory / file).ok());
+    return ReadVolume(directory / file)->volume->description.geometry.orientation.unit;
+  };
+  for (const World world : {World::kVoxels, World::kScene}) {
+    geometry.orientation.world = world;
+    for (int unit = int(LengthUnit::kMillimetre); unit <= int(LengthUnit::kMetre); ++unit) {
+      geometry.orientation.unit = LengthUnit(unit);
+      for (const char* file : {"v.nrrd", "v.mha", "v.mhd"}) {
+        EXPECT_EQ(unit_after(file), LengthUnit(unit)) << file;
+        EXPECT_EQ(WhatIsLost(*FindWritableFormat(file), geometry), "");
+      }
+    }
+  }
+  // NIfTI is read in mm, and has no name for others.
+  geometry.orientation = {.unit = LengthUnit::kMicrometre};
+  EXPECT_EQ(unit_after("v.nii"), LengthUnit::kMillimetre);
+  ExpectNear(ReadVolume(directory / "v.nii")->volume->description.geometry.spacing, {0.0005, 0.001, 0.002}, 1e-9);
+  geometry.orientation.unit = LengthUnit::kAngstrom;
+  for (const char* file : {"v.nii", "v.vti"}) {
+    EXPECT_EQ(WhatIsLost(*FindWritableFormat(file), geometry), "the unit \u00c5");
+    EXPECT_EQ(unit_after(file), std::nullopt) << file;
+  }
+}
+
 TEST(Convert, ToATypeHoldsEveryValueOrNamesTheOneThatDoesNotFit) {
   const TemporaryDirectory directory;
   Volume volume = MakeTestVolume({4, 3, 2}, ScalarType::kUint16, [](const Index3& v) { return v == Index3{2, 1, 1} ? 3071 : v.x; });

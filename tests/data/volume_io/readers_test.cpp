@@ -134,6 +134,7 @@ TEST_F(ReadersTest, MrcAxesAreThoseOfTheCell) {
     const VolumeGeometry& geometry = loaded.info.description.geometry;
     EXPECT_EQ(geometry.size, size);
     ExpectNear(geometry.spacing, spacing, 1e-6);
+    EXPECT_EQ(geometry.orientation.unit, LengthUnit::kAngstrom);
     EXPECT_EQ(geometry.orientation.axes, Orientation{}.axes);
     EXPECT_EQ(ValuesOf(loaded), Counted(24)) << axes.x << axes.y << axes.z;
     Vec3 origin;
@@ -527,6 +528,45 @@ TEST_F(ReadersTest, PicturesThatAreCutOffOrDamagedFail) {
   }
 }
 
+// --- units
+
+TEST_F(ReadersTest, UnitsOfTextHeadersAreTold) {
+  const auto unit = [&](const std::string& name, const std::string& header) {
+    return Read(name, header + FileBytes(8, 'x')).info.description.geometry.orientation.unit;
+  };
+  const auto nrrd = [&](const std::string& lines) {
+    return unit("v.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n" + lines + "\n");
+  };
+  const std::string scene = "space: 3D-right-handed\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n",
+                    patient = "space: RAS\nspace directions: (1,0,0) (0,1,0) (0,0,1)\n";
+  EXPECT_EQ(nrrd(""), std::nullopt);
+  EXPECT_EQ(nrrd("spacings: 1 1 2\nunits: \"um\" \"um\" \"um\"\n"), LengthUnit::kMicrometre);
+  EXPECT_EQ(nrrd("units: \"microns\" \"microns\" \"microns\"\n"), LengthUnit::kMicrometre);
+  EXPECT_EQ(nrrd("units: \"\u03bcm\" \"\u03bcm\" \"\u03bcm\"\n"), LengthUnit::kMicrometre);
+  EXPECT_EQ(nrrd("units: \"nanometers\" \"nanometers\" \"nanometers\"\n"), LengthUnit::kNanometre);
+  EXPECT_EQ(nrrd(scene + "space units: \"cm\" \"cm\" \"cm\"\n"), LengthUnit::kCentimetre);
+  EXPECT_EQ(nrrd(patient + "space units: \"um\" \"um\" \"um\"\n"), LengthUnit::kMicrometre);
+  EXPECT_EQ(nrrd(patient + "space units: \"mm\" \"mm\" \"mm\"\n"), std::nullopt) << "goes without saying";
+  for (const char* other :
+       {"\"mm\" \"mm\" \"um\"", "\"mm\" \"mm\"", "\"pixel\" \"pixel\" \"pixel\"", "mm mm mm", "\"mm\" \"mm\" \"mm", "\""}) {
+    EXPECT_EQ(nrrd(std::string("units: ") + other + "\n"), std::nullopt) << other;
+  }
+  // Not of the axis of components.
+  EXPECT_EQ(Read("v.nrrd",
+                 "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 1 2 2 2\nencoding: raw\nkinds: vector domain domain domain\n"
+                 "units: \"\" \"nm\" \"nm\" \"nm\"\n\n" +
+                     FileBytes(8, 'x'),
+                 {.channel = 0})
+                .info.description.geometry.orientation.unit,
+            LengthUnit::kNanometre);
+  const auto meta = [&](const std::string& lines) {
+    return unit("v.mha", "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\n" + lines + "ElementDataFile = LOCAL\n");
+  };
+  EXPECT_EQ(meta(""), std::nullopt);
+  EXPECT_EQ(meta("DistanceUnits = ?\n"), std::nullopt);
+  EXPECT_EQ(meta("DistanceUnits = um\n"), LengthUnit::kMicrometre);
+}
+
 // --- OME-TIFF
 
 std::string Ome(const std::string& pixels, const std::string& channels = "") {
@@ -566,6 +606,18 @@ TEST_F(OmeTest, PhysicalSizesAreMicrometres) {
       {0.25, 0.5, 2}, 1e-12);
   EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\""), (Vec3{1, 1, 1})) << "not all are known";
   EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\" PhysicalSizeZUnit=\"pixel\""), (Vec3{1, 1, 1}));
+}
+
+TEST_F(OmeTest, PhysicalSizesHaveAUnit) {
+  const auto unit = [&](const std::string& sizes, const ReadOptions& options = {}) {
+    return ReadPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" " + sizes), 2), options)
+        .info.description.geometry.orientation.unit;
+  };
+  const std::string sizes = "PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\"";
+  EXPECT_EQ(unit(sizes), LengthUnit::kMicrometre);
+  EXPECT_EQ(unit(sizes + " PhysicalSizeXUnit=\"nm\""), LengthUnit::kMicrometre);
+  EXPECT_EQ(unit(""), std::nullopt);
+  EXPECT_EQ(unit(sizes, {.spacing = Vec3{1, 1, 2}}), std::nullopt) << "whoever gives the distances says no unit";
 }
 
 TEST_F(OmeTest, OneChannelAndTimeIsTaken) {

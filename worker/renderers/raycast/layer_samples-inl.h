@@ -124,15 +124,15 @@ HWY_INLINE LayeredSample WithLayers(const RayLayers& layers, const RayBox& box, 
     sample.label = NearestLabel(layers, box, place, at);
     sample.label_entry = hn::ShiftLeft<2>(sample.label);
     const auto changed = hn::GatherIndex(df, tables.entries.data() + 3, sample.label_entry);
+    const auto shown = hn::Ge(changed, zero);
     if (tables.surface) {
-      sample.matter = hn::Ge(changed, zero);
+      sample.matter = shown;
       sample.opacity = hn::IfThenElse(sample.matter, changed, opacity);
       sample.tint = hn::IfThenElseZero(sample.matter, one);
     } else {
-      const auto labelled = hn::RebindMask(df, hn::Gt(sample.label, hn::Zero(di)));
-      sample.tint = hn::IfThenElseZero(labelled, Set(tables.tint));
-      sample.opacity = hn::IfThenElseZero(hn::Gt(changed, zero), opacity);
-      const auto thinned = hn::And(hn::Lt(changed, one), hn::Gt(sample.opacity, zero));
+      sample.tint = hn::IfThenElseZero(shown, Set(tables.tint));
+      sample.opacity = hn::IfThenElseZero(hn::Ne(changed, zero), opacity);
+      const auto thinned = hn::And(hn::And(shown, hn::Lt(changed, one)), hn::Gt(sample.opacity, zero));
       if (!hn::AllFalse(df, thinned)) {
         const auto steps = Set(tables.steps_a_length);
         const auto of_length = hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), steps));

@@ -24,8 +24,9 @@ HWY_INLINE void AddLabelled(const MarchWork& work, Mask rays, const SamplePlace&
   const float *const colors = work.look->surface_looks.data(), *const tints = tables.entries.data();
   const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, IndexBefore(*work.box, place, rays)));
   const auto changed = hn::GatherIndex(df, tints + 3, label);
-  const auto factor = tables.surface ? hn::IfThenElseZero(hn::Lt(changed, hn::Zero(df)), Set(1)) : changed;
-  const auto tint = hn::IfThenElseZero(hn::RebindMask(df, hn::Gt(label, hn::Zero(IntTag()))), Set(tables.tint));
+  const auto shown = hn::Ge(changed, hn::Zero(df));
+  const auto factor = hn::IfThenElse(shown, tables.surface ? hn::Zero(df) : changed, Set(1));
+  const auto tint = hn::IfThenElseZero(shown, Set(tables.tint));
   sums.AddChannels(rays, hn::Mul(hn::GatherIndex(df, colors + 3, entry), factor), [&](std::size_t channel) HWY_ATTR {
     return Sums::Lit(Lerp(tint, hn::GatherIndex(df, colors + channel, entry), hn::GatherIndex(df, tints + channel, label)), light);
   });

@@ -10,11 +10,10 @@ LabelTables MakeLabelTables(const LabelLook& look, double steps_per_voxel, doubl
   tables.tint = tables.surface ? 0 : float(look.tint);
   tables.last = float(look.entries.size());
   tables.steps_a_length = float(steps_per_voxel * opacity_distance);
-  tables.entries = {0, 0, 0, tables.surface ? -1.0F : 1.0F};
+  tables.entries = {0, 0, 0, -1};
   for (const auto& [color, opacity, shown] : look.entries) {
-    const double factor = shown ? double(opacity) : 0;
-    const double of_step = shown ? -std::expm1(std::log1p(-double(opacity)) / steps_per_voxel) : -1;
-    tables.entries.insert(tables.entries.end(), {color.r, color.g, color.b, float(tables.surface ? of_step : factor)});
+    const double of_step = -std::expm1(std::log1p(-double(opacity)) / steps_per_voxel);
+    tables.entries.insert(tables.entries.end(), {color.r, color.g, color.b, !shown ? -1 : tables.surface ? float(of_step) : opacity});
   }
   return tables;
 }

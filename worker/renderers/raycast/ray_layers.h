@@ -14,8 +14,9 @@ namespace slabstream {
 // Tables of labels. Made once a frame.
 struct LabelTables {
   // Four floats each, by number: straight colour, and
-  //   tint     the factor of the material's opacity; of label 0 and of others that leave it as it is: 1
-  //   surface  the opacity of one step along a ray; -1: the volume's material is drawn as it is
+  //   tint     the factor of the material's opacity
+  //   surface  the opacity of one step along a ray
+  // -1, as of label 0: the volume's material is drawn as it is
   AlignedVector<float> entries;
   bool surface = false;
   float tint = 0;            // share of the label's colour; 0 with surfaces

@@ -28,7 +28,7 @@ bool ShownLabels::AnyOpaqueBetween(float low, float high) const {
 std::vector<float> LabelColors(const LabelLook& look) {
   std::vector<float> colors(4);
   for (const LabelLook::Entry& entry : look.entries) {
-    const float share = look.mode == LabelMode::kTint ? float(look.tint) : entry.shown ? 1 : 0;
+    const float share = !entry.shown ? 0 : look.mode == LabelMode::kTint ? float(look.tint) : 1;
     colors.insert(colors.end(), {share * entry.color.r, share * entry.color.g, share * entry.color.b, share});
   }
   return colors;

@@ -110,13 +110,13 @@ TEST(Labels, HaveTheirOwnColoursAndNoThirdAtTheirBorder) {
   }
 }
 
-TEST(Labels, OneThatIsNotShownIsMissingAndTheOtherStaysAsItIs) {
+TEST(Labels, OneThatIsClearIsMissingAndTheOtherStaysAsItIs) {
   const LayeredVolume volume = TwoLabels();
   for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface}) {
     SetupOptions options = Unlit();
     options.transfer = {.colors = {{0, {0, 0, 1}}}, .opacities = {{60, 0, 0.5, 1}, {61, mode == LabelMode::kTint ? 0.5 : 0.0, 0.5, 0}}};
     const LocalImage both = Rendered(volume, LayeredSetup(volume, options, {.labels = Look(mode, {{kRed}, {kGreen}})}));
-    const LocalImage one = Rendered(volume, LayeredSetup(volume, options, {.labels = Look(mode, {{kRed}, {kGreen, 1, false}})}));
+    const LocalImage one = Rendered(volume, LayeredSetup(volume, options, {.labels = Look(mode, {{kRed}, {kGreen, 0}})}));
     int kept = 0;
     for (int y = 0; y < 64; ++y) {
       for (int x = 0; x < 64; ++x) {
@@ -130,6 +130,29 @@ TEST(Labels, OneThatIsNotShownIsMissingAndTheOtherStaysAsItIs) {
       }
     }
     EXPECT_GT(kept, 50);
+  }
+}
+
+// As if it were not in the file, to the last bit: samples and isosurfaces.
+TEST(Labels, OneThatIsNotShownLeavesTheVolumeAsItIs) {
+  LayeredVolume volume = TwoLabels(), one = volume, none = volume;
+  volume.volume = one.volume = none.volume = Shared(MakeBlobs(kGeometry, ScalarType::kUint8, 5));
+  one.layers.labels = Shared(MakeVolume(kGeometry, ScalarType::kUint8, [&](const Index3& v) {
+    const VoxelBlock& both = volume.layers.labels->block;
+    return both.samples<std::uint8_t>()[both.Offset(v)] == 1 ? 1 : 0;
+  }));
+  none.layers = {};
+  for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface}) {
+    SetupOptions options = Unlit();
+    options.transfer = Ramp(0.3);
+    options.transfer.isosurfaces = {{90, {1, 1, 1}, 0.5}};
+    const LocalImage hidden =
+        Rendered(volume, LayeredSetup(volume, options, {.labels = Look(mode, {{kRed, 0.5F}, {kGreen, 0, false}}, 0.7)}));
+    const LocalImage expected = Rendered(one, LayeredSetup(one, options, {.labels = Look(mode, {{kRed, 0.5F}, {kGreen}}, 0.7)}));
+    EXPECT_FALSE(ColorsOf(hidden).empty());
+    EXPECT_EQ(hidden.rgba, expected.rgba);
+    const LocalImage all = Rendered(volume, LayeredSetup(volume, options, {.labels = Look(mode, {{kRed, 1, false}, {kGreen, 1, false}})}));
+    EXPECT_LE(LargestDifference(all, Rendered(none, LayeredSetup(none, options, {}))), 1e-6F);
   }
 }
 

@@ -139,8 +139,10 @@ class ReferenceMarch {
       if (ShowsLabels()) {
         const std::int32_t label = LabelAt(crossing.position);
         const float* const entry = &work_.layers->labels->entries[4 * std::size_t(label)];
-        surface.opacity *= !work_.layers->labels->surface ? double(entry[3]) : entry[3] < 0 ? 1 : 0;
-        if (label != 0) Tint(entry, surface);
+        if (entry[3] >= 0) {
+          surface.opacity *= work_.layers->labels->surface ? 0 : double(entry[3]);
+          Tint(entry, surface);
+        }
       }
       Light(GradientAt(samples(), crossing.position), surface);
       Blend(surface.color, surface.opacity, sum);
@@ -238,13 +240,12 @@ class ReferenceMarch {
     const LabelTables& tables = *work_.layers->labels;
     const std::int32_t label = LabelAt(p);
     const float* const entry = &tables.entries[4 * std::size_t(label)];
+    if (entry[3] < 0) return;
     if (tables.surface) {
-      if (entry[3] < 0) return;
       volume = PartOf(entry);
       gradient = IndicatorGradient(p, label);
       return;
     }
-    if (label == 0) return;
     const double steps = double(tables.steps_a_length), of_length = 1 - std::pow(1 - volume.opacity, steps);
     if (entry[3] < 1) volume.opacity = 1 - std::pow(1 - double(entry[3]) * of_length, 1 / steps);
     Tint(entry, volume);

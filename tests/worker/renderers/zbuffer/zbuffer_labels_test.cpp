@@ -108,14 +108,28 @@ TEST(ZBufferLabels, WithoutTintChangeNothing) {
   options.transfer = Ramp(1);
   ExpectSame(Rendered(data, LabelledSetup(data, options, Look(LabelMode::kTint, {{kRed}, {kGreen}}, 0))),
              Rendered(data, LabelledSetup(data, options, std::nullopt)));
-  ExpectSame(Rendered(data, LabelledSetup(data, options, Look(LabelMode::kSurface, {{kRed, 1, false}, {kGreen, 1, false}}))),
-             Rendered(data, LabelledSetup(data, options, std::nullopt)));
+}
+
+TEST(ZBufferLabels, OneThatIsNotShownLeavesTheVolumeAsItIs) {
+  const Labelled data = {MakeBlobs(kGrid, ScalarType::kUint16, 3),
+                         MakeVolume(kGrid, ScalarType::kUint16, [](const Index3& v) { return v.x % 3; })};
+  Labelled one = data;  // as if label 2 were not in the file
+  one.labels = MakeVolume(kGrid, ScalarType::kUint16, [](const Index3& v) { return v.x % 3 == 1 ? 1 : 0; });
+  SetupOptions options;
+  options.transfer = Ramp(1);
+  for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface}) {
+    ExpectSame(Rendered(data, LabelledSetup(data, options, Look(mode, {{kRed, 1, false}, {kGreen, 0, false}}))),
+               Rendered(data, LabelledSetup(data, options, std::nullopt)));
+    const LocalImage image = Rendered(data, LabelledSetup(data, options, Look(mode, {{kRed}, {kGreen, 1, false}})));
+    EXPECT_EQ(image.depth, Rendered(one, LabelledSetup(one, options, Look(mode, {{kRed}, {kGreen}}))).depth);
+    EXPECT_EQ(image.rgba, Rendered(one, LabelledSetup(one, options, Look(mode, {{kRed}, {kGreen}}))).rgba);
+  }
 }
 
 // As if the label's voxels were empty: those behind appear. So it is if less than half of them is left.
-TEST(ZBufferLabels, TintTakesAwayWhatIsNotShown) {
+TEST(ZBufferLabels, TintTakesAwayWhatIsClear) {
   const Labelled data = Block(), rest = BlockWhere([](const Index3&v) { return v.y >= 8; });
-  for (const LabelLook::Entry& gone : {LabelLook::Entry{kRed, 1, false}, LabelLook::Entry{kRed, 0.25F}}) {
+  for (const LabelLook::Entry& gone : {LabelLook::Entry{kRed, 0}, LabelLook::Entry{kRed, 0.25F}}) {
     const LocalImage image = Rendered(data, LabelledSetup(data, Unlit(), Look(LabelMode::kTint, {gone, {kGreen}})));
     EXPECT_GT(CountColor(image, kGreen), 100);
     EXPECT_EQ(CountColor(image, kRed), 0);
@@ -152,9 +166,10 @@ TEST(ZBufferLabels, CutsHaveTheirColours) {
   options.view.azimuth_degrees = 0;
   options.view.elevation_degrees = 0;
   options.clipping.planes = {{{0, 1, 0}, -6}};  // keeps y >= 6, behind the cut
-  for (const auto& [look, expected] : {std::pair{Look(LabelMode::kTint, {{kRed}, {kGreen}}, 0.5), Rgb{0.5F, 0, 0.5F}},
-                                       std::pair{Look(LabelMode::kSurface, {{kRed}, {kGreen}}), kRed},
-                                       std::pair{Look(LabelMode::kTint, {{kRed, 1, false}, {kGreen}}), kGreen}}) {
+  for (const auto& [look, expected] :
+       {std::pair{Look(LabelMode::kTint, {{kRed}, {kGreen}}, 0.5), Rgb{0.5F, 0, 0.5F}},
+        std::pair{Look(LabelMode::kSurface, {{kRed}, {kGreen}}), kRed}, std::pair{Look(LabelMode::kTint, {{kRed, 0}, {kGreen}}), kGreen},
+        std::pair{Look(LabelMode::kTint, {{kRed, 1, false}, {kGreen}}), kBlue}}) {
     const LocalImage image = Rendered(data, LabelledSetup(data, options, look));
     EXPECT_EQ(PixelOf(image, 32, 32), (std::array<float, 4>{expected.r, expected.g, expected.b, 1}));
   }

@@ -1,0 +1,45 @@
+#include "data/volume_io/length_names.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+// The first name of a unit is the one that is written.
+constexpr std::array<std::pair<std::string_view, LengthUnit>, 16> kUnitNames = {{
+    {"mm", LengthUnit::kMillimetre},
+    {"millimetre", LengthUnit::kMillimetre},
+    {"um", LengthUnit::kMicrometre},
+    {"\u00b5m", LengthUnit::kMicrometre},  // the micro sign
+    {"\u03bcm", LengthUnit::kMicrometre},  // the Greek letter
+    {"micron", LengthUnit::kMicrometre},
+    {"micrometre", LengthUnit::kMicrometre},
+    {"nm", LengthUnit::kNanometre},
+    {"nanometre", LengthUnit::kNanometre},
+    {"angstrom", LengthUnit::kAngstrom},
+    {"\u00c5", LengthUnit::kAngstrom},  // the letter
+    {"\u212b", LengthUnit::kAngstrom},  // the sign
+    {"cm", LengthUnit::kCentimetre},
+    {"centimetre", LengthUnit::kCentimetre},
+    {"m", LengthUnit::kMetre},
+    {"metre", LengthUnit::kMetre},
+}};
+
+}  // namespace
+
+std::optional<LengthUnit> LengthUnitNamed(std::string_view name) {
+  std::string one(name);
+  if (one.ends_with('s')) one.pop_back();
+  if (const std::size_t at = one.find("meter"); at != std::string::npos) one.replace(at, 5, "metre");
+  const auto* const found = std::ranges::find(kUnitNames, one, [](const auto& entry) { return entry.first; });
+  return found == kUnitNames.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::string_view FileNameOf(LengthUnit unit) {
+  return std::ranges::find(kUnitNames, unit, [](const auto& entry) { return entry.second; })->first;
+}
+
+}  // namespace slabstream

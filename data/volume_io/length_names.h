@@ -1,0 +1,17 @@
+// What files call units of length.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "common/volume/orientation.h"
+
+namespace slabstream {
+
+// "mm", "microns", "nanometers"; none: a name that is not known.
+std::optional<LengthUnit> LengthUnitNamed(std::string_view name);
+
+// The name that is written, in ASCII: "um". `unit` is one that files state.
+std::string_view FileNameOf(LengthUnit unit);
+
+}  // namespace slabstream
