@@ -15,8 +15,8 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
-#include "client/request/picture_record.h"
 #include "common/planning/resolved_request.h"
+#include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
 
@@ -189,7 +189,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                  {"spacing", VectorJson(d.geometry.spacing)},
-                                 {"unit", kRecordedUnits.at(std::size_t(UnitOf(d.geometry)) - 1)},
+                                 {"unit", NameOf(UnitOf(d.geometry))},
                                  {"orientation", world},
                                  {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
                                  {"non_finite", summary.non_finite},

@@ -51,7 +51,7 @@ std::optional<double> AngleDegrees(const Vec3& a, const Vec3& vertex, const Vec3
 class Measurer {
  public:
   Measurer(Client& client, std::string dataset, const VolumeGeometry& geometry)
-      : client_(client), dataset_(std::move(dataset)), spacing_(geometry.spacing), unit_(NameOf(UnitOf(geometry))) {}
+      : client_(client), dataset_(std::move(dataset)), spacing_(geometry.spacing), unit_(PluralOf(UnitOf(geometry))) {}
 
   Json Distance(const Points& p) const {
     return {

@@ -13,12 +13,6 @@ bool IsShown(const Label& label, const LabelChoice& choice) {
   return choice.shown.empty() || std::ranges::any_of(choice.shown, [&](const LabelRange& range) { return Covers(range, label); });
 }
 
-// As the picture has it (FrameRequest::brightness).
-Rgb Brightened(Rgb color, double factor) {
-  for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
-  return color;
-}
-
 }  // namespace
 
 PictureKey KeyOf(const FrameRequest& request, const SummaryReply& summary) {

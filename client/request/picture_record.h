@@ -9,8 +9,6 @@
 // It names no host, no time and no place of the service, so the same picture has the same record wherever and whenever it is made.
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,7 +18,6 @@
 #include "client/request/request_options.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
-#include "common/view/picture_geometry.h"
 #include "data/layers/layer_reader.h"
 
 namespace slabstream {
@@ -33,13 +30,6 @@ struct PictureRecord {
   PictureFormat format;
   Json json;  // of the whole record
 };
-
-// What the geometry calls units, from LengthUnit::kVoxel on.
-inline constexpr std::array<std::string_view, 8> kRecordedUnits = [] {
-  std::array<std::string_view, 8> names = {"voxel", "unknown"};
-  for (std::size_t i = 2; i < names.size(); ++i) names.at(i) = NameOf(LengthUnit(i + 1));
-  return names;
-}();
 
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);

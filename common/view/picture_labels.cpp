@@ -12,7 +12,7 @@ namespace slabstream {
 namespace {
 
 std::string LengthText(double length, LengthUnit unit) {
-  std::string_view name = NameOf(unit);
+  std::string_view name = PluralOf(unit);
   if (length == 1 && unit <= LengthUnit::kFile) name.remove_suffix(1);  // one voxel, one unit
   return fmt::format("{:g} {}", length, name);
 }

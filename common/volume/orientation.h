@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -31,10 +32,12 @@ enum class LengthUnit : std::uint8_t {
   kCentimetre = 7,
   kMetre = 8,
 };
-// As it stands behind a number, in UTF-8.
-constexpr std::string_view NameOf(LengthUnit unit) {
-  constexpr std::array<std::string_view, 8> kNames = {"voxels", "units", "mm", "\u00b5m", "nm", "\u00c5", "cm", "m"};
-  return kNames.at(std::size_t(unit) - 1);
+inline constexpr std::array<std::string_view, 8> kLengthUnitNames = {"voxel", "unknown", "mm", "\u00b5m",
+                                                                     "nm",    "\u00c5",  "cm", "m"};  // in records and answers; UTF-8
+constexpr std::string_view NameOf(LengthUnit unit) { return kLengthUnitNames.at(std::size_t(unit) - 1); }
+// As it stands behind a number.
+constexpr std::string_view PluralOf(LengthUnit unit) {
+  return unit == LengthUnit::kVoxel ? "voxels" : unit == LengthUnit::kFile ? "units" : NameOf(unit);
 }
 
 struct Orientation {

@@ -49,6 +49,11 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
        },
        "renderer is 'shear', but projection 'perspective' needs one of: splat, zbuffer, raycast, mip"},
       {[](auto& r) { r.labels.emplace(); }, "renderer is 'splat', but labels needs one of: zbuffer, raycast"},
+      {[&](auto& r) {
+         r.renderer = "raycast";
+         r.labels = LabelChoice{.shown = {{2, 5}, {.name = long_name}}};
+       },
+       "labels.shown[1].name has 257 bytes, but must have 0 to 256"},
       {[](auto& r) {
          r.renderer = "zbuffer";
          r.overlay.emplace();
