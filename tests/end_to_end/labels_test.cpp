@@ -50,9 +50,9 @@ class LabelsTest : public EndToEndTest {
 
 // The labels meet in the middle of the picture.
 TEST_F(LabelsTest, SlicesShowTheValuesOfLabelsThatAreNotHighlighted) {
-  const std::vector<std::string> coronal = {"--plane", "coronal"};
+  const std::vector<std::string> across = {"--plane", "y"};
   const auto with = [&](std::vector<std::string> more) {
-    more.insert(more.end(), coronal.begin(), coronal.end());
+    more.insert(more.end(), across.begin(), across.end());
     return Picture("slice", more);
   };
   const PictureFile plain = with({}), highlight = with(Labelled("", "highlight", "Precentral_R")),

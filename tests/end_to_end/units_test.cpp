@@ -33,7 +33,7 @@ TEST_F(UnitsTest, AreShownAsTheFileStatesThem) {
   const std::vector<std::string> measure = {"measure", "cells.nrrd", "--local=1", "--distance", "0,0,0:3,4,0", "--box", ":,:,:"};
   EXPECT_THAT(MustRun(measure).out, testing::AllOf(HasSubstr("distance 5 \u00b5m\n"), HasSubstr("12000 \u00b5m^3\n")));
   MustRun({"render", "cells.nrrd", "--local=1", "--size", "300x200", "--scale-bar", "-o", "bar.png"});
-  EXPECT_EQ(json::parse(MustRun({"info", "bar.png", "--json"}).out)["record"]["geometry"]["unit"], "\u00b5m");
+  EXPECT_EQ(json::parse(MustRun({"info", "bar.png", "--json"}).out)["geometry"]["unit"], "\u00b5m");
   MustRun({"convert", "cells.nrrd", "again.nrrd"});
   EXPECT_THAT(MustRun({"info", "again.nrrd"}).out, HasSubstr("spacing      0.5 0.5 2 \u00b5m\n"));
 }

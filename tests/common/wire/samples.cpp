@@ -30,7 +30,9 @@ RankReport FullReport() {
   return report;
 }
 
-VolumeDescription Description() { return {{{301, 370, 316}, {0.5, 1, 2.25}}, ScalarType::kUint16, {-0.125, 1e300}}; }
+VolumeDescription Description() {
+  return {{{301, 370, 316}, {0.5, 1, 2.25}, {.unit = LengthUnit::kAngstrom}}, ScalarType::kUint16, {-0.125, 1e300}};
+}
 
 TransferFunction Curve() {
   return {{{-1e308, {0, 0.25F, 1}}, {0, {1, 1, 1}}, {0, {0, 0, 0}}, {1e308, {0.5F, 0.5F, 0.5F}}},
