@@ -69,10 +69,12 @@ class PageTest(unittest.TestCase):
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "s.nrrd")
         write_grid(cls.programs.folder / "g.vtk")
         write_nrrd(cls.programs.folder / "o.nrrd", SIZE, lambda i, j, k: 10 * k if ball(i, j, k) > 0 else 0)
+        cells = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 22 26 18\nspacings: 0.5 0.5 2\nunits: \"um\" \"um\" \"um\"\nencoding: raw\n\n"
+        (cls.programs.folder / "c.nrrd").write_bytes(cells.encode() + bytes(ball(i, j, k) for k in range(18) for j in range(26) for i in range(22)))
         # Half a gigabyte of zeros, of which a file takes little: it is read long enough to be seen.
         big = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1024 1024 {BIG_MEGABYTES}\nencoding: gzip\n\n".encode()
         (cls.programs.folder / "big.nrrd").write_bytes(big + gzip.compress(bytes(1 << 20), 1) * BIG_MEGABYTES)
-        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "big=big.nrrd")
+        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "big=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -466,6 +468,14 @@ class PageTest(unittest.TestCase):
         drawn = viewer.final("o['overlay-range'] === '20:150'")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.save(SHOTS, "overlay")
+
+    def test_lengths_have_the_unit_of_the_file(self):
+        viewer = self.viewer(dataset="cells", layout="quad", measure="distance:0,0,0:3,4,0")
+        viewer.settled()
+        viewer.until("[...document.querySelectorAll('.facts dd')].some(d => d.textContent === '0.5 × 0.5 × 2 µm')")
+        viewer.until("[...document.querySelectorAll('.scale-bar text')].some(t => /^[0-9.]+ µm$/.test(t.textContent))")
+        viewer.until("document.querySelector('[data-measure=distance] .measure-text')?.textContent === '5.0 µm'")
+        viewer.save(SHOTS, "units")
 
     def test_labels_have_a_legend(self):
         viewer = self.viewer(label_mode="tint", renderer="raycast")
