@@ -40,7 +40,7 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
   }
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
-  const std::atomic<bool> cancelled{false};
+  RenderControl control;
   tbb::task_arena arena(threads);
   std::chrono::duration<double, std::milli> finish{};
   std::size_t frame = 0;
@@ -49,7 +49,7 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
       const FrameSetup& setup = setups[frame++ % setups.size()];
       LocalImage image;
       for (std::size_t i = 0; i < slabs.size(); ++i) {
-        image = renderer->Render(*slabs[i], partition.boxes()[i], setup, {}, cancelled, report).value();
+        image = renderer->Render(*slabs[i], partition.boxes()[i], setup, {}, control, report).value();
         benchmark::DoNotOptimize(image.rgba.data());
       }
       const auto begin = std::chrono::steady_clock::now();

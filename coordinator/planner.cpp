@@ -9,16 +9,12 @@
 namespace slabstream {
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& request) {
-  const std::lock_guard lock(mutex_);
   return Guarded("planning", [&] { return TryPlan(request); });
 }
 
 std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(const PlanRequest& request) try {
   constexpr std::size_t kMostBoxes = 4096;  // a plan places each of them
-  const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock || LeavesChoice(request.frame.policy, ServiceMachine(request.workers, surroundings_), request.roster.slots.size())) {
-    return std::nullopt;
-  }
+  if (LeavesChoice(request.frame.policy, ServiceMachine(request.workers, surroundings_), request.roster.slots.size())) return std::nullopt;
   Result<ResolvedPolicy> policy = ResolvePolicy(request.frame, request.summary->description.geometry);
   if (!policy.ok()) return std::nullopt;
   std::shared_ptr<const Layout> layout =
@@ -36,6 +32,7 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
     Result<ChosenPolicy> chosen = policies_.Find(request, machine, layouts_);
     if (!chosen.ok()) return chosen.status();
     planned.policy = std::move(chosen->policy);
+    if (!chosen->chosen) planned.asked.occupied = nullptr;
     planned.prediction = chosen->prediction;
     planned.render_scale = chosen->render_scale;
   } else {
@@ -46,8 +43,10 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned.policy,
                                                         .volume = &request.volume,
                                                         .summary = request.summary.get(),
-                                                        .occupied = request.occupied,
-                                                        .slots = std::uint32_t(request.roster.slots.size())});
+                                                        .occupied = planned.asked.occupied,
+                                                        .slots = std::uint32_t(request.roster.slots.size()),
+                                                        .stop = request.stop});
+  if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
   return WithLayout(std::move(planned), std::move(layout));
 }
 
@@ -61,7 +60,6 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(PlannedFrame pla
 }
 
 void Planner::Learn(const FrameMeasured& measured) {
-  const std::lock_guard lock(mutex_);
   const PlannedFrame& frame = *measured.frame;
   layouts_.Learn(frame.asked.volume, frame.plan, frame.policy, measured.reports);
   policies_.Learn(frame, measured.reports);

@@ -18,6 +18,7 @@ namespace slabstream {
 namespace {
 
 const OcclusionMask kNothingHidden;
+constexpr ClientId kNobody = 0;  // for what belongs to no client
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 
@@ -198,12 +199,10 @@ Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threa
       make_renderer_(std::move(make_renderer)),
       hook_(std::move(hook)),
       threads_(threads),
-      render_arena_(threads),
-      combine_arena_(threads),
-      finish_arena_(threads),
-      combine_thread_([this] { Break(); }),
-      finish_thread_([this] { Break(); }),
-      render_thread_([this] { Break(); }) {}
+      chunk_thread_([this] { Break(); }),
+      combine_(threads, [this] { Break(); }),
+      finish_(threads, [this] { Break(); }),
+      render_(threads, [this] { Break(); }) {}
 
 void Executor::Break() {
   broken_ = true;
@@ -226,7 +225,9 @@ bool Executor::TrySend(const char* task, const GroupKey& key, Work&& work) {
 }
 
 Executor::~Executor() {
-  if (last_render_) *last_render_->cancelled = true;
+  for (const auto& [image, render] : renders_) {
+    if (const std::shared_ptr<RenderControl> control = render.lock()) control->Cancel();
+  }
 }
 
 void Executor::Perform(const OpenSlab& action) {
@@ -240,7 +241,7 @@ void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
 void Executor::Perform(StoreChunk&& action) {
   const auto found = slabs_.find(action.slab);
   std::shared_ptr<Slab> slab = found == slabs_.end() ? nullptr : found->second;
-  combine_thread_.Post([this, slab = std::move(slab), store = std::move(action)] {
+  chunk_thread_.Post([this, slab = std::move(slab), store = std::move(action)] {
     Status status = Guard("slab", [&] {
       return slab == nullptr ? Status::NotFound("chunk of a slab that was dropped") : slab->Store(store.chunk, store.payload);
     });
@@ -251,15 +252,17 @@ void Executor::Perform(StoreChunk&& action) {
 void Executor::Perform(StartRender&& action) {
   std::shared_ptr<Slab> slab = SlabOf(action.slab);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
-  auto cancelled = std::make_shared<std::atomic<bool>>(false);
-  last_render_ = {action.key, cancelled};
-  render_thread_.Post(
-      [this, slab = std::move(slab), image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
-        outbox_.Post(WorkerEvent(render_arena_.execute([&] { return Render(render, *slab, *cancelled, *image); })));
+  auto control = std::make_shared<RenderControl>();
+  std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
+  renders_[action.image] = control;
+  ClientLane& lane = render_.Of(action.client);
+  lane.thread.Post(
+      [this, &lane, slab = std::move(slab), image = std::move(image), control = std::move(control), render = std::move(action)] {
+        outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *slab, *control, lane, *image); })));
       });
 }
 
-RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image) {
+RenderDone Executor::Render(const StartRender& action, Slab& slab, const RenderControl& control, ClientLane& lane, LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
@@ -268,10 +271,10 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
       slab.Data();
       AddStage(report, Stage::kFetch, begin, NowNs());
     }
-    std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
+    std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(slab.Data(), action.placement.box, *action.setup, hidden, cancelled, report);
+    Result<LocalImage> rendered = renderer->Render(slab.Data(), action.placement.box, *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;
@@ -283,8 +286,21 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const std::at
   return done;
 }
 
+std::shared_ptr<RenderControl> Executor::ControlOf(ImageHandle image) const {
+  const auto render = renders_.find(image);
+  return render == renders_.end() ? nullptr : render->second.lock();
+}
+
+void Executor::Perform(const PauseRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Pause();
+}
+
+void Executor::Perform(const ResumeRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Resume();
+}
+
 void Executor::Perform(const CancelRender& action) {
-  if (last_render_ && last_render_->key == action.key) *last_render_->cancelled = true;
+  if (const auto control = ControlOf(action.image)) control->Cancel();
 }
 
 std::shared_ptr<Executor::Slab> Executor::SlabOf(const SlabKey& key) const {
@@ -304,19 +320,20 @@ void Executor::Perform(StartCombine&& action) {
   const bool fresh = image == nullptr;
   if (fresh) image = std::make_shared<LocalImage>();
   std::shared_ptr<LocalImage> other = action.other == 0 ? nullptr : ImageOf(action.other);
-  combine_thread_.Post([this, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
+  ClientLane& lane = combine_.Of(action.client);
+  lane.thread.Post([this, &lane, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
     CombineDone done{combine.key, combine.image, {}, {Stage::kCombine, NowNs(), 0}};
     done.status = Guard("combine", [&] {
       const PixelRange pixels = combine.pixels == PixelRange{} ? PixelRange{0, std::uint64_t(combine.frame.pixel_count())} : combine.pixels;
       if (other != nullptr) {
-        WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
+        WithAllThreads(lane.arena, [&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
       }
       if (!combine.incoming) combine.incoming.emplace();
       if (!fresh && image->format != combine.incoming->header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
       }
-      return WithAllThreads(combine_arena_, [&] {
+      return WithAllThreads(lane.arena, [&] {
         return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
                                         : CombineIncoming(*image, fresh, combine, pixels);
       });
@@ -328,7 +345,7 @@ void Executor::Perform(StartCombine&& action) {
 
 void Executor::Perform(FindHidden&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
-  combine_thread_.Post([this, image = std::move(image), find = std::move(action)]() mutable {
+  combine_.Of(action.client).thread.Post([this, image = std::move(image), find = std::move(action)]() mutable {
     HiddenFound found{find.key, find.image, {}};
     const Status status = Guard("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
@@ -364,7 +381,8 @@ void Executor::Perform(SendPartial&& action) {
   std::optional<ImageView> view;
   std::optional<Bytes> payload;
   // Describing where pixels are takes less time than waking a thread for it.
-  if (combine_thread_.Idle()) {
+  ClientLane& lane = combine_.Of(action.client);
+  if (lane.thread.Idle()) {
     bool posted = false;
     const bool tried = TrySend("encode", action.message.key, [&] {
       const std::int64_t begin = NowNs();
@@ -375,15 +393,15 @@ void Executor::Perform(SendPartial&& action) {
     });
     if (posted || !tried) return;
   }
-  combine_thread_.Post(
-      [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
+  lane.thread.Post(
+      [=, this, &lane, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
         TrySend("encode", send.message.key, [&] {
           const std::int64_t begin = NowNs();
           if (!view) {
             view = view_of(*image, send);
             payload = PayloadInPlace(*image, *view, send);
           }
-          if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(*view, send.color, send.message); });
+          if (!payload) payload = WithAllThreads(lane.arena, [&] { return EncodePixels(*view, send.color, send.message); });
           Post(send, PackForLink(*std::move(payload), send.delivery.bytes_per_second, send.message.packed), begin);
         });
       });
@@ -398,11 +416,12 @@ void Executor::Perform(const ForgetGroups& action) {
 void Executor::Perform(const ResendImage& action) {
   std::shared_ptr<const LentImage> lent = lent_.Find(action.refused.key, action.refused.step, action.refused.pixels);
   if (lent == nullptr) return;
-  combine_thread_.Post([this, lent = std::move(lent)] {
+  ClientLane& lane = combine_.Of(kNobody);
+  lane.thread.Post([this, &lane, lent = std::move(lent)] {
     TrySend("encode", lent->message.key, [&] {
       PartialImage message = lent->message;
       message.shared.reset();
-      Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
+      Bytes payload = WithAllThreads(lane.arena, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
       outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), false, 0, message.key});
     });
   });
@@ -411,8 +430,9 @@ void Executor::Perform(const ResendImage& action) {
 void Executor::Perform(SendFrame&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const bool finished = action.message.groups_done == action.message.group_count;
-  (finished ? finish_thread_ : combine_thread_).Post([this, finished, image = std::move(image), send = std::move(action)]() mutable {
-    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, finished ? finish_arena_ : combine_arena_); });
+  ClientLane& lane = (finished ? finish_ : combine_).Of(action.client);
+  lane.thread.Post([this, &lane, image = std::move(image), send = std::move(action)]() mutable {
+    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, lane.arena); });
   });
 }
 

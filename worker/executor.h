@@ -1,11 +1,12 @@
-// Executor: runs the slow actions of a WorkerMachine. One thread renders; another combines, encodes and unpacks chunks; a third makes
-// finished pictures while the next frames are combined. Rendering and making pictures use all render threads of the worker.
+// Executor: runs the slow actions of a WorkerMachine. For each client, one thread renders; another combines and encodes; a third makes
+// finished pictures while the next frames are combined (ClientLanes). Another one unpacks chunks. Rendering uses all render threads of the
+// worker; the machine lets one client's render go on at a time.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. The result goes to the outbox: an event for the machine, or a message that is ready to be sent.
 // Tables of slabs and images belong to the calling thread. Tasks share the entries that they need, so nothing is freed under a running task
 // and no lock is held while pixels are touched. One task at a time touches an entry's contents: the machine orders the next use of a slab
-// or image only after the event that ends the last one. The combining thread's own tasks are an exception: they run in order. Nothing is
+// or image only after the event that ends the last one. A combining thread's own tasks are an exception: they run in order. Nothing is
 // combined into the image of a finished frame; the image of a preview still grows, so previews are made on the combining thread.
 #pragma once
 
@@ -23,6 +24,7 @@
 #include "common/base/task_thread.h"
 #include "common/image/local_image.h"
 #include "common/transport/mailbox.h"
+#include "worker/client_lanes.h"
 #include "worker/image_packing.h"
 #include "worker/lent_images.h"
 #include "worker/peer_memory.h"
@@ -33,7 +35,7 @@
 
 namespace slabstream {
 
-// An encoded message from the combining thread.
+// An encoded message from a combining thread.
 struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
@@ -57,12 +59,14 @@ class Executor {
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
   Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer,
            TaskHook hook = {});
-  ~Executor();  // cancels the running render, drops tasks that have not begun, joins
+  ~Executor();  // cancels the renders, drops tasks that have not begun, joins
 
   void Perform(const OpenSlab& action);
   void Perform(StoreChunk&& action);
   void Perform(const DropSlab& action);
   void Perform(StartRender&& action);
+  void Perform(const PauseRender& action);
+  void Perform(const ResumeRender& action);
   void Perform(const CancelRender& action);
   void Perform(StartCombine&& action);
   void Perform(FindHidden&& action);
@@ -80,10 +84,6 @@ class Executor {
 
  private:
   struct Slab;
-  struct RunningRender {
-    GroupKey key;
-    std::shared_ptr<std::atomic<bool>> cancelled;
-  };
 
   // Runs `work`, which returns a Status, and catches its exceptions.
   template <class Work>
@@ -99,7 +99,8 @@ class Executor {
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
-  RenderDone Render(const StartRender& action, Slab& slab, const std::atomic<bool>& cancelled, LocalImage& image);
+  std::shared_ptr<RenderControl> ControlOf(ImageHandle image) const;   // null: the render has ended
+  RenderDone Render(const StartRender& action, Slab& slab, const RenderControl& control, ClientLane& lane, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
   const Codec frame_codec_;
@@ -108,19 +109,13 @@ class Executor {
   LentImages lent_;
   SentTallies sent_;
   PeerMemory peer_memory_;
-  std::optional<RunningRender> last_render_;
+  std::map<ImageHandle, std::weak_ptr<RenderControl>> renders_;  // their tasks hold them
   const RendererFactory make_renderer_;
   const TaskHook hook_;
   std::atomic<bool> broken_ = false;
-  std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // used by the render thread
   const ThreadShare threads_;
-  // One arena for each thread below that enters: in a shared one, the last picture would wait for the rendering of the next.
-  tbb::task_arena render_arena_;
-  tbb::task_arena combine_arena_;
-  tbb::task_arena finish_arena_;
-  TaskThread combine_thread_;
-  TaskThread finish_thread_;
-  TaskThread render_thread_;
+  TaskThread chunk_thread_;
+  ClientLanes combine_, finish_, render_;
 };
 
 }  // namespace slabstream

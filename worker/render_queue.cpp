@@ -4,40 +4,130 @@
 
 namespace slabstream {
 
-void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
-                      const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions) {
-  const Box voxels = SlabBox(placement.box, *setup);
-  waiting_[{key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+bool RenderQueue::Busy(ClientId client) const {
+  const auto first = waiting_.lower_bound({client, {}, 0});
+  return begun_.contains(client) || (first != waiting_.end() && std::get<ClientId>(first->first) == client);
 }
 
-void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
+void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Placement& placement,
+                      const std::shared_ptr<const FrameSetup>& setup, const std::shared_ptr<const OcclusionMask>& hidden, Time now,
+                      WorkerActions& actions) {
+  if (!Busy(client)) {  // it begins where the others are
+    if (turn_ && OnlyTurns()) {
+      ChargeTurn(now);
+      turns_.Take(turn_->client);
+    }
+    turns_.Join(client);
+  }
+  const Box voxels = SlabBox(placement.box, *setup);
+  waiting_[{client, key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+}
+
+void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
   std::erase_if(waiting_, [&](const auto& entry) {
-    if (entry.first.first != key) return false;
+    if (std::get<GroupKey>(entry.first) != key) return false;
     slabs_.Release(entry.second.slab);
     return true;
   });
-  if (running_ && running_->key == key && !running_->dropped) {
-    running_->dropped = true;
-    actions.push_back(CancelRender{key});
+  for (auto& [client, begun] : begun_) {
+    if (begun.key != key || begun.dropped) continue;
+    begun.dropped = true;
+    actions.push_back(CancelRender{begun.image});
+    if (turn_ && turn_->client == client) EndTurn(now);
   }
 }
 
-void RenderQueue::StartNext(WorkerActions& actions) {
-  if (running_) return;
-  const auto next = std::ranges::find_if(waiting_, [&](const auto& entry) { return slabs_.complete(entry.second.slab); });
-  if (next == waiting_.end()) return;
-  running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
-  waiting_.erase(next);
-  actions.push_back(StartRender{running_->key, running_->rank, slabs_.key(running_->job.slab), running_->job.placement, running_->job.setup,
-                                running_->job.hidden, running_->image});
+RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
+  for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
+    const SlabFetcher::Generation slab = job->second.slab;
+    const auto touches = [&](const auto& begun) { return slabs_.Share(slab, begun.second.job.slab); };
+    if (slabs_.complete(slab) && std::ranges::none_of(begun_, touches)) return job;
+  }
+  return waiting_.end();
 }
 
-std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions) {
-  if (!running_ || running_->image != done.image) return std::nullopt;
-  const Running job = *std::exchange(running_, std::nullopt);
+bool RenderQueue::WantsTurn(ClientId client) const {
+  const auto begun = begun_.find(client);
+  return begun != begun_.end() ? !begun->second.dropped : NextOf(client) != waiting_.end();
+}
+
+std::set<ClientId> RenderQueue::Clients() const {
+  std::set<ClientId> clients;
+  for (const auto& [client, begun] : begun_) clients.insert(client);
+  for (auto job = waiting_.begin(); job != waiting_.end();) {
+    const ClientId client = std::get<ClientId>(job->first);
+    clients.insert(client);
+    job = waiting_.lower_bound({client + 1, {}, 0});
+    if (client + 1 == 0) break;
+  }
+  return clients;
+}
+
+bool RenderQueue::OnlyTurns() const {
+  const auto other = [this](const auto& job) { return std::get<ClientId>(job.first) != turn_->client; };
+  return begun_.size() == 1 && (waiting_.empty() || !(other(*waiting_.begin()) || other(*waiting_.rbegin())));
+}
+
+std::optional<ClientId> RenderQueue::NextInTurn() const {
+  std::optional<ClientId> next;
+  for (const ClientId client : Clients()) {
+    if ((turn_ && turn_->client == client) || !WantsTurn(client)) continue;
+    if (!next || turns_.TurnOf(client) < turns_.TurnOf(*next)) next = client;
+  }
+  return next;
+}
+
+void RenderQueue::ChargeTurn(Time now) {
+  turns_.Charge(turn_->client, now - turn_->begin);
+  turn_->begin = now;
+}
+
+void RenderQueue::EndTurn(Time now) {
+  ChargeTurn(now);
+  turn_.reset();
+}
+
+void RenderQueue::StartNext(Time now, WorkerActions& actions) {
+  if (turn_ && (OnlyTurns() || now < turn_->begin + kTurn)) return;
+  const std::optional<ClientId> next = NextInTurn();
+  if (!next) return;
+  if (turn_) {
+    ChargeTurn(now);
+    if (turns_.TurnOf(*next).used > turns_.TurnOf(turn_->client).used) return turns_.Take(turn_->client);
+    actions.push_back(PauseRender{begun_.at(turn_->client).image});
+  }
+  Begin(*next, now, actions);
+}
+
+void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
+  turns_.Take(client);
+  turn_ = TurnNow{client, now};
+  if (const auto paused = begun_.find(client); paused != begun_.end()) {
+    actions.push_back(ResumeRender{paused->second.image});
+    return;
+  }
+  const auto next = NextOf(client);
+  const auto& [of_client, key, rank] = next->first;
+  const Begun& begun = begun_.emplace(client, Begun{key, rank, next->second, names_.Next()}).first->second;
+  waiting_.erase(next);
+  actions.push_back(StartRender{client, begun.key, begun.rank, slabs_.key(begun.job.slab), begun.job.placement, begun.job.setup,
+                                begun.job.hidden, begun.image});
+}
+
+Time RenderQueue::NextTurn() const { return turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max(); }
+
+std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions) {
+  const auto ended = std::ranges::find_if(begun_, [&](const auto& begun) { return begun.second.image == done.image; });
+  if (ended == begun_.end()) return std::nullopt;
+  const ClientId client = ended->first;
+  if (turn_ && turn_->client == client) EndTurn(now);
+  const Begun job = std::move(ended->second);
+  begun_.erase(ended);
   const SlabFetcher::Generation slab = job.job.slab;
   if (done.status.ok()) slabs_.Rendered(slab);
   slabs_.SetBytes(slab, done.slab_bytes);  // a cancelled frame derives data too
+  if (waiting_.empty() && begun_.empty()) turns_.ForgetAll();
+  turns_.ForgetIdle([this](ClientId each) { return Busy(each); });
   if (job.dropped) {
     slabs_.Release(slab);
     actions.push_back(ReleaseImage{done.image});
@@ -58,16 +148,21 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   return report;
 }
 
-std::vector<SlabFetcher::Generation> RenderQueue::SlabsInOrder() const {
-  std::vector<SlabFetcher::Generation> slabs;
-  for (const auto& [name, job] : waiting_) slabs.push_back(job.slab);
-  return slabs;
+std::vector<std::vector<SlabFetcher::Generation>> RenderQueue::SlabsInTurn() const {
+  std::vector<ClientId> clients;
+  std::map<ClientId, std::vector<SlabFetcher::Generation>> slabs;
+  for (const auto& [name, job] : waiting_) slabs[std::get<ClientId>(name)].push_back(job.slab);
+  for (const auto& [client, of_client] : slabs) clients.push_back(client);
+  std::ranges::sort(clients, {}, [this](ClientId client) { return turns_.TurnOf(client); });
+  std::vector<std::vector<SlabFetcher::Generation>> in_turn;
+  for (const ClientId client : clients) in_turn.push_back(std::move(slabs[client]));
+  return in_turn;
 }
 
 std::set<GroupKey> RenderQueue::GroupsOn(SlabFetcher::Generation slab) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.slab == slab) groups.insert(name.first);
+    if (job.slab == slab) groups.insert(std::get<GroupKey>(name));
   }
   return groups;
 }

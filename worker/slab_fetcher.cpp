@@ -108,23 +108,53 @@ void SlabFetcher::SetBytes(Generation slab, std::uint64_t bytes) {
   cached_bytes_ += of_slab.bytes;
 }
 
-void SlabFetcher::RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions) {
+// While a slab has not been rendered from, its voxels are still copied from its sources.
+bool SlabFetcher::Share(Generation a, Generation b) const {
+  const auto touched = [this](Generation slab) {
+    std::vector<Generation> all = slabs_.at(slab).sources;
+    all.push_back(slab);
+    return all;
+  };
+  const std::vector<Generation> of_a = touched(a), of_b = touched(b);
+  return std::ranges::find_first_of(of_a, of_b) != of_a.end();
+}
+
+void SlabFetcher::RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker,
+                                Time now, WorkerActions& actions) {
+  const auto waits = [this](const std::vector<Generation>& slabs) {
+    return std::ranges::any_of(slabs, [this](Generation slab) { return !slabs_.at(slab).missing.empty() && !slabs_.at(slab).retired; });
+  };
+  const auto clients = std::ranges::count_if(by_client, waits);
+  if (clients == 0) return;
   std::uint64_t begun_bytes = BegunBytes();
-  for (const Generation generation : slabs) {
-    Slab& slab = slabs_.at(generation);
-    if (!slab.begun && generation != slabs.front() && begun_bytes + slab.bytes > room_) return;
-    if (!slab.begun) begun_bytes += slab.bytes;
-    slab.begun = true;
-    while (!slab.retired && !slab.missing.empty()) {
-      const ChunkPlace chunk = slab.missing.back();
-      const std::uint32_t bytes = slab.BytesOf(chunk);
-      if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
-      slab.missing.pop_back();
-      in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
-      in_flight_bytes_ += bytes;
-      if (!slab.requested) slab.report.begin = now;
-      slab.requested = true;
-      actions.push_back(SendChunkRequest{{epoch, worker, slab.key.dataset, chunk.box, chunk.chunk}});
+  bool first = true;
+  for (const std::vector<Generation>& slabs : by_client) {
+    std::uint64_t in_flight_bytes = 0;  // of this client
+    for (const auto& [name, request] : in_flight_) {
+      if (std::ranges::find(slabs, name.first) != slabs.end()) in_flight_bytes += request.bytes;
+    }
+    bool has_credit = true;
+    for (const Generation generation : slabs) {
+      if (!has_credit) break;
+      Slab& slab = slabs_.at(generation);
+      const bool at_any_rate = std::exchange(first, false) && next_at_any_rate;
+      if (!slab.begun && !at_any_rate && begun_bytes + slab.bytes > room_) return;
+      if (!slab.begun) begun_bytes += slab.bytes;
+      slab.begun = true;
+      while (!slab.retired && !slab.missing.empty()) {
+        const ChunkPlace chunk = slab.missing.back();
+        const std::uint32_t bytes = slab.BytesOf(chunk);
+        if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
+        has_credit = in_flight_bytes == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        if (!has_credit) break;
+        slab.missing.pop_back();
+        in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
+        in_flight_bytes_ += bytes;
+        in_flight_bytes += bytes;
+        if (!slab.requested) slab.report.begin = now;
+        slab.requested = true;
+        actions.push_back(SendChunkRequest{{epoch, worker, slab.key.dataset, chunk.box, chunk.chunk}});
+      }
     }
   }
 }

@@ -6,9 +6,10 @@
 //   2. RequestChunks, in the order in which slabs will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive within
 //      chunk_timeout, or arrives damaged, is asked for again, chunk_attempts times; then the slab is given up (TakeFailures).
 //   3. complete(slab): it can be rendered from. Release when that is done; the slab stays cached.
+// Clients that wait for voxels at the same time have equal parts of the credit.
 // Trim drops unpinned slabs: those that a complete one covers (the same box with a smaller halo), then the least recently used above
 // cache_bytes or the room (SetRoom). Slabs that are waited for begin to take memory one after the other, as far as there is room; the one
-// that is needed next always does.
+// that is needed next always does, unless others are needed at the same time (RequestChunks).
 #pragma once
 
 #include <algorithm>
@@ -51,9 +52,13 @@ class SlabFetcher {
   // The slab's memory, with what was derived from its voxels and cells; it may fall. Counts as at least the samples and cells.
   void SetBytes(Generation slab, std::uint64_t bytes);
 
-  // Requests missing chunks of these slabs, which are in the order in which they are needed, within the credit (one chunk is always
-  // allowed) and the room.
-  void RequestChunks(std::span<const Generation> slabs, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);
+  // Of acquired slabs: whether rendering from one may touch what rendering from the other one touches.
+  bool Share(Generation a, Generation b) const;
+
+  // Requests missing chunks of these slabs, which each client needs in this order, within the credit (one chunk is always allowed) and the
+  // room. `next_at_any_rate`: the first of all begins to take memory even if there is no room.
+  void RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker, Time now,
+                     WorkerActions& actions);
   void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
   void OnRefused(const ChunkRefused& refused);
   void OnStored(const ChunkStored& stored, Time now);

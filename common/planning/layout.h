@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "common/decomposition/partition.h"
@@ -47,6 +48,7 @@ struct LayoutRequest {
   std::int64_t slab_bytes_target = kSlabBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
+  std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped
 };
 
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their

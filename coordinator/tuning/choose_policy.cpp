@@ -56,7 +56,8 @@ class Search {
                   .looks = &setup.looks,
                   .slots = question.slots,
                   .slab_bytes_target = question.slab_bytes_target,
-                  .known = question.known}),
+                  .known = question.known,
+                  .stop = question.stop}),
         predictor_(predictor),
         asked_(SettledPolicy(*question.frame, question.summary->description.geometry)),
         open_partition_(asked_.decomposition == kAutomatic),
@@ -127,6 +128,7 @@ class Search {
   void ChooseScheme() {
     if (!prediction_) return;
     for (const std::string& scheme : SchemesToTry()) {
+      if (question_.stop.stop_requested()) return;
       ResolvedPolicy policy = best_;
       policy.combine = scheme;
       if (const auto prediction = predictor_.Predict(prepared_, scheme)) Consider(policy, *prediction, kLeastGain);
@@ -135,6 +137,7 @@ class Search {
 
   // Layouts that have been tried under another name are not tried again. `schemes`: under all kPartitionSchemes, if the scheme is open.
   void TryLayout(const ResolvedPolicy& policy, bool schemes) {
+    if (question_.stop.stop_requested()) return;
     Layout layout = layouts_.Make(policy);
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);
@@ -149,7 +152,7 @@ class Search {
     bool better = prediction && Consider(policy, *prediction, least_gain);
     if (better) stands_in_ = stands_in;
     for (const char* const scheme : kPartitionSchemes) {
-      if (!schemes || asked_.combine != kAutomatic || scheme == policy.combine) continue;
+      if (!schemes || asked_.combine != kAutomatic || scheme == policy.combine || question_.stop.stop_requested()) continue;
       ResolvedPolicy other = policy;
       other.combine = scheme;
       prediction = predictor_.Predict(prepared, scheme);
@@ -197,6 +200,16 @@ Policy FixedPolicy(Policy policy) {
   if (policy.combine == kAutomatic) policy.combine = defaults.combine;
   policy.balance_by = BalanceByOf(policy);
   return policy;
+}
+
+Policy FirstPolicy(Policy policy, std::size_t workers) {
+  constexpr std::size_t kManyWorkers = 8;
+  if (policy.decomposition == kAutomatic) {
+    policy.decomposition = "kd-tree";
+    if (policy.balance_by == kAutomatic) policy.balance_by = NameOf(BalanceBy::kOccupied);
+  }
+  if (policy.combine == kAutomatic && workers >= kManyWorkers) policy.combine = "radix-k";
+  return FixedPolicy(std::move(policy));
 }
 
 Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <semaphore>
 
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
@@ -14,6 +15,7 @@
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
+#include "worker/renderers/for_each_piece.h"
 
 namespace slabstream {
 namespace {
@@ -225,7 +227,7 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
 
   const auto setup = std::make_shared<const FrameSetup>(plan.setup);
   executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 1});
-  executor_.Perform(CancelRender{kKey});
+  executor_.Perform(CancelRender{1});
   auto done = outputs_.NextEvent<RenderDone>();
   EXPECT_EQ(done.image, 1U);
   EXPECT_TRUE(done.status.ok() || done.status.code() == StatusCode::kCancelled) << done.status.message();
@@ -240,6 +242,69 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   EXPECT_TRUE(done.status.ok()) << done.status.message();
   EXPECT_GT(done.slab_bytes, 0U);
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
+}
+
+// Renders small frames at once. Larger ones have three pieces, each of which says that it has begun and then waits until it may end.
+class StepwiseRenderer : public Renderer {
+ public:
+  struct Steps {
+    std::counting_semaphore<> begun{0}, may_end{0};
+  };
+  explicit StepwiseRenderer(Steps& steps) : steps_(steps) {}
+
+  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
+                            RankReport&) override {
+    if (FrameBounds(setup).pixel_count() >= 64 * 64) {
+      ForEachPiece(3, control, [this](std::int32_t) {
+        steps_.begun.release();
+        steps_.may_end.acquire();
+      });
+    }
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
+    return MakeLocalImage(setup.format, {});
+  }
+
+ private:
+  Steps& steps_;
+};
+
+TEST(ExecutorPauses, ARenderThatPausesLetsThatOfAnotherClientPass) {
+  StepwiseRenderer::Steps steps;
+  Outputs outputs;
+  Executor executor(outputs.outbox, Codec::kRaw, 1, [&](const RendererKind&) { return std::make_unique<StepwiseRenderer>(steps); });
+  const std::shared_ptr<const Volume> volume = TestSphere(8);
+  const auto start = [&](ClientId client, std::int32_t size, ImageHandle image) {
+    const SlabKey slab{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = image};
+    executor.Perform(OpenSlab{slab});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = 0};
+    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+    executor.Perform(StoreChunk{slab, chunk, payload});
+    ASSERT_TRUE(outputs.NextEvent<ChunkStored>().status.ok());
+    FrameRequest request = TestRequest(FindRenderer("mip"), 20);
+    request.size = {size, size};
+    const auto setup = std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
+    executor.Perform(StartRender{
+        .client = client, .key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = image});
+  };
+  start(1, 64, 1);
+  steps.begun.acquire();
+  executor.Perform(PauseRender{1});
+  steps.may_end.release(3);
+  for (ImageHandle small = 2; small < 5; ++small) {
+    start(2, 1, small);
+    EXPECT_EQ(outputs.NextEvent<RenderDone>().image, small) << "the other one goes on";
+  }
+  EXPECT_FALSE(steps.begun.try_acquire()) << "a piece begins in a pause";
+  executor.Perform(ResumeRender{1});
+  const RenderDone done = outputs.NextEvent<RenderDone>();
+  EXPECT_EQ(done.image, 1U);
+  EXPECT_TRUE(done.status.ok()) << done.status.message();
+
+  start(1, 64, 5);
+  executor.Perform(PauseRender{5});
+  executor.Perform(CancelRender{5});
+  steps.may_end.release(3);
+  EXPECT_EQ(outputs.NextEvent<RenderDone>().status.code(), StatusCode::kCancelled) << "a render that pauses can be cancelled";
 }
 
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {

@@ -45,9 +45,9 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   SlabLayers layers;
   layers.cells = volume.cells;
   SlabData slab(std::move(copy), std::move(layers));
-  const std::atomic<bool> cancelled = false;
+  RenderControl control;
   RankReport report;
-  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(slab, volume.block.box, plan->setup, {}, cancelled, report);
+  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(slab, volume.block.box, plan->setup, {}, control, report);
   CHECK(image.ok()) << image.status().message();
   return FinishPicture(*std::move(image), plan->setup);
 }

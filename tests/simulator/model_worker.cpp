@@ -116,22 +116,38 @@ void ModelWorker::Perform(const DropSlab& action) {
     for (const OpenSlab::Copy& copy : slab.copied)
       EXPECT_TRUE(slab.rendered || copy.from != action.slab) << "a slab is dropped that is copied from";
   }
-  EXPECT_NE(rendering_, action.slab) << "a slab is dropped while it is rendered from";
+  for (const auto& [image, rendering] : rendering_) EXPECT_NE(rendering.slab, action.slab) << "a slab is dropped while it is rendered from";
 }
 
 double ModelWorker::Begin(Job&, const StartRender& action) {
-  EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
+  const std::set<SlabKey> touched = Touched(action.slab);
+  for (const auto& [image, rendering] : rendering_) {
+    EXPECT_NE(rendering.client, action.client) << "two renders of a client at a time";
+    for (const SlabKey& slab : Touched(rendering.slab)) EXPECT_FALSE(touched.contains(slab)) << "two renders touch a slab";
+    tally_.Add(Count::kRendersBesideOthers);
+  }
   EXPECT_TRUE(Complete(action.slab)) << "a slab is rendered from before it is complete";
   EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
   EXPECT_EQ(action.slab.dataset, action.setup->dataset);
-  rendering_ = action.slab;
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);
-  render_seconds_ = speed_.render * random_.Real(0.5, 2);
-  return render_seconds_;
+  const bool large = std::uint64_t(FrameBounds(*action.setup).pixel_count()) >= kLargePixels;
+  const double seconds = speed_.render * random_.Real(0.5, 2) * (large ? speed_.large : 1);
+  rendering_[action.image] = {action.client, action.slab, seconds};
+  return seconds;
+}
+
+// What rendering from the slab reads: until it has been rendered from, those that it is copied from, too.
+std::set<SlabKey> ModelWorker::Touched(const SlabKey& slab) const {
+  std::set<SlabKey> touched = {slab};
+  const ModelSlab& open = slabs_.at(slab);
+  for (const OpenSlab::Copy& copy : open.copied) {
+    if (!open.rendered) touched.insert(copy.from);
+  }
+  return touched;
 }
 
 RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
-  rendering_.reset();
+  const double render_seconds = rendering_.extract(render.image).mapped().seconds;
   Status status;
   if (cancelled) {
     status = Status::Cancelled("render");
@@ -149,7 +165,7 @@ RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
     images_.FailRender(render.image);
   }
   RankReport report;
-  report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds_ * 1e9);
+  report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds * 1e9);
   return {render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.slab.box.voxel_count()) * 2};
 }
 

@@ -21,6 +21,7 @@ inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // of the only v
 
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds
+  double large = 1;                                       // times as long renders a box of a large frame
 };
 
 class ModelWorker {
@@ -79,6 +80,7 @@ class ModelWorker {
   RenderDone Rendered(const StartRender& render, bool cancelled);
   ChunkStored Stored(const StoreChunk& store);
   bool Complete(const SlabKey& key) const;
+  std::set<SlabKey> Touched(const SlabKey& slab) const;
 
   const Node node_;
   const WorkerConfig config_;
@@ -93,8 +95,12 @@ class ModelWorker {
   bool has_memory_ = true;
 
   SymbolicImages images_;
-  std::optional<SlabKey> rendering_;
-  double render_seconds_ = 0;                    // of that
+  struct Rendering {
+    ClientId client = 0;
+    SlabKey slab;
+    double seconds = 0;
+  };
+  std::map<ImageHandle, Rendering> rendering_;   // begun and not ended, paused or not
   std::map<ImageHandle, OcclusionMask> hidden_;  // found, and not yet told
   std::map<SlabKey, ModelSlab> slabs_;           // that are open
   std::map<ChunkName, Outstanding> requested_;   // and not yet stored, as the credit counts

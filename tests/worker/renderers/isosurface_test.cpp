@@ -298,7 +298,7 @@ TEST(Isosurfaces, OpaqueOnesEndRays) {
     const FrameSetup setup = MakeSetup(half, options);
     RankReport report;
     const auto slab = CutSlab(half, half.block.box);
-    (void)MakeRenderer(*setup.renderer)->Render(*slab, half.block.box, setup, {}, std::atomic<bool>(false), report).value();
+    (void)MakeRenderer(*setup.renderer)->Render(*slab, half.block.box, setup, {}, RenderControl(), report).value();
     return double(report.drawn_voxels);
   };
   TransferFunction with_surface = options.transfer;
@@ -352,7 +352,7 @@ TEST(Isosurfaces, AreDrawnWhereBricksSaySo) {
     for (const Box& box : partition.boxes()) {
       RankReport report;
       const auto slab = CutSlab(volume, SlabBox(box, setup));
-      (void)MakeRenderer(*renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value();
+      (void)MakeRenderer(*renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
       if (bricks.AnyVisible(SlabBox(box, setup))) {
         drawn += report.drawn_voxels > 0 ? 1 : 0;
       } else {

@@ -97,12 +97,12 @@ TEST(Raycast, BoxesWithoutDrawnVoxelsShowNothing) {
     ++left_out;
     RankReport report;
     const auto slab = CutSlab(volume, SlabBox(box, setup));
-    (void)MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value();
+    (void)MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
     EXPECT_EQ(report.drawn_voxels, 0U);
   }
   RankReport report;
   const auto slab = CutSlab(volume, volume.block.box);
-  (void)MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, {}, std::atomic<bool>(false), report).value();
+  (void)MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, {}, RenderControl(), report).value();
   EXPECT_GT(report.drawn_voxels, 0U);
   EXPECT_LT(left_out, 16);
 }
