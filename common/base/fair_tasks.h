@@ -5,9 +5,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <exception>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -45,19 +45,21 @@ class FairTasks {
   // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory or no thread; the
   // task then runs with a later one, or never.
   void Post(Owner owner, std::function<void()> task) {
+    std::list<std::function<void()>> one;
+    one.push_back(std::move(task));
     {
       const std::lock_guard lock(shared_->mutex);
-      std::deque<std::function<void()>>& waiting = shared_->waiting[owner];
-      if (waiting.empty() && !shared_->running.contains(owner)) shared_->turns.Join(owner);
-      waiting.push_back(std::move(task));
+      if (!shared_->waiting.contains(owner) && !shared_->running.contains(owner)) shared_->turns.Join(owner);
+      std::list<std::function<void()>>& waiting = shared_->waiting[owner];
+      waiting.splice(waiting.end(), one);  // does not throw: nobody finds an owner that waits without a task
     }
     threads_.Post([shared = shared_] { RunTasks(*shared); });
   }
 
  private:
   struct Shared {
-    std::mutex mutex;  // guards everything
-    std::map<Owner, std::deque<std::function<void()>>> waiting;
+    std::mutex mutex;                                           // guards everything
+    std::map<Owner, std::list<std::function<void()>>> waiting;  // none of them empty
     std::set<Owner> running;
     FairTurns<Owner> turns;
   };
@@ -73,10 +75,10 @@ class FairTasks {
       }
       if (next == shared.waiting.end()) return;
       const Owner owner = next->first;
+      shared.running.insert(owner);  // first: if it throws, the task still waits
       std::function<void()> task = std::move(next->second.front());
       next->second.pop_front();
       if (next->second.empty()) shared.waiting.erase(next);
-      shared.running.insert(owner);
       shared.turns.Take(owner);
       lock.unlock();
       const Time begin = MonotonicNow();
