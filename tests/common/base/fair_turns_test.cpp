@@ -90,7 +90,7 @@ TEST(FairTurns, MembersThatAlwaysWantMoreGetTheSameWhateverOthersDo) {
   }
 }
 
-// Small demands of one member beside any number of greedy ones: as long as it takes less than its share, it waits for the turn at hand and
+// Small demands of one member beside any number of greedy ones: as long as it takes half of its share, it waits for the turn at hand and
 // no other one.
 TEST(FairTurns, WhoWantsLittleWaitsForOneTurnOnly) {
   Random random(12);
@@ -98,10 +98,12 @@ TEST(FairTurns, WhoWantsLittleWaitsForOneTurnOnly) {
   for (int round = 0; round < 200; ++round) {
     Shared shared;
     const int greedy = random.Integer(1, 6);
-    for (int member = 1; member <= greedy; ++member) shared.wanted[member] = {{Time{}, std::chrono::hours(1)}};
+    for (int member = 1; member <= greedy; ++member) {  // no two of them ever have used the same
+      shared.wanted[member] = {{Time{}, microseconds(random.Integer(1, 9999))}, {Time{}, std::chrono::hours(1)}};
+    }
     Time when{};
     for (int i = 0; i < 100; ++i) {
-      when += kLongest * random.Integer(greedy + 1, 20);
+      when += kLongest * random.Integer(2 * (greedy + 1), 20);  // half of its share: it has never used more than they
       shared.wanted[0].push_back({when, microseconds(random.Integer(1, 10'000))});
     }
     shared.Run(Time{} + std::chrono::seconds(3), [&](int member, Duration) {
