@@ -146,9 +146,9 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
                                    .frame = frame});
   };
   combine({0, 0, 20, 8}, 1);
-  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  executor_.Perform(FindHidden{0, kKey, 1, shared, {}});
   combine({30, 0, 40, 8}, 1);
-  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  executor_.Perform(FindHidden{0, kKey, 1, shared, {}});
   EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
   const auto first = outputs_.NextEvent<HiddenFound>();
   EXPECT_EQ(first.image, 1U);
@@ -160,7 +160,7 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
 
 TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
   EXPECT_TRUE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
-  executor_.Perform(FindHidden{kKey, 1, std::make_shared<const FrameSetup>(), {}});
+  executor_.Perform(FindHidden{0, kKey, 1, std::make_shared<const FrameSetup>(), {}});
   EXPECT_TRUE(outputs_.NextEvent<HiddenFound>().hidden.empty());
 }
 
