@@ -78,8 +78,8 @@ std::optional<ClientId> RenderQueue::NextInTurn() const {
 }
 
 void RenderQueue::ChargeTurn(Time now) {
-  turns_.Charge(turn_->client, now - turn_->begin);
-  turn_->begin = now;
+  turns_.Charge(turn_->client, now - turn_->charged);
+  turn_->charged = now;
 }
 
 void RenderQueue::EndTurn(Time now) {
@@ -93,7 +93,10 @@ void RenderQueue::StartNext(Time now, WorkerActions& actions) {
   if (!next) return;
   if (turn_) {
     ChargeTurn(now);
-    if (turns_.TurnOf(*next).used > turns_.TurnOf(turn_->client).used) return turns_.Take(turn_->client);
+    if (turns_.TurnOf(*next).used > turns_.TurnOf(turn_->client).used) {  // another turn of the same client
+      turn_->begin = now;
+      return turns_.Take(turn_->client);
+    }
     actions.push_back(PauseRender{begun_.at(turn_->client).image});
   }
   Begin(*next, now, actions);
@@ -101,7 +104,7 @@ void RenderQueue::StartNext(Time now, WorkerActions& actions) {
 
 void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
   turns_.Take(client);
-  turn_ = TurnNow{client, now};
+  turn_ = TurnNow{client, now, now};
   if (const auto paused = begun_.find(client); paused != begun_.end()) {
     actions.push_back(ResumeRender{paused->second.image});
     return;

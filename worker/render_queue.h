@@ -63,7 +63,8 @@ class RenderQueue {
   };
   struct TurnNow {
     ClientId client = 0;
-    Time begin;  // what it took before is charged
+    Time begin;    // of the turn
+    Time charged;  // what it took before is
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;
 
