@@ -116,8 +116,7 @@ class PreparedPicture : public Renderer {
  public:
   PreparedPicture(const Case& config, Rank rank, Shared& shared) : picture_(MakePicture(config, rank)), shared_(shared) {}
 
-  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&,
-                            RankReport&) override {
+  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&, RankReport&) override {
     const std::int64_t begin_ns = ProcessorNs(CLOCK_THREAD_CPUTIME_ID);
     LocalImage copy = picture_;
     shared_.made_ns += ProcessorNs(CLOCK_THREAD_CPUTIME_ID) - begin_ns;
@@ -163,9 +162,9 @@ class Coordinator {
         shared_(shared),
         processes_(std::move(processes)),
         control_(*Socket::Router(context_)),
-        slabs_(*Socket::Router(context_)) {
+        voxels_(*Socket::Router(context_)) {
     CHECK(control_.Bind("ipc://" + directory + "/control").ok());
-    slabs_endpoint_ = *slabs_.Bind("ipc://" + directory + "/slabs");
+    voxels_endpoint_ = *voxels_.Bind("ipc://" + directory + "/voxels");
     SetRenderer(*FindRenderer(kDefaultRenderer), setup_);
     setup_.dataset = kDataset;
     setup_.description.geometry.size = {16, 16, 65535};
@@ -242,7 +241,7 @@ class Coordinator {
   void Send(const std::string& identity, MessageView message) { CHECK(control_.Send(identity, Encode(message)).ok()); }
 
   void Serve() {
-    const std::vector<Socket*> sockets = {&control_, &slabs_};
+    const std::vector<Socket*> sockets = {&control_, &voxels_};
     Wait(sockets, nullptr, std::chrono::milliseconds(200));
     if (const Time now = MonotonicNow(); now >= next_ping_) {
       next_ping_ = now + std::chrono::milliseconds(500);
@@ -253,7 +252,7 @@ class Coordinator {
       if (const auto* hello = std::get_if<Register>(&message)) {
         if (std::ranges::find(workers_, incoming->identity, &Worker::identity) != workers_.end()) continue;
         workers_.push_back({incoming->identity, hello->images_endpoint, hello->memory_scope, hello->images_key});
-        Send(incoming->identity, Welcome{kEpoch, hello->incarnation, WorkerId(workers_.size()), slabs_endpoint_, 1000, 60000});
+        Send(incoming->identity, Welcome{kEpoch, hello->incarnation, WorkerId(workers_.size()), voxels_endpoint_, 1000, 60000});
       } else if (const auto* done = std::get_if<GroupDone>(&message)) {
         reported_ns_ = NowNs();
         if (done->key.frame == frame_) done_ = *done;
@@ -261,12 +260,12 @@ class Coordinator {
         CHECK(false) << trouble->status.message();
       }
     }
-    while (const auto incoming = slabs_.TryReceive()) {
+    while (const auto incoming = voxels_.TryReceive()) {
       const auto request = std::get<ChunkRequest>(Decode(incoming->header()).value());
       const auto bytes = std::size_t(request.box.voxel_count()) * BytesPerSample(setup_.description.type);
       Chunk chunk = {.epoch = kEpoch, .dataset = kDataset, .box = request.box, .chunk = request.chunk};
       const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::min<std::size_t>(bytes, kChunkBytes))), Codec::kRaw, chunk);
-      CHECK(slabs_.Send(incoming->identity, Encode(chunk), payload).ok());
+      CHECK(voxels_.Send(incoming->identity, Encode(chunk), payload).ok());
     }
   }
 
@@ -274,8 +273,8 @@ class Coordinator {
   const Shared& shared_;
   const std::vector<pid_t> processes_;
   Context context_;
-  Socket control_, slabs_;
-  std::string slabs_endpoint_;
+  Socket control_, voxels_;
+  std::string voxels_endpoint_;
   FrameSetup setup_;
   std::vector<Worker> workers_;
   FrameId frame_ = 0;

@@ -24,7 +24,7 @@ namespace {
 constexpr std::int32_t kObject = 128;  // a side of the sphere in empty space
 constexpr int kAzimuths = 12;
 
-// Renders `boxes` slabs of the volume, from each view in turn.
+// Renders `boxes` boxes of the volume, from each view in turn.
 void Render(benchmark::State& state, const Volume& volume, const RendererKind& kind, const std::vector<ViewParameters>& views, int boxes,
             int threads) {
   const BenchCase look = StandardSphere(SphereClass::kHollow, kObject, &kind);
@@ -34,9 +34,9 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
 
   const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
   const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});
-  std::vector<std::unique_ptr<SlabData>> slabs;
+  std::vector<std::unique_ptr<BoxData>> data;
   for (const Box& box : partition.boxes()) {
-    slabs.push_back(std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume.block, SlabBox(box, setups[0])))));
+    data.push_back(std::make_unique<BoxData>(BrickedVoxels(CutBlock(volume.block, PaddedBox(box, setups[0])))));
   }
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
@@ -48,8 +48,8 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
     arena.execute([&] {
       const FrameSetup& setup = setups[frame++ % setups.size()];
       LocalImage image;
-      for (std::size_t i = 0; i < slabs.size(); ++i) {
-        image = renderer->Render(*slabs[i], partition.boxes()[i], setup, {}, control, report).value();
+      for (std::size_t i = 0; i < data.size(); ++i) {
+        image = renderer->Render(*data[i], partition.boxes()[i], setup, {}, control, report).value();
         benchmark::DoNotOptimize(image.rgba.data());
       }
       const auto begin = std::chrono::steady_clock::now();
@@ -73,9 +73,9 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
   }
   state.counters["finish"] = finish.count() / frames;
   state.counters["drawn"] = double(report.drawn_voxels) / frames;
-  double slab_bytes = 0;
-  for (const auto& slab : slabs) slab_bytes += double(slab->bytes());
-  state.counters["slab_MB"] = slab_bytes / 1e6;
+  double box_bytes = 0;
+  for (const auto& box : data) box_bytes += double(box->bytes());
+  state.counters["box_MB"] = box_bytes / 1e6;
 }
 
 const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t(index)]; }

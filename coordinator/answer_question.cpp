@@ -53,7 +53,7 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
 
 }  // namespace
 
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples) {
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   const ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
   const Dataset dataset{volume, *asked.summary, asked.dataset};

@@ -4,11 +4,11 @@
 #include <memory>
 
 #include "coordinator/dataset_machine.h"
-#include "coordinator/slab_server.h"
+#include "coordinator/voxel_server.h"
 
 namespace slabstream {
 
 // Errors: as of MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const SlabServer::Samples& samples);
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples);
 
 }  // namespace slabstream

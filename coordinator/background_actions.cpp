@@ -30,7 +30,7 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-FoldersSeen LookThrough(const LookAtFolders& action) {
+FoldersSeen Check(const CheckWatchedFolders& action) {
   FoldersSeen seen;
   for (const std::string& folder : action.folders) {
     seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
@@ -58,7 +58,7 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
   return found;
 }
 
-Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const SlabServer::Samples& samples,
+Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const VoxelServer::Samples& samples,
                                                    const CountDataset& action) {
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
@@ -71,17 +71,17 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
 }  // namespace
 
 BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings,
-                                     SlabServer& slabs)
+                                     VoxelServer& voxels)
     : make_plan_(std::move(make_plan)),
       count_occupied_(std::move(count_occupied)),
       planner_(std::make_shared<Planner>(surroundings)),
-      slabs_(slabs),
+      voxels_(voxels),
       answers_(kAnswersAtOnce) {}
 
 std::vector<CoordinatorEvent> BackgroundActions::TakeEvents() {
   std::vector<CoordinatorEvent> events;
   for (News& news : inbox_->TakeAll()) {
-    if (news.samples.any()) slabs_.Publish(news.dataset, std::move(news.samples));
+    if (news.samples.any()) voxels_.Publish(news.dataset, std::move(news.samples));
     if (news.upload != nullptr) {
       const auto open = uploads_.find(std::get<UploadBegun>(news.event).upload);
       if (open != uploads_.end()) open->second = std::move(news.upload);
@@ -109,7 +109,7 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
   auto summary = std::make_shared<const VolumeSummary>(SummaryOf(LayeredVolume{volume, layers}));
-  SlabServer::Samples samples;
+  VoxelServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
   if (volume->cells != nullptr) samples.cells = std::make_shared<const MeshCutter>(volume->cells);
   if (!held && MostBricksAreEqual(*summary)) {
@@ -134,13 +134,13 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
-  slabs_.Withdraw(action.dataset);
+  voxels_.Withdraw(action.dataset);
   return std::nullopt;
 }
 
-BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
+BackgroundActions::AtOnce BackgroundActions::Perform(CheckDatasetFiles& action) {
   return Post(
-      looks_, "checking the files of a dataset",
+      checks_, "checking the files of a dataset",
       [action] {
         return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
       },
@@ -149,9 +149,9 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LookAtDataset& action) {
       });
 }
 
-BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
+BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action) {
   return Post(
-      looks_, "searching the watched folders", [action] { return News{LookThrough(action)}; },
+      checks_, "searching the watched folders", [action] { return News{Check(action)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};
@@ -160,7 +160,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LookAtFolders& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
   return Post(
-      looks_, "a look at files",
+      checks_, "a check of files",
       [action] {
         return News{DatasetsFound{action.order, Find(action.arguments)}};
       },
@@ -172,7 +172,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   return Post(
       answers_, "an answer to a question",
-      [action, samples = slabs_.Find(action.dataset)] {
+      [action, samples = voxels_.Find(action.dataset)] {
         return News{QuestionAnswered{action.id, AnswerTo(action, samples)}};
       },
       [id = action.id](const Status& why) {
@@ -219,7 +219,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {
 BackgroundActions::AtOnce BackgroundActions::Perform(CountDataset& action) {
   return Post(
       counts_.Of(action.volume.dataset()), "counting of occupied voxels",
-      [count = count_occupied_, samples = slabs_.Find(action.volume.dataset()), action] {
+      [count = count_occupied_, samples = voxels_.Find(action.volume.dataset()), action] {
         return News{OccupiedCounted{action.count, Count(count, samples, action)}};
       },
       [id = action.count](const Status& why) {

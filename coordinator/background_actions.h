@@ -1,5 +1,5 @@
 // BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets or
-// take memory for uploads, up to kLooksAtOnce look at files, two answer questions about voxels, up to kCountsAtOnce count occupied voxels,
+// take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, up to kCountsAtOnce count occupied voxels,
 // each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open policies. None waits for
 // another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as
 // events for the machines. Plans that are dropped stop soon, as do the choices for clients that have left.
@@ -23,8 +23,8 @@
 #include "coordinator/dataset_machine.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
-#include "coordinator/slab_server.h"
 #include "coordinator/upload_buffer.h"
+#include "coordinator/voxel_server.h"
 
 namespace slabstream {
 
@@ -35,22 +35,22 @@ using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const Clas
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
-inline constexpr std::size_t kLooksAtOnce = 4;  // so one file system that does not answer leaves the others alone
+inline constexpr std::size_t kChecksAtOnce = 4;  // so one file system that does not answer leaves the others alone
 inline constexpr std::size_t kCountsAtOnce = 4;
 inline constexpr std::size_t kPlansAtOnce = 8;
 inline constexpr std::size_t kChoicesAtOnce = 2;
 
 class BackgroundActions {
  public:
-  // `slabs` serves the voxels of the datasets that are loaded, and must outlive this.
-  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, SlabServer& slabs);
+  // `voxels` serves the voxels of the datasets that are loaded, and must outlive this.
+  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, VoxelServer& voxels);
 
   // Each begins an action. An event: the action is over already, or could not begin.
   using AtOnce = std::optional<CoordinatorEvent>;
   AtOnce Perform(LoadDataset& action);
   AtOnce Perform(UnloadDataset& action);
-  AtOnce Perform(LookAtDataset& action);
-  AtOnce Perform(LookAtFolders& action);
+  AtOnce Perform(CheckDatasetFiles& action);
+  AtOnce Perform(CheckWatchedFolders& action);
   AtOnce Perform(FindDatasets& action);
   AtOnce Perform(AnswerQuestion& action);
   AtOnce Perform(BeginUpload& action);
@@ -73,7 +73,7 @@ class BackgroundActions {
   struct News {
     CoordinatorEvent event;
     DatasetId dataset = 0;
-    SlabServer::Samples samples = {};
+    VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
   static Result<News> Load(const LoadDataset& action);
@@ -84,11 +84,11 @@ class BackgroundActions {
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;
-  SlabServer& slabs_;
+  VoxelServer& voxels_;
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
   std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen
-  BackgroundTasks loads_{kLoadsAtOnce}, looks_{kLooksAtOnce}, answers_;
+  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_;
   const std::shared_ptr<FairTasks> choices_ = std::make_shared<FairTasks>(kChoicesAtOnce);  // plans share it
   FairTasks counts_{kCountsAtOnce}, planning_{kPlansAtOnce};
 };

@@ -1,4 +1,4 @@
-// Samples of a box cut out of a volume, as the slabs plane sends them.
+// Samples of a box cut out of a volume, as the voxels plane sends them.
 #pragma once
 
 #include <cstdint>

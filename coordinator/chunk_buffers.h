@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/wire/slab_messages.h"
+#include "common/wire/voxel_messages.h"
 
 namespace slabstream {
 

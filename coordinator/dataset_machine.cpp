@@ -17,7 +17,7 @@ void DatasetMachine::State::On(const SeekDataset& event) {
     news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(event.name), &RefusedRequests::unknown_dataset};
     return;
   }
-  TellUse(*uses.insert_or_assign(event.use, Use{.name = event.name, .look = Seek(event.name)}).first);
+  TellUse(*uses.insert_or_assign(event.use, Use{.name = event.name, .check = Seek(event.name)}).first);
 }
 
 void DatasetMachine::State::On(const KeepDataset& event) {
@@ -45,11 +45,11 @@ void DatasetMachine::State::On(const EndDatasets& event) {
   stopped = true;
 }
 
-// Sees to it that the dataset is loaded as its files are now. The look at them that must be over before; 0: none.
-LookId DatasetMachine::State::Seek(const std::string& name) {
+// Sees to it that the dataset is loaded as its files are now. The check of them that must be over before; 0: none.
+CheckId DatasetMachine::State::Seek(const std::string& name) {
   if (!datasets.IsListed(name)) {
-    datasets.Await(name, folder_looks.Want());
-    LookThroughFolders();
+    datasets.Await(name, folder_checks.Want());
+    CheckFolders();
     return 0;
   }
   datasets.Use(name);
@@ -57,23 +57,23 @@ LookId DatasetMachine::State::Seek(const std::string& name) {
   switch (entry->state) {
     case DatasetState::kUnloaded:
     case DatasetState::kFailed: LoadData(name); break;
-    case DatasetState::kLoading: return entry->looks.Want();
+    case DatasetState::kLoading: return entry->checks.Want();
     case DatasetState::kReady: {
       if (entry->stamp == nullptr) break;
-      const LookId look = entry->looks.Want();
-      LookAt(name);
-      return look;
+      const CheckId check = entry->checks.Want();
+      CheckFilesOf(name);
+      return check;
     }
   }
   return 0;
 }
 
-// Until a look has shown that the files have not changed, requests are planned for the voxels that are there.
+// Until a check has shown that the files have not changed, requests are planned for the voxels that are there.
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
   const DatasetTable::Entry& entry = *datasets.Find(use.name);
   if (entry.state == DatasetState::kReady) {
-    news.uses[id] = DatasetReady{entry.id, entry.summary, entry.looks.IsOver(use.look)};
+    news.uses[id] = DatasetReady{entry.id, entry.summary, entry.checks.IsOver(use.check)};
   } else {
     news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading};
   }
@@ -135,8 +135,8 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   const Index3& size = event.summary->description.geometry.size;
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is loaded: {} x {} x {} voxels, {}, {:.1f} ms", InQuotes(event.name), size.x,
        size.y, size.z, MemoryText(event.bytes), std::chrono::duration<double, std::milli>(now - begun).count());
-  if (event.stamp == nullptr) datasets.Find(event.name)->looks.AnswerAll();
-  LookAt(event.name);
+  if (event.stamp == nullptr) datasets.Find(event.name)->checks.AnswerAll();
+  CheckFilesOf(event.name);
   TellUses(event.name);
 
   const std::uint64_t share = DatasetShare(config.memory_bytes);
@@ -192,30 +192,30 @@ void DatasetMachine::State::Unload(DatasetId dataset) {
   actions.emplace_back(UnloadDataset{dataset});
 }
 
-// ---------------------------------------------------------------- looks
+// ---------------------------------------------------------------- checks
 
 // If somebody wants it and none is under way.
-void DatasetMachine::State::LookAt(const std::string& name) {
+void DatasetMachine::State::CheckFilesOf(const std::string& name) {
   DatasetTable::Entry& entry = *datasets.Find(name);
-  if (entry.state != DatasetState::kReady || entry.stamp == nullptr || !entry.looks.MustBegin()) return;
-  entry.looks.Begin();
-  actions.emplace_back(LookAtDataset{.name = name, .load = entry.load, .stamp = entry.stamp});
+  if (entry.state != DatasetState::kReady || entry.stamp == nullptr || !entry.checks.MustBegin()) return;
+  entry.checks.Begin();
+  actions.emplace_back(CheckDatasetFiles{.name = name, .load = entry.load, .stamp = entry.stamp});
 }
 
 void DatasetMachine::State::On(const DatasetSeen& event) {
   DatasetTable::Entry* const entry = datasets.FindLoad(event.name, event.load);
   if (entry == nullptr) return;
-  entry->looks.End();
+  entry->checks.End();
   if (!event.changed.ok()) {
     FailData(event.name, event.changed.status());
   } else if (*event.changed) {
     Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));
     RenewData(event.name);
   } else {
-    LookAt(event.name);
+    CheckFilesOf(event.name);
     for (auto& use : uses) {
-      if (use.second.look == 0 || use.second.name != event.name || !entry->looks.IsOver(use.second.look)) continue;
-      use.second.look = 0;
+      if (use.second.check == 0 || use.second.name != event.name || !entry->checks.IsOver(use.second.check)) continue;
+      use.second.check = 0;
       if (!use.second.kept) TellUse(use);
     }
   }
@@ -223,22 +223,22 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
 }
 
 // If somebody wants it and it is not under way.
-void DatasetMachine::State::LookThroughFolders() {
-  if (!folder_looks.MustBegin()) return;
-  folder_looks.Begin();
-  actions.emplace_back(LookAtFolders{datasets.folders});
+void DatasetMachine::State::CheckFolders() {
+  if (!folder_checks.MustBegin()) return;
+  folder_checks.Begin();
+  actions.emplace_back(CheckWatchedFolders{datasets.folders});
 }
 
 // At the folders, if there are any, and the files of what is loaded.
-void DatasetMachine::State::LookAtEverything() {
+void DatasetMachine::State::CheckEverything() {
   if (!datasets.folders.empty()) {
-    folder_looks.Want();
-    LookThroughFolders();
+    folder_checks.Want();
+    CheckFolders();
   }
   datasets.ForEach([this](const std::string& name, DatasetTable::Entry& entry) {
     if (entry.state != DatasetState::kReady || entry.stamp == nullptr) return;
-    entry.looks.Want();
-    LookAt(name);
+    entry.checks.Want();
+    CheckFilesOf(name);
   });
 }
 
@@ -258,7 +258,7 @@ void DatasetMachine::State::On(const BadRequest& event) {
 }
 
 Time DatasetMachine::State::NextWake() const {
-  return stopped || datasets.folders.empty() || folder_looks.UnderWay() ? Time::max() : next_round;
+  return stopped || datasets.folders.empty() || folder_checks.UnderWay() ? Time::max() : next_round;
 }
 
 DatasetMachine::DatasetMachine(DatasetConfig config) : state_(std::make_unique<State>(std::move(config))) {}
@@ -270,12 +270,12 @@ std::vector<DatasetAction> DatasetMachine::Step(const DatasetEvent& event, Time 
   if (state.stopped) return {};
   state.now = now;
   if (!std::exchange(state.started, true)) {
-    state.next_round = now + state.config.look_interval;
+    state.next_round = now + state.config.check_interval;
     state.datasets.ForEach([now](const std::string&, DatasetTable::Entry& entry) { entry.since = now; });
   }
   std::visit([&state](const auto& e) { state.On(e); }, event);
   if (!state.stopped) {
-    if (now >= state.NextWake()) state.LookAtEverything();
+    if (now >= state.NextWake()) state.CheckEverything();
     state.AskExecutor();
     state.UnloadRetired();
     if (!state.news.uses.empty() || !state.news.unloaded.empty()) state.actions.emplace_back(std::exchange(state.news, {}));

@@ -4,10 +4,10 @@
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
 //              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
 //              cannot be loaded for want of memory.
-//   files      A frame of a dataset begins only after a look at its files that began after the request came. If they have changed, they
+//   files      A frame of a dataset begins only after a check of its files that began after the request came. If they have changed, they
 //              are read anew, and what has not begun waits. Frames that have begun end with the voxels that they began with, which stay
-//              until then. Watched folders are looked through every look_interval, and when somebody asks for a name that is not known;
-//              files that come and go there are datasets that come and go. DataOrders add and remove datasets, too. A look never holds
+//              until then. Watched folders are looked through every check_interval, and when somebody asks for a name that is not known;
+//              files that come and go there are datasets that come and go. DataOrders add and remove datasets, too. A check never holds
 //              the machine up: the executor answers it with an event, as it does for loads.
 //   questions  What a dataset holds is asked of the executor once the dataset is loaded and its files were looked at, as for frames. A
 //              question ends with its answer, with OrderRefused, or with its client.
@@ -16,7 +16,7 @@
 //              it up or sends anything else than the next bytes, nothing stays.
 //
 // What the executor must do: call Step(DatasetTick) no later than NextWake(); carry out the actions in order; answer LoadDataset,
-// LookAtDataset, LookAtFolders, FindDatasets, AnswerQuestion, BeginUpload and FinishUpload with one event each, in any order.
+// CheckDatasetFiles, CheckWatchedFolders, FindDatasets, AnswerQuestion, BeginUpload and FinishUpload with one event each, in any order.
 #pragma once
 
 #include <cstdint>
@@ -42,12 +42,12 @@ using UploadId = std::uint64_t;    // likewise, of a dataset that a client sends
 
 struct DatasetConfig {
   Catalogue datasets;
-  std::set<std::string> folders;                     // that are watched, as WatchedFolder says them
-  std::uint64_t memory_bytes = 0;                    // limit of the coordinator's memory; 0: none
-  std::size_t max_questions = 1024;                  // of all clients
-  Duration look_interval = std::chrono::seconds(5);  // between looks at the watched folders
-  std::size_t max_datasets = kMaxListed;             // in the catalogue
-  LogLevel log_level = LogLevel::kOff;               // Notes of lower levels are not made
+  std::set<std::string> folders;                      // that are watched, as WatchedFolder says them
+  std::uint64_t memory_bytes = 0;                     // limit of the coordinator's memory; 0: none
+  std::size_t max_questions = 1024;                   // of all clients
+  Duration check_interval = std::chrono::seconds(5);  // between checks of the watched folders
+  std::size_t max_datasets = kMaxListed;              // in the catalogue
+  LogLevel log_level = LogLevel::kOff;                // Notes of lower levels are not made
 };
 
 // ---- events, beside ToDatasets
@@ -76,13 +76,13 @@ struct DatasetFailed {
   LoadId load = 0;
   Status status;
 };
-// The end of a LookAtDataset.
+// The end of a CheckDatasetFiles.
 struct DatasetSeen {
   std::string name;
   LoadId load = 0;
   Result<bool> changed;
 };
-// The end of a LookAtFolders.
+// The end of a CheckWatchedFolders.
 struct FoldersSeen {
   std::map<std::string, Result<FoundData>> folders;
 };
@@ -122,13 +122,13 @@ struct UnloadDataset {
   DatasetId dataset = 0;
 };
 // -> DatasetSeen: whether the files of a loaded dataset have changed.
-struct LookAtDataset {
+struct CheckDatasetFiles {
   std::string name;
   LoadId load = 0;
   std::shared_ptr<const FileStamp> stamp;
 };
 // -> FoldersSeen: what lies in each of these folders.
-struct LookAtFolders {
+struct CheckWatchedFolders {
   std::set<std::string> folders;
 };
 // -> DatasetsFound: what these arguments of an order mean, and whether it can be read.
@@ -161,13 +161,13 @@ struct FinishUpload {
 struct DropUpload {
   UploadId upload = 0;
 };
-using DatasetAction = std::variant<DatasetNews, ToClient, LoadDataset, UnloadDataset, LookAtDataset, LookAtFolders, FindDatasets,
+using DatasetAction = std::variant<DatasetNews, ToClient, LoadDataset, UnloadDataset, CheckDatasetFiles, CheckWatchedFolders, FindDatasets,
                                    AnswerQuestion, BeginUpload, StoreUpload, FinishUpload, DropUpload, Note>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0.
 struct DatasetSizes {
   std::size_t uses = 0;
-  std::size_t orders = 0, awaited = 0;  // that wait for a look at files; names that do
+  std::size_t orders = 0, awaited = 0;  // that wait for a check of files; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
   std::size_t questions = 0, uploads = 0;
 };

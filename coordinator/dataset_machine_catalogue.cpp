@@ -9,7 +9,7 @@ namespace slabstream {
 // ---------------------------------------------------------------- watched folders
 
 void DatasetMachine::State::On(const FoldersSeen& event) {
-  folder_looks.End();
+  folder_checks.End();
   std::set<std::string> heard;
   for (const auto& [folder, found] : event.folders) {
     if (!datasets.folders.contains(folder)) continue;  // not any more
@@ -27,14 +27,14 @@ void DatasetMachine::State::On(const FoldersSeen& event) {
 
   std::vector<std::string> missing;
   datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
-    if (entry.awaited != 0 && folder_looks.IsOver(entry.awaited)) missing.push_back(name);
+    if (entry.awaited != 0 && folder_checks.IsOver(entry.awaited)) missing.push_back(name);
   });
   for (const std::string& name : missing) {
     datasets.Remove(name);
     Lose(name, datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset);
   }
-  next_round = now + config.look_interval;
-  LookThroughFolders();
+  next_round = now + config.check_interval;
+  CheckFolders();
   AnswerLists();
 }
 
@@ -94,10 +94,10 @@ void DatasetMachine::State::OnMessage(PeerToken client, const DataOrder& message
     case DataAction::kReload: return AnswerOrder(client, message, Reload(message.items));
     case DataAction::kList: break;
   }
-  LookAtEverything();
-  if (!datasets.folders.empty()) order.folders = folder_looks.Last();
+  CheckEverything();
+  if (!datasets.folders.empty()) order.folders = folder_checks.Last();
   datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
-    if (entry.state == DatasetState::kReady && entry.stamp != nullptr) order.datasets[name] = entry.looks.Last();
+    if (entry.state == DatasetState::kReady && entry.stamp != nullptr) order.datasets[name] = entry.checks.Last();
   });
   orders.emplace(++last_order, std::move(order));
   AnswerLists();
@@ -106,10 +106,10 @@ void DatasetMachine::State::OnMessage(PeerToken client, const DataOrder& message
 void DatasetMachine::State::AnswerLists() {
   std::erase_if(orders, [this](const auto& open) {
     const OpenOrder& order = open.second;
-    if (order.order.action != DataAction::kList || !folder_looks.IsOver(order.folders)) return false;
-    for (const auto& [name, look] : order.datasets) {
+    if (order.order.action != DataAction::kList || !folder_checks.IsOver(order.folders)) return false;
+    for (const auto& [name, check] : order.datasets) {
       const DatasetTable::Entry* const entry = datasets.Find(name);
-      if (entry != nullptr && entry->state == DatasetState::kReady && !entry->looks.IsOver(look)) return false;
+      if (entry != nullptr && entry->state == DatasetState::kReady && !entry->checks.IsOver(check)) return false;
     }
     AnswerOrder(order.client, order.order, Status::Ok());
     return true;
@@ -147,7 +147,7 @@ Status DatasetMachine::State::AddFound(const FoundData& found) {
     return Status::ResourceExhausted(
         fmt::format("{} datasets and {} more, the catalogue has at most {}", datasets.size(), more, config.max_datasets));
   }
-  if (!found.folders.empty() && datasets.folders.empty()) next_round = now + config.look_interval;
+  if (!found.folders.empty() && datasets.folders.empty()) next_round = now + config.check_interval;
   datasets.folders.insert(found.folders.begin(), found.folders.end());
   for (const auto& [name, source] : found.datasets) {
     if (!datasets.IsListed(name)) AddData(name, source);

@@ -20,7 +20,7 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
     ++refused.unknown_dataset;
     return RefuseQuestion(open, datasets.NoSuchDataset(name));
   }
-  open.look = Seek(name);
+  open.check = Seek(name);
   questions.emplace(++last_question, std::move(open));
 }
 
@@ -29,7 +29,7 @@ void DatasetMachine::State::AskExecutor() {
   for (auto& [id, open] : questions) {
     if (open.asked) continue;
     const DatasetTable::Entry& entry = *datasets.Find(DatasetOf(open.question));
-    if (entry.state != DatasetState::kReady || !entry.looks.IsOver(open.look)) continue;
+    if (entry.state != DatasetState::kReady || !entry.checks.IsOver(open.check)) continue;
     open.asked = true;
     actions.emplace_back(AnswerQuestion{id, open.question, entry.id, entry.summary});
   }

@@ -1,6 +1,6 @@
 // DatasetMachine::State: what the machine knows, and its handlers. Not for executors: only the sources dataset_machine*.cpp include it.
 // Handlers append to `actions` and `news`.
-//   dataset_machine.cpp            requests, voxels, looks at their files, and the Step itself
+//   dataset_machine.cpp            requests, voxels, checks of their files, and the Step itself
 //   dataset_machine_catalogue.cpp  the catalogue: watched folders and orders
 //   dataset_machine_questions.cpp  questions about what datasets hold
 //   dataset_machine_uploads.cpp    datasets that clients send
@@ -32,21 +32,21 @@ struct DatasetMachine::State {
   // A dataset that a request needs.
   struct Use {
     std::string name;
-    LookId look = 0;                // at its files, which must be over before a frame begins; 0: none
+    CheckId check = 0;              // at its files, which must be over before a frame begins; 0: none
     std::optional<DatasetId> kept;  // its frame has begun with these voxels
   };
-  // An order that waits for a look at files. kList: for that at the folders and those at datasets.
+  // An order that waits for a check of files. kList: for that at the folders and those at datasets.
   struct OpenOrder {
     PeerToken client = 0;
     DataOrder order;
-    LookId folders = 0;
-    std::map<std::string, LookId> datasets = {};
+    CheckId folders = 0;
+    std::map<std::string, CheckId> datasets = {};
   };
   // A question that has no answer yet.
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    LookId look = 0;     // as of a Use
+    CheckId check = 0;   // as of a Use
     bool asked = false;  // of the executor
   };
   // A dataset on its way from a client.
@@ -65,7 +65,7 @@ struct DatasetMachine::State {
   QuestionId last_question = 0;
   std::map<UploadId, OpenUpload> uploads;  // at most one of each client
   UploadId last_upload = 0;
-  LookCounter folder_looks;
+  CheckCounter folder_checks;
   Time next_round;                            // when the folders are looked through, if there are any
   std::set<std::string> complaints;           // about what lies in the folders
   std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
@@ -108,7 +108,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);
 
   // ---- requests
-  LookId Seek(const std::string& name);
+  CheckId Seek(const std::string& name);
   void TellUse(const std::pair<const UseId, Use>& use);
   void TellUses(const std::string& name);
   void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
@@ -124,10 +124,10 @@ struct DatasetMachine::State {
   void Unload(DatasetId dataset);
   Status TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const;
 
-  // ---- looks
-  void LookAt(const std::string& name);
-  void LookThroughFolders();
-  void LookAtEverything();
+  // ---- checks
+  void CheckFilesOf(const std::string& name);
+  void CheckFolders();
+  void CheckEverything();
 
   // ---- the catalogue
   Status NameIsFree(const std::string& name) const;

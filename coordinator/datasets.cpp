@@ -73,7 +73,7 @@ void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
   entry = {.source = std::move(source), .since = now};
 }
 
-void DatasetTable::Await(const std::string& name, LookId look) { entries_[name].awaited = look; }
+void DatasetTable::Await(const std::string& name, CheckId check) { entries_[name].awaited = check; }
 
 void DatasetTable::Remove(const std::string& name) {
   const auto entry = entries_.find(name);
@@ -122,8 +122,8 @@ void DatasetTable::Fail(const std::string& name, const Status& status, Time now)
 void DatasetTable::Reset(const std::string& name, Time now) {
   Entry& entry = entries_.at(name);
   Retire(entry);
-  Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .looks = entry.looks};
-  fresh.looks.End();
+  Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
+  fresh.checks.End();
   entry = std::move(fresh);
 }
 

@@ -19,8 +19,8 @@
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
 #include "common/wire/client_messages.h"
+#include "coordinator/check_counter.h"
 #include "coordinator/data_source.h"
-#include "coordinator/look_counter.h"
 
 namespace slabstream {
 
@@ -39,9 +39,9 @@ class DatasetTable {
     std::string error;                             // kFailed only
     std::uint64_t bytes = 0;                       // kReady only: memory of its voxels beside what the source holds
     std::uint64_t last_use = 0;                    // greater: later
-    LookCounter looks;                             // at its files, while it is ready
-    // Not in the catalogue: somebody asks for it, and this look at the folders will tell whether it is there. 0: it is in the catalogue.
-    LookId awaited = 0;
+    CheckCounter checks;                           // at its files, while it is ready
+    // Not in the catalogue: somebody asks for it, and this check of the folders will tell whether it is there. 0: it is in the catalogue.
+    CheckId awaited = 0;
   };
 
   DatasetTable(Catalogue catalogue, std::set<std::string> folders);
@@ -58,7 +58,7 @@ class DatasetTable {
 
   // ---- the catalogue
   void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
-  void Await(const std::string& name, LookId look);
+  void Await(const std::string& name, CheckId check);
   void Remove(const std::string& name);  // retires its voxels
   std::set<std::string> folders;         // that are watched
 

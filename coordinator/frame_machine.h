@@ -54,7 +54,7 @@ namespace slabstream {
 struct CoordinatorConfig {
   Epoch epoch = 0;  // random, not 0
   std::uint32_t pid = 0;
-  std::string slabs_endpoint;
+  std::string voxels_endpoint;
   std::uint64_t memory_bytes = 0;                       // limit of the coordinator's memory; 0: none
   Duration heartbeat = std::chrono::milliseconds(500);  // also the interval of Ping
   Duration worker_timeout = std::chrono::seconds(6);

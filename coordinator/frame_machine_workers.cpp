@@ -16,7 +16,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Registe
   SendWorker(worker, Welcome{.epoch = config.epoch,
                              .incarnation = message.incarnation,
                              .worker = worker,
-                             .slabs_endpoint = config.slabs_endpoint,
+                             .voxels_endpoint = config.voxels_endpoint,
                              .heartbeat_ms = Milliseconds(config.heartbeat),
                              .timeout_ms = Milliseconds(config.worker_timeout)});
 }

@@ -15,7 +15,7 @@ void KeepFirst(List& list, std::size_t count) {
   while (list.size() > count) list.pop_back();
 }
 
-// Rendering without what is done once a slab, which the next frame does not repeat. 0: none is reported.
+// Rendering without what is done once a padded box, which the next frame does not repeat. 0: none is reported.
 inline std::int64_t LastingRenderNs(const RankReport& report) {
   const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
   return std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0);

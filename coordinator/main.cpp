@@ -46,9 +46,9 @@ int Run(int argc, char** argv) {
   app.add_option("--worker-listen", options.worker_endpoint, "Address for workers")
       ->type_name("ENDPOINT")
       ->default_str("the next port, or the path with .workers");
-  app.add_option("--slabs-listen", options.slabs_endpoint, "Address from which workers get voxels")
+  app.add_option("--voxels-listen", options.voxels_endpoint, "Address from which workers get voxels")
       ->type_name("ENDPOINT")
-      ->default_str("any port, or the path with .slabs");
+      ->default_str("any port, or the path with .voxels");
   app.add_option("--keys", options.keys_folder,
                  "Encrypt tcp connections with the keys in this folder; make it, with the service files client.json, worker.json and "
                  "admin.json, if it does not exist; required for addresses that are not loopback")

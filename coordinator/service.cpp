@@ -21,7 +21,7 @@
 #include "coordinator/background_actions.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
-#include "coordinator/slab_server.h"
+#include "coordinator/voxel_server.h"
 
 namespace slabstream {
 namespace {
@@ -40,9 +40,9 @@ Epoch RandomEpoch() {
   return epoch == 0 ? 1 : epoch;
 }
 
-std::string SlabsEndpointFor(Endpoint client) {
+std::string VoxelsEndpointFor(Endpoint client) {
   client.port = 0;
-  client.path += ".slabs";
+  client.path += ".voxels";
   return client.ToString();
 }
 
@@ -57,7 +57,7 @@ Endpoint ImagesSocketsOf(const std::string& worker_endpoint) {
 
 struct CoordinatorService::Impl {
   Impl(CoordinatorOptions service_options, std::optional<ServiceKeys> service_keys, Socket client_socket, Socket control_socket,
-       std::unique_ptr<SlabServer> slab_server)
+       std::unique_ptr<VoxelServer> voxel_server)
       : keys(std::move(service_keys)),
         frames(service_options.machine),
         datasets({.datasets = std::move(service_options.catalogue),
@@ -66,8 +66,9 @@ struct CoordinatorService::Impl {
                   .log_level = service_options.machine.log_level}),
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
-        slabs(std::move(slab_server)),
-        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *slabs) {}
+        voxels(std::move(voxel_server)),
+        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *voxels) {
+  }
 
   void Run();
   void Loop();
@@ -110,7 +111,7 @@ struct CoordinatorService::Impl {
   DatasetMachine datasets;
   Socket clients, control;
   PeerTable client_peers, worker_peers;
-  std::unique_ptr<SlabServer> slabs;
+  std::unique_ptr<VoxelServer> voxels;
   std::deque<CoordinatorEvent> following;  // what actions led to: heard after all actions of the event at hand
   BackgroundActions background;            // its wakeup also signals stop_requested
   std::atomic<bool> stop_requested = false;
@@ -269,7 +270,7 @@ bool CoordinatorService::Impl::CarryOut(const Incoming& incoming, const ClientTo
     if (done.revoked) {
       clients.EndConnections(*done.revoked);
       control.EndConnections(*done.revoked);
-      slabs->EndConnections(*done.revoked);
+      voxels->EndConnections(*done.revoked);
     }
   }
   return true;
@@ -279,8 +280,8 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   const Result<Endpoint> client_wanted = ParseEndpoint(options.client_endpoint, true);
   if (!client_wanted.ok()) return client_wanted.status();
   if (options.worker_endpoint.empty()) options.worker_endpoint = WorkerEndpointFor(*client_wanted).ToString();
-  if (options.slabs_endpoint.empty()) options.slabs_endpoint = SlabsEndpointFor(*client_wanted);
-  for (const std::string& endpoint : {options.worker_endpoint, options.slabs_endpoint}) {
+  if (options.voxels_endpoint.empty()) options.voxels_endpoint = VoxelsEndpointFor(*client_wanted);
+  for (const std::string& endpoint : {options.worker_endpoint, options.voxels_endpoint}) {
     if (const Result<Endpoint> parsed = ParseEndpoint(endpoint, true); !parsed.ok()) return parsed.status();
   }
 
@@ -308,19 +309,19 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
   if (!client_endpoint.ok()) return client_endpoint.status();
   Result<std::string> worker_endpoint = control->Bind(options.worker_endpoint);
   if (!worker_endpoint.ok()) return worker_endpoint.status();
-  Result<std::unique_ptr<SlabServer>> slabs =
-      SlabServer::Start(context, {options.slabs_endpoint, options_of(Plane::kSlabs)}, options.machine.epoch, options.codec);
-  if (!slabs.ok()) return slabs.status();
+  Result<std::unique_ptr<VoxelServer>> voxels =
+      VoxelServer::Start(context, {options.voxels_endpoint, options_of(Plane::kVoxels)}, options.machine.epoch, options.codec);
+  if (!voxels.ok()) return voxels.status();
   if (keys) {
     if (Status published = keys->Publish(*client_endpoint, *worker_endpoint); !published.ok()) return published;
   }
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
-  options.machine.slabs_endpoint = (*slabs)->endpoint();
+  options.machine.voxels_endpoint = (*voxels)->endpoint();
   options.surroundings.memory_scope = SharedMemoryScope();
   options.surroundings.encrypted = keys.has_value();
   options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
-  auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*slabs));
+  auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*voxels));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);
   impl->images_sockets = ImagesSocketsOf(impl->worker_endpoint);

@@ -1,7 +1,7 @@
-// CoordinatorService: runs a FrameMachine and a DatasetMachine over ZeroMQ. Binds the client, control and slabs planes, loads datasets,
+// CoordinatorService: runs a FrameMachine and a DatasetMachine over ZeroMQ. Binds the client, control and voxels planes, loads datasets,
 // serves voxels.
 //
-// Threads: one owns the client and control sockets and runs the machines; one owns the slabs socket, cuts and packs chunks; and those of
+// Threads: one owns the client and control sockets and runs the machines; one owns the voxels socket, cuts and packs chunks; and those of
 // BackgroundActions. If the machines' own thread throws, open requests fail with the reason and the service stops.
 #pragma once
 
@@ -21,12 +21,12 @@ namespace slabstream {
 struct CoordinatorOptions {
   std::string client_endpoint;       // bound; a wildcard port is read back
   std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
-  std::string slabs_endpoint;        // bound; empty: any port, ".slabs" beside an ipc path or inproc name
+  std::string voxels_endpoint;       // bound; empty: any port, ".voxels" beside an ipc path or inproc name
   std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
   Catalogue catalogue;               // datasets
   std::set<std::string> folders;     // that are watched (FoundData)
   Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;         // filled in by Start: epoch, pid, slabs_endpoint
+  CoordinatorConfig machine;         // filled in by Start: epoch, pid, voxels_endpoint
   ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;

@@ -28,7 +28,7 @@ Status ServiceKeys::Publish(const std::string& client_endpoint, const std::strin
 void ServiceKeys::Admit() {
   Authenticator& authenticator = context_->authenticator();
   authenticator.AdmitOnly(NameOfPlane(Plane::kClient), folder_.KeysOf({Role::kClient, Role::kAdmin}));
-  for (const Plane plane : {Plane::kControl, Plane::kSlabs}) authenticator.AdmitOnly(NameOfPlane(plane), folder_.KeysOf({Role::kWorker}));
+  for (const Plane plane : {Plane::kControl, Plane::kVoxels}) authenticator.AdmitOnly(NameOfPlane(plane), folder_.KeysOf({Role::kWorker}));
 }
 
 std::optional<Role> ServiceKeys::RoleOf(const Incoming& incoming) const {

@@ -47,7 +47,7 @@ void Metrics::CountFrame(const FrameStatistics& statistics, Duration latency) {
   const FrameSummary summary = Summarize(statistics);
   const std::lock_guard lock(mutex_);
   ++frames_;
-  bytes_["slabs"] += summary.voxel_bytes;
+  bytes_["voxels"] += summary.voxel_bytes;
   bytes_["images"] += summary.image_bytes;
   for (const RankReport& report : statistics.reports) {
     ++voxel_reports_;

@@ -22,7 +22,7 @@ HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
 }  // namespace
 
 void PictureRequests::MakePng(std::vector<FrameRequest> frames, EncodeFunction encode, ReplyFunction reply, const Gone& gone) {
-  errands_.Begin(std::move(reply), gone, [&](const Errands::Finish& finish) {
+  under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, encode = std::move(encode), finish](Result<std::vector<Picture>> pictures) {
       if (!pictures.ok()) return finish([status = pictures.status()] { return Failure(status); });
       metrics_.CountFrame(pictures->front().statistics, pictures->front().latency);

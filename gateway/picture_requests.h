@@ -2,7 +2,7 @@
 #pragma once
 
 #include "client/request/picture_fields.h"
-#include "gateway/errands.h"
+#include "gateway/requests_under_way.h"
 
 namespace boost::asio {
 class thread_pool;
@@ -14,7 +14,7 @@ class PictureRequests {
  public:
   // All must outlive this. `encoders` compress pictures; at most `most` pictures are under way.
   PictureRequests(boost::asio::io_context& io, boost::asio::thread_pool& encoders, Metrics& metrics, ServiceLink& link, int most)
-      : encoders_(encoders), metrics_(metrics), link_(link), errands_(io, metrics, link, "pictures", most) {}
+      : encoders_(encoders), metrics_(metrics), link_(link), under_way_(io, metrics, link, "pictures", most) {}
 
   void Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
   void Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
@@ -28,7 +28,7 @@ class PictureRequests {
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;
   ServiceLink& link_;
-  Errands errands_;
+  RequestsUnderWay under_way_;
 };
 
 }  // namespace slabstream

@@ -23,10 +23,10 @@ static_assert(kMaxQuestions < int(kMaxOpenQuestions));
 }  // namespace
 
 QuestionRequests::QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link)
-    : metrics_(metrics), link_(link), errands_(io, metrics, link, "questions", kMaxQuestions) {}
+    : metrics_(metrics), link_(link), under_way_(io, metrics, link, "questions", kMaxQuestions) {}
 
 void QuestionRequests::Ask(std::string_view name, Question question, const MakeFunction& make, ReplyFunction reply, const Gone& gone) {
-  errands_.Begin(std::move(reply), gone, [&](const Errands::Finish& finish) {
+  under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, name, make, finish, begin = MonotonicNow()](Result<QuestionReply> answer) {
       finish([this, name, make, begin, held = std::make_shared<const Result<QuestionReply>>(std::move(answer))] {
         if (!held->ok()) return Failure(held->status());

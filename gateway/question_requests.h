@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "client/request/picture_fields.h"
-#include "gateway/errands.h"
+#include "gateway/requests_under_way.h"
 
 namespace slabstream {
 
@@ -25,7 +25,7 @@ class QuestionRequests {
 
   Metrics& metrics_;
   ServiceLink& link_;
-  Errands errands_;
+  RequestsUnderWay under_way_;
 };
 
 }  // namespace slabstream

@@ -11,7 +11,7 @@
 
 #include "client/image_io/composed_picture.h"
 #include "client/movie/turntable.h"
-#include "gateway/errands.h"
+#include "gateway/requests_under_way.h"
 #include "gateway/service_link.h"
 
 namespace slabstream {

@@ -48,8 +48,8 @@ class Conditions {
   virtual WorkerEvent Answer(Job& job) = 0;
   virtual bool CancelsInTime() { return false; }  // a rendering that is to be cancelled: it ends now
   virtual void Perform(Node node, SendChunkRequest& action) = 0;
-  virtual void Perform(Node, const OpenSlab&) {}
-  virtual void Perform(Node, const DropSlab&) {}
+  virtual void Perform(Node, const OpenBox&) {}
+  virtual void Perform(Node, const DropBox&) {}
   virtual void Perform(Node, const ReleaseImage&) {}
   virtual void Perform(Node, const StopProcess&) {}
   virtual void AfterStep(Node) {}

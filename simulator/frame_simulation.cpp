@@ -273,10 +273,10 @@ void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
 WorkerEvent FrameSimulation::Answer(Job& job) {
   return std::visit(Overloaded{[](const StartRender& a) -> WorkerEvent {
                                  return RenderDone{
-                                     .key = a.key, .rank = a.rank, .image = a.image, .status = {}, .report = {}, .slab_bytes = 1};
+                                     .key = a.key, .rank = a.rank, .image = a.image, .status = {}, .report = {}, .box_bytes = 1};
                                },
                                [](const StoreChunk& a) -> WorkerEvent {
-                                 return ChunkStored{a.slab, a.chunk.box, a.chunk.chunk, {}};
+                                 return ChunkStored{a.padded, a.chunk.box, a.chunk.chunk, {}};
                                },
                                [](const StartCombine& a) -> WorkerEvent {
                                  return CombineDone{a.key, a.image, {}, {}};

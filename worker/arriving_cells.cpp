@@ -13,7 +13,7 @@ namespace slabstream {
 Status ArrivingCells::Store(const Chunk& chunk, std::span<const std::byte> payload) {
   if (cells_ != nullptr) return Status::Ok();
   if (stored_.empty()) {
-    if (Status status = CheckFitsMemory(std::int64_t(chunk.cell_bytes), "cells of a slab"); !status.ok()) return status;
+    if (Status status = CheckFitsMemory(std::int64_t(chunk.cell_bytes), "cells of a padded box"); !status.ok()) return status;
     bytes_.resize(chunk.cell_bytes);
     missing_ = CellChunkCount(chunk.cell_bytes);
     stored_.resize(missing_);

@@ -1,4 +1,4 @@
-// ArrivingCells: the cells of a slab while their chunks are stored.
+// ArrivingCells: the cells of a padded box while their chunks are stored.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 #include "common/base/status.h"
 #include "common/mesh/mesh.h"
-#include "common/wire/slab_messages.h"
+#include "common/wire/voxel_messages.h"
 
 namespace slabstream {
 

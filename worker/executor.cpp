@@ -120,12 +120,13 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
 }  // namespace
 
 // Voxels and cells while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
-struct Executor::Slab {
-  explicit Slab(const SlabKey& slab_key) : key(slab_key) {}
+struct Executor::HeldBox {
+  explicit HeldBox(const BoxKey& box_key) : key(box_key) {}
 
   Status Store(const Chunk& chunk, const Bytes& payload) {
-    if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset) return Status::DataLoss("chunk of another slab");
-    if (data != nullptr) return Status::Ok();  // a duplicate after the slab was complete
+    if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset)
+      return Status::DataLoss("chunk of another padded box");
+    if (data != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
     if (IsCellChunk(chunk.chunk)) {
       return key.types.layers.cells ? cells.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
     }
@@ -140,8 +141,8 @@ struct Executor::Slab {
     return Status::Ok();
   }
 
-  // The data to render from. The first call, when all chunks are stored, copies voxels that other slabs hold. Render thread only.
-  SlabData& Data() {
+  // The data to render from. The first call, when all chunks are stored, copies voxels that other padded boxes hold. Render thread only.
+  BoxData& Data() {
     if (data != nullptr) return *data;
     for (const Layer layer : kLayers) {
       if (!key.types.Of(layer)) continue;
@@ -149,7 +150,7 @@ struct Executor::Slab {
       for (const Copy& copy : copies) copy.Perform(layer, to);
     }
     copies.clear();
-    data = std::make_unique<SlabData>(*std::move(voxels[0]), SlabLayers{std::move(voxels[1]), std::move(voxels[2]), cells.cells()});
+    data = std::make_unique<BoxData>(*std::move(voxels[0]), BoxLayers{std::move(voxels[1]), std::move(voxels[2]), cells.cells()});
     voxels = {};
     cells = {};
     unpacked = {};
@@ -164,13 +165,13 @@ struct Executor::Slab {
   }
 
   VoxelBricks Bricks(Layer layer) {
-    const SlabData& stored = Data();
+    const BoxData& stored = Data();
     if (layer == Layer::kVolume) return stored.bricks();
     return *(layer == Layer::kLabels ? stored.layers().labels : stored.layers().overlay);
   }
 
   struct Copy {
-    std::shared_ptr<Slab> from;
+    std::shared_ptr<HeldBox> from;
     Box box;
 
     void Perform(Layer layer, BrickedVoxels& to) const {
@@ -185,12 +186,12 @@ struct Executor::Slab {
     }
   };
 
-  const SlabKey key;
+  const BoxKey key;
   std::vector<Copy> copies;
   std::array<std::optional<BrickedVoxels>, kLayers.size()> voxels;  // by layer
   ArrivingCells cells;
   std::vector<std::byte> unpacked;  // a chunk's samples
-  std::unique_ptr<SlabData> data;
+  std::unique_ptr<BoxData> data;
 };
 
 Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
@@ -230,51 +231,51 @@ Executor::~Executor() {
   }
 }
 
-void Executor::Perform(const OpenSlab& action) {
-  auto slab = std::make_shared<Slab>(action.slab);
-  for (const OpenSlab::Copy& copy : action.copies) slab->copies.push_back({SlabOf(copy.from), copy.box});
-  slabs_.insert_or_assign(action.slab, std::move(slab));
+void Executor::Perform(const OpenBox& action) {
+  auto padded = std::make_shared<HeldBox>(action.padded);
+  for (const OpenBox::Copy& copy : action.copies) padded->copies.push_back({BoxOf(copy.from), copy.box});
+  boxes_.insert_or_assign(action.padded, std::move(padded));
 }
 
-void Executor::Perform(const DropSlab& action) { slabs_.erase(action.slab); }
+void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }
 
 void Executor::Perform(StoreChunk&& action) {
-  const auto found = slabs_.find(action.slab);
-  std::shared_ptr<Slab> slab = found == slabs_.end() ? nullptr : found->second;
-  chunk_thread_.Post([this, slab = std::move(slab), store = std::move(action)] {
-    Status status = Guard("slab", [&] {
-      return slab == nullptr ? Status::NotFound("chunk of a slab that was dropped") : slab->Store(store.chunk, store.payload);
+  const auto found = boxes_.find(action.padded);
+  std::shared_ptr<HeldBox> padded = found == boxes_.end() ? nullptr : found->second;
+  chunk_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
+    Status status = Guard("box", [&] {
+      return padded == nullptr ? Status::NotFound("chunk of a padded box that was dropped") : padded->Store(store.chunk, store.payload);
     });
-    outbox_.Post(WorkerEvent(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, std::move(status)}));
+    outbox_.Post(WorkerEvent(ChunkStored{store.padded, store.chunk.box, store.chunk.chunk, std::move(status)}));
   });
 }
 
 void Executor::Perform(StartRender&& action) {
-  std::shared_ptr<Slab> slab = SlabOf(action.slab);
+  std::shared_ptr<HeldBox> padded = BoxOf(action.padded);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
   std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
   renders_[action.image] = control;
   ClientLane& lane = render_.Of(action.client);
   lane.thread.Post(
-      [this, &lane, slab = std::move(slab), image = std::move(image), control = std::move(control), render = std::move(action)] {
-        outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *slab, *control, lane, *image); })));
+      [this, &lane, padded = std::move(padded), image = std::move(image), control = std::move(control), render = std::move(action)] {
+        outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *padded, *control, lane, *image); })));
       });
 }
 
-RenderDone Executor::Render(const StartRender& action, Slab& slab, const RenderControl& control, ClientLane& lane, LocalImage& image) {
+RenderDone Executor::Render(const StartRender& action, HeldBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guard("render", [&] {
-    if (!slab.copies.empty()) {
-      slab.Data();
+    if (!padded.copies.empty()) {
+      padded.Data();
       AddStage(report, Stage::kFetch, begin, NowNs());
     }
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(slab.Data(), action.placement.box, *action.setup, hidden, control, report);
+    Result<LocalImage> rendered = renderer->Render(padded.Data(), action.placement.box, *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;
@@ -282,7 +283,7 @@ RenderDone Executor::Render(const StartRender& action, Slab& slab, const RenderC
     return Status::Ok();
   });
   if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
-  done.slab_bytes = slab.data == nullptr ? 0 : slab.data->bytes();
+  done.box_bytes = padded.data == nullptr ? 0 : padded.data->bytes();
   return done;
 }
 
@@ -303,9 +304,9 @@ void Executor::Perform(const CancelRender& action) {
   if (const auto control = ControlOf(action.image)) control->Cancel();
 }
 
-std::shared_ptr<Executor::Slab> Executor::SlabOf(const SlabKey& key) const {
-  const auto found = slabs_.find(key);
-  CHECK(found != slabs_.end()) << "the machine copies and renders from slabs that it holds";
+std::shared_ptr<Executor::HeldBox> Executor::BoxOf(const BoxKey& key) const {
+  const auto found = boxes_.find(key);
+  CHECK(found != boxes_.end()) << "the machine copies and renders from boxes that it holds";
   return found->second;
 }
 

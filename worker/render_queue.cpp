@@ -19,14 +19,14 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     }
     turns_.Join(client);
   }
-  const Box voxels = SlabBox(placement.box, *setup);
-  waiting_[{client, key, rank}] = {placement, setup, hidden, slabs_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+  const Box voxels = PaddedBox(placement.box, *setup);
+  waiting_[{client, key, rank}] = {placement, setup, hidden, boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
   std::erase_if(waiting_, [&](const auto& entry) {
     if (std::get<GroupKey>(entry.first) != key) return false;
-    slabs_.Release(entry.second.slab);
+    boxes_.Release(entry.second.padded);
     return true;
   });
   for (auto& [client, begun] : begun_) {
@@ -39,9 +39,9 @@ void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& action
 
 RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
   for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
-    const SlabFetcher::Generation slab = job->second.slab;
-    const auto touches = [&](const auto& begun) { return slabs_.Share(slab, begun.second.job.slab); };
-    if (slabs_.complete(slab) && std::ranges::none_of(begun_, touches)) return job;
+    const BoxFetcher::Generation padded = job->second.padded;
+    const auto touches = [&](const auto& begun) { return boxes_.Share(padded, begun.second.job.padded); };
+    if (boxes_.complete(padded) && std::ranges::none_of(begun_, touches)) return job;
   }
   return waiting_.end();
 }
@@ -113,7 +113,7 @@ void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
   const auto& [of_client, key, rank] = next->first;
   const Begun& begun = begun_.emplace(client, Begun{key, rank, next->second, names_.Next()}).first->second;
   waiting_.erase(next);
-  actions.push_back(StartRender{client, begun.key, begun.rank, slabs_.key(begun.job.slab), begun.job.placement, begun.job.setup,
+  actions.push_back(StartRender{client, begun.key, begun.rank, boxes_.key(begun.job.padded), begun.job.placement, begun.job.setup,
                                 begun.job.hidden, begun.image});
 }
 
@@ -126,13 +126,13 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   if (turn_ && turn_->client == client) EndTurn(now);
   const Begun job = std::move(ended->second);
   begun_.erase(ended);
-  const SlabFetcher::Generation slab = job.job.slab;
-  if (done.status.ok()) slabs_.Rendered(slab);
-  slabs_.SetBytes(slab, done.slab_bytes);  // a cancelled frame derives data too
+  const BoxFetcher::Generation padded = job.job.padded;
+  if (done.status.ok()) boxes_.Rendered(padded);
+  boxes_.SetBytes(padded, done.box_bytes);  // a cancelled frame derives data too
   if (waiting_.empty() && begun_.empty()) turns_.ForgetAll();
   turns_.ForgetIdle([this](ClientId each) { return Busy(each); });
   if (job.dropped) {
-    slabs_.Release(slab);
+    boxes_.Release(padded);
     actions.push_back(ReleaseImage{done.image});
     return std::nullopt;
   }
@@ -141,31 +141,31 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   report.group = job.key.group;
   report.rank = job.rank;
   report.box = job.job.placement.id;
-  const SlabFetcher::FetchReport fetched = slabs_.TakeReport(slab);
+  const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
   report.voxel_bytes = fetched.voxel_bytes;
   if (fetched.voxel_bytes > 0) {
     AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
   }
-  slabs_.Release(slab);
+  boxes_.Release(padded);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
   return report;
 }
 
-std::vector<std::vector<SlabFetcher::Generation>> RenderQueue::SlabsInTurn() const {
+std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::SlabsInTurn() const {
   std::vector<ClientId> clients;
-  std::map<ClientId, std::vector<SlabFetcher::Generation>> slabs;
-  for (const auto& [name, job] : waiting_) slabs[std::get<ClientId>(name)].push_back(job.slab);
-  for (const auto& [client, of_client] : slabs) clients.push_back(client);
+  std::map<ClientId, std::vector<BoxFetcher::Generation>> boxes;
+  for (const auto& [name, job] : waiting_) boxes[std::get<ClientId>(name)].push_back(job.padded);
+  for (const auto& [client, of_client] : boxes) clients.push_back(client);
   std::ranges::sort(clients, {}, [this](ClientId client) { return turns_.TurnOf(client); });
-  std::vector<std::vector<SlabFetcher::Generation>> in_turn;
-  for (const ClientId client : clients) in_turn.push_back(std::move(slabs[client]));
+  std::vector<std::vector<BoxFetcher::Generation>> in_turn;
+  for (const ClientId client : clients) in_turn.push_back(std::move(boxes[client]));
   return in_turn;
 }
 
-std::set<GroupKey> RenderQueue::GroupsOn(SlabFetcher::Generation slab) const {
+std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation padded) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.slab == slab) groups.insert(std::get<GroupKey>(name));
+    if (job.padded == padded) groups.insert(std::get<GroupKey>(name));
   }
   return groups;
 }

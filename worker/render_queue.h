@@ -1,10 +1,10 @@
 // RenderQueue: the ranks that this worker has yet to render, and those that it renders. The ranks of a client are rendered one after the
-// other, in order of frame, group and rank; the first one with a complete slab is next. The clients take turns of at least kTurn: the next
-// turn belongs to the client that has used least of this worker's time (FairTurns), for rendering and combining. The render of a client
-// whose turn is over pauses, and goes on in its next turn. So a frame that takes seconds holds up nobody.
+// other, in order of frame, group and rank; the first one with a complete padded box is next. The clients take turns of at least kTurn: the
+// next turn belongs to the client that has used least of this worker's time (FairTurns), for rendering and combining. The render of a
+// client whose turn is over pauses, and goes on in its next turn. So a frame that takes seconds holds up nobody.
 //
 // A render that pauses stops only between two of its pieces, and one that is cancelled only soon, so others run beside it for a moment.
-// Renders that touch the same slabs are no two at a time, paused ones included. Each job pins its slab.
+// Renders that touch the same padded boxes are no two at a time, paused ones included. Each job pins its padded box.
 #pragma once
 
 #include <map>
@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "common/base/fair_turns.h"
-#include "worker/slab_fetcher.h"
+#include "worker/box_fetcher.h"
 
 namespace slabstream {
 
@@ -25,7 +25,7 @@ class RenderQueue {
   static constexpr Duration kTurn = std::chrono::milliseconds(10);
 
   // Both must outlive the queue.
-  RenderQueue(SlabFetcher& slabs, ImageNames& names) : slabs_(slabs), names_(names) {}
+  RenderQueue(BoxFetcher& boxes, ImageNames& names) : boxes_(boxes), names_(names) {}
 
   void Add(ClientId client, const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
            const std::shared_ptr<const OcclusionMask>& hidden, Time now, WorkerActions& actions);
@@ -42,8 +42,8 @@ class RenderQueue {
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions);
 
   // Of waiting jobs, by client, the next one in turn first.
-  std::vector<std::vector<SlabFetcher::Generation>> SlabsInTurn() const;
-  std::set<GroupKey> GroupsOn(SlabFetcher::Generation slab) const;
+  std::vector<std::vector<BoxFetcher::Generation>> SlabsInTurn() const;
+  std::set<GroupKey> GroupsOn(BoxFetcher::Generation padded) const;
   bool AnyPaused() const { return begun_.size() > (turn_ ? 1U : 0U); }
   std::size_t size() const { return waiting_.size() + begun_.size(); }
 
@@ -52,7 +52,7 @@ class RenderQueue {
     Placement placement;
     std::shared_ptr<const FrameSetup> setup;
     std::shared_ptr<const OcclusionMask> hidden;
-    SlabFetcher::Generation slab = 0;
+    BoxFetcher::Generation padded = 0;
   };
   struct Begun {
     GroupKey key;
@@ -78,7 +78,7 @@ class RenderQueue {
   void EndTurn(Time now);
   void Begin(ClientId client, Time now, WorkerActions& actions);
 
-  SlabFetcher& slabs_;
+  BoxFetcher& boxes_;
   ImageNames& names_;
   Waiting waiting_;
   std::map<ClientId, Begun> begun_;  // one of a client; all are paused or dropped but that of the client whose turn it is

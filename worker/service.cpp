@@ -92,7 +92,7 @@ struct WorkerService::Impl {
   // One for each kind of action.
   void Perform(SendControl& action);
   void Perform(SendChunkRequest& action);
-  void Perform(ConnectSlabs& action);
+  void Perform(ConnectVoxels& action);
   void Perform(ResendImage& action);
   void Perform(AnswerPeer& action);
   void Perform(AdmitKeys& action);
@@ -110,8 +110,8 @@ struct WorkerService::Impl {
   Socket control, images;
   ImagesEndpoint images_endpoint;
   const std::string first_images_endpoint = images_endpoint.text();
-  std::optional<Socket> slabs;  // once the coordinator has named its endpoint
-  std::string slabs_endpoint;
+  std::optional<Socket> voxels;  // once the coordinator has named its endpoint
+  std::string voxels_endpoint;
   PeerSockets peers;
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
@@ -146,13 +146,13 @@ Status WorkerService::Impl::Loop() {
   HandleEvent(Tick{});
   while (!stop_now && MonotonicNow() < stop_deadline) {
     std::vector<Socket*> sockets = {&control, &images};
-    if (slabs) sockets.push_back(&*slabs);
+    if (voxels) sockets.push_back(&*voxels);
     Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     if (executor->broken()) throw std::runtime_error("a task could not report its failure");
     for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
     Receive<CoordinatorToWorker>(control, Plane::kControl);
     Receive<WorkerToWorker>(images, Plane::kImages);
-    if (slabs) Receive<SlabsToWorker>(*slabs, Plane::kSlabs);
+    if (voxels) Receive<VoxelsToWorker>(*voxels, Plane::kVoxels);
     const Time now = MonotonicNow();
     if (machine.NextWake() <= now) HandleEvent(Tick{});
     if (now >= next_look) {
@@ -272,20 +272,20 @@ void WorkerService::Impl::Perform(StopProcess& action) {
 }
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
-  if (slabs) Send(*slabs, action.request);
+  if (voxels) Send(*voxels, action.request);
 }
 
-void WorkerService::Impl::Perform(ConnectSlabs& action) {
-  if (slabs && action.endpoint == slabs_endpoint) return;  // the socket reconnects by itself
-  slabs.reset();
+void WorkerService::Impl::Perform(ConnectVoxels& action) {
+  if (voxels && action.endpoint == voxels_endpoint) return;  // the socket reconnects by itself
+  voxels.reset();
   Result<Socket> socket = Socket::Dealer(context, {.client_keys = options.keys});
   const Status connected = socket.ok() ? socket->Connect(action.endpoint) : socket.status();
   if (!connected.ok()) {
-    LogError("slabs plane: " + connected.message());  // chunk requests time out and are reported
+    LogError("voxels plane: " + connected.message());  // chunk requests time out and are reported
     return;
   }
-  slabs = std::move(*socket);
-  slabs_endpoint = action.endpoint;
+  voxels = std::move(*socket);
+  voxels_endpoint = action.endpoint;
 }
 
 void WorkerService::Impl::Perform(ResendImage& action) {

@@ -11,12 +11,12 @@
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/worker_memory.h"
 #include "common/volume/memory_budget.h"
+#include "worker/box_fetcher.h"
 #include "worker/early_images.h"
 #include "worker/frame_accumulator.h"
 #include "worker/group_run.h"
 #include "worker/peer_links.h"
 #include "worker/render_queue.h"
-#include "worker/slab_fetcher.h"
 
 namespace slabstream {
 
@@ -24,8 +24,8 @@ struct WorkerMachine::State {
   explicit State(WorkerConfig c)
       : config(std::move(c)),
         incarnation(config.incarnation),
-        slabs(config),
-        renders(slabs, names),
+        boxes(config),
+        renders(boxes, names),
         early(EarlyImageBytes(config)),
         links(config) {}
 
@@ -52,7 +52,7 @@ struct WorkerMachine::State {
   void On(const ImageUnreadable& unreadable) {
     if (worker == 0 || unreadable.image.epoch == epoch) links.Refuse(unreadable.image, actions);  // it may have overtaken the Welcome
   }
-  void On(const ChunkStored& stored) { slabs.OnStored(stored, now); }
+  void On(const ChunkStored& stored) { boxes.OnStored(stored, now); }
   void On(const RenderDone& done);
   void On(const CombineDone& done);
   void On(const HiddenFound& found);
@@ -100,7 +100,7 @@ struct WorkerMachine::State {
   std::uint64_t RoomForVoxels() const;
   Time NextWake() const;
   void FailGroup(const GroupKey& key, const Status& status);
-  void ReportSlabFailures();
+  void ReportFetchFailures();
 
   WorkerConfig config;
   Incarnation incarnation;  // of the current registration
@@ -112,7 +112,7 @@ struct WorkerMachine::State {
   std::optional<Time> leave_by;  // it is leaving
   bool ended = false;
   ImageNames names;
-  SlabFetcher slabs;
+  BoxFetcher boxes;
   RenderQueue renders;
   EarlyImages early;
   PeerLinks links;
@@ -149,7 +149,7 @@ void WorkerMachine::State::On(const Welcome& welcome, const Bytes&) {
   next_heartbeat = now;
   early.Forget([&](const PartialImage& image) { return image.epoch != epoch; });
   links.Begin(epoch, worker, actions);
-  actions.push_back(ConnectSlabs{welcome.slabs_endpoint});
+  actions.push_back(ConnectVoxels{welcome.voxels_endpoint});
 }
 
 void WorkerMachine::State::On(const Retire&, const Bytes&) {
@@ -182,7 +182,7 @@ void WorkerMachine::State::Unregister() {
   early.Forget([](const PartialImage&) { return true; });
   finished_before = 0;
   cancelled.clear();
-  slabs.ForgetRequests();
+  boxes.ForgetRequests();
   worker = 0;
   epoch = 0;
   ++incarnation;
@@ -207,7 +207,7 @@ void WorkerMachine::State::KeepTime() {
   }
   if (worker != 0 && now >= next_heartbeat) {
     actions.push_back(SendControl{
-        Heartbeat{epoch, incarnation, worker, slabs.cached_bytes(), slabs.fetched_bytes(), rendered_ranks, leave_by.has_value()}});
+        Heartbeat{epoch, incarnation, worker, boxes.cached_bytes(), boxes.fetched_bytes(), rendered_ranks, leave_by.has_value()}});
     next_heartbeat = now + heartbeat;
   }
 }
@@ -424,16 +424,16 @@ void WorkerMachine::State::Trouble(const GroupKey& key, Status status, WorkerId 
 // ---------------------------------------------------------------- voxels
 
 void WorkerMachine::State::On(const Chunk& chunk, const Bytes& payload) {
-  if (Heard(chunk.epoch)) slabs.OnChunk(chunk, payload, actions);
+  if (Heard(chunk.epoch)) boxes.OnChunk(chunk, payload, actions);
 }
 
 void WorkerMachine::State::On(const ChunkRefused& refused, const Bytes&) {
-  if (Heard(refused.epoch)) slabs.OnRefused(refused);
+  if (Heard(refused.epoch)) boxes.OnRefused(refused);
 }
 
-void WorkerMachine::State::ReportSlabFailures() {
-  for (const SlabFetcher::Failure& failure : slabs.TakeFailures()) {
-    for (const GroupKey& key : renders.GroupsOn(failure.slab)) FailGroup(key, failure.status);
+void WorkerMachine::State::ReportFetchFailures() {
+  for (const BoxFetcher::Failure& failure : boxes.TakeFailures()) {
+    for (const GroupKey& key : renders.GroupsOn(failure.padded)) FailGroup(key, failure.status);
   }
 }
 
@@ -461,16 +461,16 @@ WorkerActions WorkerMachine::Step(WorkerEvent&& event, Time now, WorkerActions m
 }
 
 void WorkerMachine::State::Tend() {
-  slabs.ExpireRequests(now);
-  if (config.memory_bytes != 0) slabs.SetRoom(RoomForVoxels());
+  boxes.ExpireRequests(now);
+  if (config.memory_bytes != 0) boxes.SetRoom(RoomForVoxels());
   early.ForgetSince(now - config.early_image_patience);
-  ReportSlabFailures();
+  ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
-    slabs.RequestChunks(renders.SlabsInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
+    boxes.RequestChunks(renders.SlabsInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
     renders.StartNext(now, actions);
   }
-  slabs.Trim(actions);
+  boxes.Trim(actions);
   wake = NextWake();
 }
 
@@ -487,7 +487,7 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
 Time WorkerMachine::State::NextWake() const {
   if (ended) return Time::max();
   if (worker == 0) return next_register;
-  return std::min({next_heartbeat, last_heard + timeout, slabs.NextExpiry(), renders.NextTurn(), leave_by.value_or(Time::max())});
+  return std::min({next_heartbeat, last_heard + timeout, boxes.NextExpiry(), renders.NextTurn(), leave_by.value_or(Time::max())});
 }
 
 Time WorkerMachine::NextWake() const { return state_->wake; }
@@ -501,8 +501,8 @@ WorkerSizes WorkerMachine::sizes() const {
           .cancelled = state.cancelled.size(),
           .early_images = state.early.size(),
           .renders = state.renders.size(),
-          .chunk_requests = state.slabs.chunk_requests(),
-          .slabs = state.slabs.size()};
+          .chunk_requests = state.boxes.chunk_requests(),
+          .boxes = state.boxes.size()};
 }
 
 }  // namespace slabstream

@@ -2,7 +2,7 @@
 // pixel and no voxel: images have handles, payloads are opaque Bytes. The service (worker/service.h) and the simulator of the tests run it.
 //
 // States:  unregistered --Welcome--> registered --silence, Retire--> unregistered
-// Unregistering drops everything but cached slabs. Dropped work cannot be continued, so the worker registers again under the next
+// Unregistering drops everything but cached padded boxes. Dropped work cannot be continued, so the worker registers again under the next
 // incarnation number: to the coordinator it is a new worker. It says which slot it had, so that it gets the boxes again whose voxels it
 // holds, also from another coordinator: the names of datasets outlive coordinators.
 //
@@ -10,9 +10,9 @@
 // over, or until it is no longer registered.
 //
 // A group on this worker:
-//   GroupAssignment   fetch the voxels of its boxes that no cached slab holds (chunk requests within the byte credit); a box that is
+//   GroupAssignment   fetch the voxels of its boxes that no cached padded box holds (chunk requests within the byte credit); a box that is
 //                     entirely hidden needs none: its rank holds an empty image at once
-//   slab complete     ranks are rendered: those of a client one after the other, groups in order of frame and group. The clients take
+//   box complete      ranks are rendered: those of a client one after the other, groups in order of frame and group. The clients take
 //                     turns, also in the midst of a rank (RenderQueue)
 //   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
@@ -58,13 +58,13 @@ class ImageNames {
 };
 
 // One box of voxels (halo included) of one dataset, as it is cached.
-struct SlabKey {
+struct BoxKey {
   DatasetId dataset = 0;
   Box box;
   SampleTypes types;
-  std::uint64_t generation = 0;  // named by the machine, never reused: a slab that is dropped and opened again gets a new one
-  friend bool operator==(const SlabKey&, const SlabKey&) = default;
-  friend auto operator<=>(const SlabKey&, const SlabKey&) = default;
+  std::uint64_t generation = 0;  // named by the machine, never reused: a padded box that is dropped and opened again gets a new one
+  friend bool operator==(const BoxKey&, const BoxKey&) = default;
+  friend auto operator<=>(const BoxKey&, const BoxKey&) = default;
 };
 
 // The user's choice. kAuto: pack partial images if it pays. kOn: pack all partial images between processes, and pictures for clients. kOff:
@@ -80,10 +80,10 @@ struct WorkerConfig {
   std::uint64_t memory_scope = 0;  // as in Register
   bool lends_memory = false;       // as in Register
   Compression compression = Compression::kAuto;
-  std::uint32_t threads = 1;                             // render threads, reported to the coordinator
-  std::uint64_t memory_bytes = 0;                        // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
-  std::uint64_t cache_bytes = std::uint64_t{1} << 40;    // slabs not needed by a current group are dropped, oldest first, above this, and
-                                                         // above what images leave of memory_bytes
+  std::uint32_t threads = 1;                           // render threads, reported to the coordinator
+  std::uint64_t memory_bytes = 0;                      // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
+  std::uint64_t cache_bytes = std::uint64_t{1} << 40;  // padded boxes not needed by a current group are dropped, oldest first, above this,
+                                                       // and above what images leave of memory_bytes
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
   Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again
@@ -102,7 +102,7 @@ struct IncomingImage {
 };
 
 // ---- events
-using MessageToWorker = Merged<CoordinatorToWorker, SlabsToWorker, WorkerToWorker>;
+using MessageToWorker = Merged<CoordinatorToWorker, VoxelsToWorker, WorkerToWorker>;
 struct MessageReceived {
   MessageToWorker message;
   Bytes payload;
@@ -112,7 +112,7 @@ struct ImageUnreadable {
   PartialImage image;
 };
 struct ChunkStored {
-  SlabKey slab;
+  BoxKey padded;
   Box box;                  // as in the chunk
   std::uint32_t chunk = 0;  // of that box
   Status status;
@@ -123,7 +123,7 @@ struct RenderDone {
   ImageHandle image = 0;
   Status status;
   RankReport report;
-  std::uint64_t slab_bytes = 0;
+  std::uint64_t box_bytes = 0;
 };
 struct CombineDone {
   GroupKey key;
@@ -168,33 +168,33 @@ struct SendControl {
 struct SendChunkRequest {
   ChunkRequest request;
 };
-struct ConnectSlabs {
+struct ConnectVoxels {
   std::string endpoint;
 };  // on Welcome
-// Makes room for the slab's voxels. Voxels that other slabs hold are copied before the first render; those slabs are complete, and open
-// until that render is done. Chunks of boxes inside the slab bring the rest.
-struct OpenSlab {
+// Makes room for the padded box's voxels. Voxels that other padded boxes hold are copied before the first render; those padded boxes are
+// complete, and open until that render is done. Chunks of boxes inside the padded box bring the rest.
+struct OpenBox {
   struct Copy {
-    SlabKey from;
+    BoxKey from;
     Box box;
   };
-  SlabKey slab;
+  BoxKey padded;
   std::vector<Copy> copies;
 };
 struct StoreChunk {
-  SlabKey slab;
+  BoxKey padded;
   Chunk chunk;
   Bytes payload;
 };  // unpack, check the digest -> ChunkStored
-struct DropSlab {
-  SlabKey slab;
+struct DropBox {
+  BoxKey padded;
 };
 // Renders a picture and stores it under the handle `image`, unless it fails.
 struct StartRender {
   ClientId client = 0;
   GroupKey key;
   Rank rank = 0;
-  SlabKey slab;
+  BoxKey padded;
   Placement placement;
   std::shared_ptr<const FrameSetup> setup;
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
@@ -293,18 +293,18 @@ struct ReleaseImage {
 struct StopProcess {
   std::uint32_t rendered_ranks = 0;  // since the process began: for the log
 };
-using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectSlabs, OpenSlab, StoreChunk, DropSlab, StartRender, PauseRender,
+using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectVoxels, OpenBox, StoreChunk, DropBox, StartRender, PauseRender,
                                   ResumeRender, CancelRender, StartCombine, FindHidden, SendPartial, ResendImage, AnswerPeer, AdmitKeys,
                                   ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;
 
-// Entries in the machine's tables. At rest, all but those of cached slabs are 0.
+// Entries in the machine's tables. At rest, all but those of cached padded boxes are 0.
 struct WorkerSizes {
   std::size_t frames = 0, cancelled = 0;
   std::size_t early_images = 0;  // groups that images have come for too early
   std::size_t renders = 0;       // waiting, running or paused
   std::size_t chunk_requests = 0;
-  std::size_t slabs = 0;
+  std::size_t boxes = 0;
 };
 
 class WorkerMachine {

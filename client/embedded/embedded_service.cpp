@@ -27,7 +27,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   }
   options.coordinator.client_endpoint = UniqueEndpoint();
   options.coordinator.worker_endpoint = UniqueEndpoint();
-  options.coordinator.slabs_endpoint = UniqueEndpoint();
+  options.coordinator.voxels_endpoint = UniqueEndpoint();
   Result<std::unique_ptr<CoordinatorService>> coordinator = CoordinatorService::Start(context, std::move(options.coordinator));
   if (!coordinator.ok()) return coordinator.status();
   std::unique_ptr<EmbeddedService> service(new EmbeddedService(context, std::move(options.worker), std::move(*coordinator)));

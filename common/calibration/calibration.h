@@ -65,7 +65,7 @@ inline constexpr double kSample = 8e-9;
 // Work of a cell that holds anything, in occupied voxels that take as long: rows are composited in segments, however little of them is
 // covered. Over five volumes and all decompositions (splatting).
 //   balance_bench VOLUME
-inline constexpr double kCellWork = 512;
+inline constexpr double kMacrocellWork = 512;
 
 // Pixels of the picture (coordinator/tuning/frame_predictor.cpp).
 //   simulation_bench CASE  (laboratory/measure/frame_costs.h)

@@ -10,10 +10,10 @@
 
 namespace slabstream {
 
-std::vector<double> CellWork(const OccupancyGrid& grid) {
+std::vector<double> MacrocellWork(const OccupancyGrid& grid) {
   std::vector<double> work;
   work.reserve(grid.cells.size());
-  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + calibration::kCellWork : 0);
+  for (const CellOccupancy& cell : grid.cells) work.push_back(cell.voxels > 0 ? cell.voxels + calibration::kMacrocellWork : 0);
   return work;
 }
 

@@ -12,14 +12,14 @@
 
 namespace slabstream {
 
-// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and calibration::kCellWork more for a cell that has any.
-std::vector<double> CellWork(const OccupancyGrid& grid);
+// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and calibration::kMacrocellWork more for a cell that has any.
+std::vector<double> MacrocellWork(const OccupancyGrid& grid);
 
 class WorkField {
  public:
   // Every voxel of a volume of `size` is work 1.
   static WorkField Uniform(const Index3& size);
-  explicit WorkField(const OccupancyGrid& grid) : WorkField(grid.size, CellWork(grid)) {}
+  explicit WorkField(const OccupancyGrid& grid) : WorkField(grid.size, MacrocellWork(grid)) {}
   // `work` by cell of an OccupancyGrid of this size: finite, >= 0. Kept in steps of 2^-40 of the total, none of them lost.
   WorkField(const Index3& size, std::span<const double> work);
 

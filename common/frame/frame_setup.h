@@ -75,6 +75,6 @@ FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t befor
 PixelBounds ReachOf(const Box& box, const FrameSetup& setup);
 
 // Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
-inline Box SlabBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
+inline Box PaddedBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
 
 }  // namespace slabstream

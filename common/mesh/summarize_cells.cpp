@@ -23,18 +23,18 @@ void Widen(ValueRange& range, const ValueRange& by) {
 }
 
 // What one thread finds.
-struct CellRanges {
+struct MacrocellRanges {
   ValueRange whole = kUnmet;
   std::vector<ValueRange> bricks;
   std::vector<std::uint32_t> cells;  // by brick
 };
 
-CellRanges RangesOf(const Mesh& mesh, const Index3& size) {
+MacrocellRanges RangesOf(const Mesh& mesh, const Index3& size) {
   const Index3 counts = CubesOver(size, kBrick);
-  const CellRanges none{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet), std::vector<std::uint32_t>(CountIn(counts))};
-  tbb::enumerable_thread_specific<CellRanges> parts(none);
+  const MacrocellRanges none{kUnmet, std::vector<ValueRange>(CountIn(counts), kUnmet), std::vector<std::uint32_t>(CountIn(counts))};
+  tbb::enumerable_thread_specific<MacrocellRanges> parts(none);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.tetrahedra.size()), [&](const tbb::blocked_range<std::size_t>& cells) {
-    CellRanges& part = parts.local();
+    MacrocellRanges& part = parts.local();
     for (std::size_t cell = cells.begin(); cell < cells.end(); ++cell) {
       const ValueRange values = ValuesIn(mesh, cell);
       if (values.min > values.max) continue;
@@ -54,8 +54,8 @@ CellRanges RangesOf(const Mesh& mesh, const Index3& size) {
       }
     }
   });
-  CellRanges all = none;
-  for (const CellRanges& part : parts) {
+  MacrocellRanges all = none;
+  for (const MacrocellRanges& part : parts) {
     Widen(all.whole, part.whole);
     for (std::size_t brick = 0; brick < all.bricks.size(); ++brick) Widen(all.bricks[brick], part.bricks[brick]);
     std::ranges::transform(all.cells, part.cells, all.cells.begin(), std::plus<>());
@@ -88,7 +88,7 @@ VolumeSummary WithCells(VolumeSummary summary, const Volume& volume) {
 
 void SummarizeCells(const Mesh& mesh, const Volume& resampled, VolumeSummary& summary) {
   CHECK(summary.description.type == ScalarType::kFloat32 && summary.description.mapping == ValueMapping{});
-  CellRanges found = RangesOf(mesh, summary.description.geometry.size);
+  MacrocellRanges found = RangesOf(mesh, summary.description.geometry.size);
   if (found.whole.min <= found.whole.max) summary.range = found.whole;
   for (std::size_t brick = 0; brick < found.bricks.size(); ++brick) {
     // All voxels have values of cells that touch them, between the values at the points.

@@ -76,7 +76,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& p
 }
 
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            std::shared_ptr<const Layout> layout, const Turn& turn, std::int64_t slab_bytes_target) {
+                            std::shared_ptr<const Layout> layout, const Turn& turn, std::int64_t box_bytes_target) {
   const Result<ResolvedPolicy> policy = ResolvePolicy(request, summary.description.geometry);
   if (!policy.ok()) return policy.status();
   if (layout == nullptr) {
@@ -89,7 +89,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                                         .clip = &look->clip,
                                                         .looks = &look->layers,
                                                         .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
-                                                        .slab_bytes_target = slab_bytes_target}));
+                                                        .box_bytes_target = box_bytes_target}));
   }
   return PlanFrame(request, *policy, dataset, summary, roster, std::move(layout), turn);
 }

@@ -82,6 +82,6 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& p
 // MakeLayout.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {},
-                            std::int64_t slab_bytes_target = kSlabBytesTarget);
+                            std::int64_t box_bytes_target = kBoxBytesTarget);
 
 }  // namespace slabstream

@@ -100,11 +100,11 @@ struct LayoutMaker::State {
 
   bool stopped() const { return request.stop.stop_requested(); }
 
-  bool SlabsFit(const Partition& partition) {
+  bool BoxesFit(const Partition& partition) {
     const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
       const std::int64_t bytes = Grown(box, request.renderer->reach(), partition.bounds()).voxel_count() * sample_bytes;
-      return bytes <= request.slab_bytes_target || !fields.Shows(box);
+      return bytes <= request.box_bytes_target || !fields.Shows(box);
     });
   }
 
@@ -213,7 +213,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
   const int most = MostGroups(state_->request, policy);
   const WorkField& work = state_->fields.Of(policy.balance_by);
   int groups = 1;
-  while (groups < most && !state_->stopped() && !state_->SlabsFit(state_->MakePartition(policy, groups, work))) ++groups;
+  while (groups < most && !state_->stopped() && !state_->BoxesFit(state_->MakePartition(policy, groups, work))) ++groups;
   return groups;
 }
 

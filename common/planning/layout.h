@@ -34,8 +34,8 @@ struct WorkKnowledge {
   const WorkField* cost = nullptr;  // seconds, learnt from frames; null: drawn voxels stand for it
 };
 
-// Most memory for the voxels of one slab, as far as the size of slices allows.
-inline constexpr std::int64_t kSlabBytesTarget = std::int64_t{256} << 20;
+// Most memory for the voxels of one padded box, as far as the size of slices allows.
+inline constexpr std::int64_t kBoxBytesTarget = std::int64_t{256} << 20;
 
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
@@ -45,7 +45,7 @@ struct LayoutRequest {
   const ClipRegion* clip = nullptr;   // null: nothing is clipped
   const LayerLooks* looks = nullptr;  // null: no layer is shown
   std::uint32_t slots = 1;            // >= 1
-  std::int64_t slab_bytes_target = kSlabBytesTarget;
+  std::int64_t box_bytes_target = kBoxBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
   std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped
@@ -66,7 +66,7 @@ class LayoutMaker {
   LayoutMaker(LayoutMaker&&) noexcept;
 
   Layout Make(const ResolvedPolicy& policy);
-  // The policy's number of groups, if it sets one. Else the fewest groups with which no slab (a box that shows something, with its halo) is
+  // The policy's number of groups, if it sets one. Else the fewest groups with which no padded box that shows something is
   // larger than the target, in any view; if none are enough, as many as leave boxes that are not mostly halo.
   int FewestGroups(const ResolvedPolicy& policy);
 

@@ -28,7 +28,7 @@ void ForEachCell(const Index3& size, const Box& box, Function&& function) {
 
 }  // namespace
 
-MeasuredCost::MeasuredCost(const OccupancyGrid& grid) : size_(grid.size), cost_(CellWork(grid)) {}
+MeasuredCost::MeasuredCost(const OccupancyGrid& grid) : size_(grid.size), cost_(MacrocellWork(grid)) {}
 
 void MeasuredCost::Learn(std::span<const BoxSeconds> boxes, double weight) {
   CHECK(weight > 0 && weight <= 1) << weight;

@@ -24,10 +24,10 @@ std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
   return std::uint64_t(bounds.pixel_count()) * BytesPerPixel(setup.format);
 }
 
-// Calls function(number of the brick, its part in the slab) for the bricks that the slab, not empty, touches.
+// Calls function(number of the brick, its part in the padded box) for the bricks that the padded box, not empty, touches.
 template <class Function>
-void VisitBricks(const Box& slab, const VolumeSummary& summary, Function&& function) {
-  const BrickGrid grid(slab);
+void VisitBricks(const Box& padded, const VolumeSummary& summary, Function&& function) {
+  const BrickGrid grid(padded);
   for (std::int32_t z = 0; z < grid.counts.z; ++z) {
     for (std::int32_t y = 0; y < grid.counts.y; ++y) {
       for (std::int32_t x = 0; x < grid.counts.x; ++x) {
@@ -38,21 +38,21 @@ void VisitBricks(const Box& slab, const VolumeSummary& summary, Function&& funct
   }
 }
 
-// Of the cells of an unstructured grid in the bricks that the slab touches.
-std::uint64_t BytesOfCells(const Box& slab, const VolumeSummary& summary) {
-  if (slab.empty() || summary.cells.empty()) return 0;
+// Of the cells of an unstructured grid in the bricks that the padded box touches.
+std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) {
+  if (padded.empty() || summary.cells.empty()) return 0;
   std::uint64_t cells = 0;
-  VisitBricks(slab, summary, [&](std::size_t brick, const Box&) { cells += summary.cells[brick]; });
+  VisitBricks(padded, summary, [&](std::size_t brick, const Box&) { cells += summary.cells[brick]; });
   return kBytesACell * cells;
 }
 
-// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of` tells what a slab takes.
+// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of` tells what a padded box takes.
 template <class BytesOf>
 std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
   std::map<WorkerId, std::uint64_t> most = {{plan.display, 0}};
   for (const GroupPlan& group : plan.groups) {
     std::map<WorkerId, std::uint64_t> bytes;
-    for (const Placement& placement : group.placements) bytes[placement.worker] += bytes_of(SlabBox(placement.box, plan.setup));
+    for (const Placement& placement : group.placements) bytes[placement.worker] += bytes_of(PaddedBox(placement.box, plan.setup));
     for (const auto& [worker, of_group] : bytes) most[worker] = std::max(most[worker], of_group);
   }
   return most;
@@ -85,18 +85,18 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
-std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary) {
-  if (slab.empty()) return 0;
+std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary) {
+  if (padded.empty()) return 0;
   std::uint64_t voxels = 0;
-  VisitBricks(slab, summary, [&](std::size_t brick, const Box& part) {
+  VisitBricks(padded, summary, [&](std::size_t brick, const Box& part) {
     const ValueRange& range = summary.bricks[brick];
     if (range.min != range.max) voxels += std::uint64_t(part.voxel_count());
   });
   std::uint64_t bytes = kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
   for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
-    if (layer != nullptr) bytes += VoxelBytes(slab, *layer);
+    if (layer != nullptr) bytes += VoxelBytes(padded, *layer);
   }
-  return bytes + BytesOfCells(slab, summary);
+  return bytes + BytesOfCells(padded, summary);
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
@@ -106,8 +106,8 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
-  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& slab) {
-    return kDerivedPerVoxel * std::uint64_t(slab.voxel_count()) * summary.types().bytes_per_voxel() + BytesOfCells(slab, summary);
+  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& padded) {
+    return kDerivedPerVoxel * std::uint64_t(padded.voxel_count()) * summary.types().bytes_per_voxel() + BytesOfCells(padded, summary);
   });
   const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
@@ -115,7 +115,7 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
       workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit.worker) + (kEnough - 1) * images <= limit.bytes; });
   if (all_fit) return int(kEnough);
   // Only now it matters how much of the volume is empty, which takes longer to find out.
-  voxels = MostVoxels(plan, [&](const Box& slab) { return VoxelBytes(slab, summary); });
+  voxels = MostVoxels(plan, [&](const Box& padded) { return VoxelBytes(padded, summary); });
 
   std::uint64_t fit = kEnough;
   for (const WorkerLimit& limit : workers) {

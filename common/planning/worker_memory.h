@@ -26,7 +26,7 @@ namespace slabstream {
 // Bytes, of the formula above. `placements`: of a group.
 std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
 std::uint64_t PictureBytes(const FrameSetup& setup);
-std::uint64_t VoxelBytes(const Box& slab, const VolumeSummary& summary);
+std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary);
 
 // A worker that has a part in a frame, and its limit in bytes; 0: it has stated none.
 struct WorkerLimit {

@@ -13,7 +13,7 @@ namespace slabstream {
 
 enum class Stage : std::uint8_t {
   kFetch = 0,    // waiting for voxels (from the first chunk request to the last chunk stored)
-  kPrepare = 1,  // classification, normals, occupied runs: once per slab and transfer function
+  kPrepare = 1,  // classification, normals, occupied runs: once per padded box and transfer function
   kTransform = 2,
   kShade = 3,
   kSplat = 4,

@@ -11,8 +11,8 @@
 #include "common/wire/client_fields.h"
 #include "common/wire/control_fields.h"
 #include "common/wire/image_fields.h"
-#include "common/wire/slab_fields.h"
 #include "common/wire/volume_fields.h"
+#include "common/wire/voxel_fields.h"
 #include "slabstream/v1/envelope.pb.h"
 
 namespace slabstream {
@@ -89,7 +89,7 @@ bool ReadIf(const Envelope& envelope, const FieldDescriptor* field, Result<Messa
 }  // namespace
 
 std::string_view NameOf(Plane plane) {
-  constexpr std::array<std::string_view, 4> kNames = {"control", "slabs", "images", "client"};
+  constexpr std::array<std::string_view, 4> kNames = {"control", "voxels", "images", "client"};
   return kNames.at(std::size_t(plane));
 }
 
@@ -131,8 +131,8 @@ Result<Messages> Decode(std::span<const std::byte> header, std::size_t payload_b
 template Result<AnyMessage> Decode(std::span<const std::byte>);
 template Result<WorkerToCoordinator> Decode(std::span<const std::byte>, std::size_t);
 template Result<CoordinatorToWorker> Decode(std::span<const std::byte>, std::size_t);
-template Result<WorkerToSlabs> Decode(std::span<const std::byte>, std::size_t);
-template Result<SlabsToWorker> Decode(std::span<const std::byte>, std::size_t);
+template Result<WorkerToVoxels> Decode(std::span<const std::byte>, std::size_t);
+template Result<VoxelsToWorker> Decode(std::span<const std::byte>, std::size_t);
 template Result<WorkerToWorker> Decode(std::span<const std::byte>, std::size_t);
 template Result<ClientToCoordinator> Decode(std::span<const std::byte>, std::size_t);
 template Result<CoordinatorToClient> Decode(std::span<const std::byte>, std::size_t);

@@ -19,14 +19,14 @@
 #include "common/wire/client_messages.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
-#include "common/wire/slab_messages.h"
+#include "common/wire/voxel_messages.h"
 
 namespace slabstream {
 
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToSlabs, SlabsToWorker, WorkerToWorker, ClientToCoordinator,
+using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToVoxels, VoxelsToWorker, WorkerToWorker, ClientToCoordinator,
                           CoordinatorToClient>;
 
 // A message where it is: itself, or in a variant of messages.
@@ -48,7 +48,7 @@ class MessageView {
 };
 
 // The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator.
-enum class Plane { kControl, kSlabs, kImages, kClient };
+enum class Plane { kControl, kVoxels, kImages, kClient };
 std::string_view NameOf(Plane plane);  // "control": for logs
 
 std::vector<std::byte> Encode(MessageView message);

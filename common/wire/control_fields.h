@@ -39,7 +39,7 @@ void Fields(auto& io, Is<Welcome> auto& m) {
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.incarnation, &P::incarnation, &P::set_incarnation);
   io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
-  io.Bytes("slabs_endpoint", m.slabs_endpoint, &P::slabs_endpoint, &P::mutable_slabs_endpoint, 1, kMaxEndpointBytes);
+  io.Bytes("voxels_endpoint", m.voxels_endpoint, &P::voxels_endpoint, &P::mutable_voxels_endpoint, 1, kMaxEndpointBytes);
   io.Range("heartbeat_ms", m.heartbeat_ms, &P::heartbeat_ms, &P::set_heartbeat_ms, 10, 60000);
   io.Range("timeout_ms", m.timeout_ms, &P::timeout_ms, &P::set_timeout_ms, 100, 600000);
 }

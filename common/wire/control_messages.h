@@ -58,7 +58,7 @@ struct Welcome {
   Epoch epoch = 0;
   Incarnation incarnation = 0;  // echoed
   WorkerId worker = 0;
-  std::string slabs_endpoint;
+  std::string voxels_endpoint;
   std::uint32_t heartbeat_ms = 500;  // [10, 60000]
   std::uint32_t timeout_ms = 6000;   // silence after which the other side is taken for dead, [100, 600000]
   friend bool operator==(const Welcome&, const Welcome&) = default;

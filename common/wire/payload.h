@@ -14,7 +14,7 @@
 #include "common/base/status.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
-#include "common/wire/slab_messages.h"
+#include "common/wire/voxel_messages.h"
 
 namespace slabstream {
 

@@ -55,7 +55,7 @@ class Search {
                   .clip = &setup.clip,
                   .looks = &setup.looks,
                   .slots = question.slots,
-                  .slab_bytes_target = question.slab_bytes_target,
+                  .box_bytes_target = question.box_bytes_target,
                   .known = question.known,
                   .stop = question.stop}),
         predictor_(predictor),

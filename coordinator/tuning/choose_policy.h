@@ -9,7 +9,7 @@
 // The measure is the latency of a frame that nobody asked for ahead: somebody who turns a volume waits for it. Frames that are asked for
 // ahead gain, too: the partition that ends first has the least work for the busiest worker.
 //
-// Memory comes first: no candidate has fewer groups than its slabs need (FewestGroups).
+// Memory comes first: no candidate has fewer groups than its boxes need (FewestGroups).
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ struct PolicyQuestion {
   WorkKnowledge known;
   std::uint32_t slots = 1;                // workers, [1, kMaxRanks]
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
-  std::int64_t slab_bytes_target = kSlabBytesTarget;
+  std::int64_t box_bytes_target = kBoxBytesTarget;
   double render_scale = 1;  // measured / predicted time of boxes so far; > 0
   // The present policy, if any; it fits the frame's policy. It stays unless another one gains the share least_gain.
   const ResolvedPolicy* now = nullptr;

@@ -27,7 +27,7 @@ std::vector<BoxCost> Measure(LabWorker& worker, const FrameSetup& setup, std::sp
     cost.bounds = first.image.bounds;
     cost.coverage = FindCoverage(first.image, FrameBounds(setup).width(), FrameBounds(setup).height());
     cost.covered_pixels = std::uint64_t(std::llround(cost.coverage.pixels()));
-    cost.voxel_bytes = std::uint64_t(SlabBox(box, setup).voxel_count()) * BytesPerSample(setup.description.type);
+    cost.voxel_bytes = std::uint64_t(PaddedBox(box, setup).voxel_count()) * BytesPerSample(setup.description.type);
   }
   // In rounds: a moment in which the machine is slower or quicker affects only part of a box's times. Each round renders a box twice, and
   // the second time counts: a worker's caches hold what it rendered last, not other workers' boxes.

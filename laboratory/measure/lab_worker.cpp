@@ -18,12 +18,12 @@ LabWorker::~LabWorker() = default;
 BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   if (kind_ != setup.renderer) renderer_ = MakeRenderer(*setup.renderer);
   kind_ = setup.renderer;
-  const Box slab_box = SlabBox(box, setup);
-  std::unique_ptr<SlabData>& slab = slabs_[slab_box];
-  if (slab == nullptr) {
-    SlabLayers layers;
-    if (cells_ != nullptr) layers.cells = std::make_shared<const Mesh>(cells_->Cut(slab_box));
-    slab = std::make_unique<SlabData>(BrickedVoxels(CutBlock(volume_.block, slab_box)), std::move(layers));
+  const Box padded_box = PaddedBox(box, setup);
+  std::unique_ptr<BoxData>& padded = boxes_[padded_box];
+  if (padded == nullptr) {
+    BoxLayers layers;
+    if (cells_ != nullptr) layers.cells = std::make_shared<const Mesh>(cells_->Cut(padded_box));
+    padded = std::make_unique<BoxData>(BrickedVoxels(CutBlock(volume_.block, padded_box)), std::move(layers));
   }
   RenderControl control;
   BoxRendering rendering;
@@ -31,7 +31,7 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   one_thread.execute([&] {
     const Time begin = MonotonicNow();
     rendering.processor_seconds =
-        SecondsOf([&] { rendering.image = renderer_->Render(*slab, box, setup, {}, control, rendering.report).value(); });
+        SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, {}, control, rendering.report).value(); });
     rendering.seconds = double((MonotonicNow() - begin).count()) * 1e-9;
   });
   return rendering;

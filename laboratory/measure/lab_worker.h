@@ -28,8 +28,8 @@ class LabWorker {
   ~LabWorker();
 
   // `box` lies inside the volume and is not empty; `setup` is of this volume (FramePlan::setup). Other boxes hide nothing. Runs on the
-  // calling thread alone; one call at a time. The first rendering of a slab cuts out its voxels (not timed) and makes the data that workers
-  // keep between frames (timed): classification, normals, occupied voxels. All slabs are kept.
+  // calling thread alone; one call at a time. The first rendering of a padded box cuts out its voxels (not timed) and makes the data that
+  // workers keep between frames (timed): classification, normals, occupied voxels. All padded boxes are kept.
   BoxRendering Render(const Box& box, const FrameSetup& setup);
 
  private:
@@ -37,7 +37,7 @@ class LabWorker {
   std::unique_ptr<MeshCutter> cells_;  // of an unstructured grid
   const RendererKind* kind_ = nullptr;
   std::unique_ptr<Renderer> renderer_;
-  std::map<Box, std::unique_ptr<SlabData>> slabs_;  // with halo
+  std::map<Box, std::unique_ptr<BoxData>> boxes_;  // with halo
 };
 
 }  // namespace slabstream

@@ -32,7 +32,7 @@ inline constexpr PeerToken kClient = 21, kOther = 22;  // connections of two cli
 struct ScriptConfig : CoordinatorConfig {
   Catalogue datasets;
   std::set<std::string> folders;
-  Duration look_interval = DatasetConfig().look_interval;
+  Duration check_interval = DatasetConfig().check_interval;
   std::size_t max_datasets = DatasetConfig().max_datasets;
 };
 
@@ -40,7 +40,7 @@ inline ScriptConfig TestConfig() {
   ScriptConfig config;
   config.epoch = 77;
   config.pid = 4321;
-  config.slabs_endpoint = "inproc://slabs";
+  config.voxels_endpoint = "inproc://voxels";
   config.datasets = {{"block", {}}, {"other", {}}};
   return config;
 }
@@ -153,7 +153,7 @@ struct Machines {
                   .folders = config.folders,
                   .memory_bytes = config.memory_bytes,
                   .max_questions = config.max_queued,
-                  .look_interval = config.look_interval,
+                  .check_interval = config.check_interval,
                   .max_datasets = config.max_datasets,
                   .log_level = config.log_level}) {}
 

@@ -34,13 +34,13 @@ class DataRules : public testing::Test {
     return script.Step(DatasetLoaded{load.name, load.load, voxels, BlockSummary(), bytes, std::make_shared<const FileStamp>()});
   }
   // The end of a look.
-  Actions Seen(const LookAtDataset& look, Result<bool> changed) {
+  Actions Seen(const CheckDatasetFiles& look, Result<bool> changed) {
     return script.Step(DatasetSeen{look.name, look.load, std::move(changed)});
   }
-  static LookAtDataset LookOf(const Actions& actions) {
-    const std::vector<LookAtDataset> looks = Of<LookAtDataset>(actions);
+  static CheckDatasetFiles LookOf(const Actions& actions) {
+    const std::vector<CheckDatasetFiles> looks = Of<CheckDatasetFiles>(actions);
     EXPECT_THAT(looks, SizeIs(1));
-    return looks.empty() ? LookAtDataset{} : looks[0];
+    return looks.empty() ? CheckDatasetFiles{} : looks[0];
   }
   // A frame of the block, which is not loaded yet, that has begun. Its voxels are number 1.
   std::vector<GroupAssignment> Begin(RequestId request = 1, int groups = 2) {
@@ -67,9 +67,9 @@ TEST_F(DataRules, AFrameWaitsForALookThatBeganAfterItsRequest) {
 
   Actions actions = script.Client(kClient, Frame(2));
   EXPECT_THAT(HandedOut(actions), IsEmpty());
-  const LookAtDataset first = LookOf(actions);
+  const CheckDatasetFiles first = LookOf(actions);
   actions = script.Client(kOther, Frame(3));
-  EXPECT_THAT(Of<LookAtDataset>(actions), IsEmpty()) << "one at a time";
+  EXPECT_THAT(Of<CheckDatasetFiles>(actions), IsEmpty()) << "one at a time";
   actions = Seen(first, false);
   ASSERT_THAT(HandedOut(actions), SizeIs(1)) << "the look began before the other one's request";
   EXPECT_THAT(HandedOut(Seen(LookOf(actions), false)), SizeIs(1));
@@ -79,7 +79,7 @@ TEST_F(DataRules, AFrameWaitsForALookThatBeganAfterItsRequest) {
 TEST_F(DataRules, AVolumeThatIsNoFileIsNotLookedAt) {
   script.AnswerAll(script.Submit(kClient, Frame(1)));
   const Actions actions = script.Client(kClient, Frame(2));
-  EXPECT_THAT(Of<LookAtDataset>(actions), IsEmpty());
+  EXPECT_THAT(Of<CheckDatasetFiles>(actions), IsEmpty());
   EXPECT_THAT(HandedOut(actions), SizeIs(1));
 }
 
@@ -140,7 +140,7 @@ TEST_F(DataRules, AFileThatCannotBeReadFailsItsRequestsAndIsTriedAgain) {
 TEST_F(DataRules, LateAnswersOfEarlierLoadsAndLooksChangeNothing) {
   Begin(1, 1);
   Actions actions = script.Client(kOther, Frame(1));
-  const LookAtDataset look = LookOf(actions);
+  const CheckDatasetFiles look = LookOf(actions);
   script.Client(kAdmin, DataOrder{.nonce = 1, .action = DataAction::kReload, .items = {"block"}});
   ASSERT_THAT(script.loads, SizeIs(2));
   EXPECT_THAT(Seen(look, true), IsEmpty());
@@ -320,9 +320,9 @@ class FolderRules : public DataOrders {
 TEST_F(FolderRules, FilesThatComeAndGoAreDatasetsThatComeAndGo) {
   Watch({"a.nrrd"});
   EXPECT_THAT(Names(), ElementsAre("a", "block", "other"));
-  const Actions actions = script.Pass(script.config.look_interval);
-  EXPECT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
-  EXPECT_THAT(Of<LookAtFolders>(script.Pass(seconds(60))), IsEmpty()) << "one at a time";
+  const Actions actions = script.Pass(script.config.check_interval);
+  EXPECT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
+  EXPECT_THAT(Of<CheckWatchedFolders>(script.Pass(seconds(60))), IsEmpty()) << "one at a time";
   SeenFolder(In({"a.nrrd", "b.nrrd", "block.nrrd"}));
   EXPECT_THAT(Names(), ElementsAre("a", "b", "block", "other"));
   script.Client(kClient, Frame(1));
@@ -336,14 +336,14 @@ TEST_F(FolderRules, FilesThatComeAndGoAreDatasetsThatComeAndGo) {
 TEST_F(FolderRules, ANameThatIsNotKnownIsLookedFor) {
   Watch({});
   Actions actions = script.Client(kClient, Frame(1, 1, "a"));
-  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
   EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty());
   EXPECT_THAT(Names(), ElementsAre("block", "other")) << "who asks for a name does not put it into the catalogue";
-  EXPECT_THAT(Of<LookAtFolders>(script.Client(kOther, Frame(1, 1, "nonesuch"))), IsEmpty());
+  EXPECT_THAT(Of<CheckWatchedFolders>(script.Client(kOther, Frame(1, 1, "nonesuch"))), IsEmpty());
   actions = SeenFolder(In({"a.nrrd"}));
   EXPECT_THAT(script.loads, SizeIs(1));
   EXPECT_THAT(ToClients<FrameFailed>(actions), IsEmpty()) << "that look began before the other request";
-  ASSERT_THAT(Of<LookAtFolders>(actions), SizeIs(1));
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
   const auto failed = ToClients<FrameFailed>(SeenFolder(In({"a.nrrd"})));
   ASSERT_THAT(failed, SizeIs(1));
   EXPECT_THAT(failed[0].message.status.message(), HasSubstr("no dataset \"nonesuch\": the catalogue has a, block, other"));
@@ -384,7 +384,7 @@ TEST_F(FolderRules, AFolderThatIsRemovedTakesItsDatasetsAlong) {
                   .message(),
               HasSubstr("/data is watched already"));
   EXPECT_THAT(Listed(Order(DataAction::kRemove, {kFolder})), ElementsAre("block", "other"));
-  EXPECT_THAT(Of<LookAtFolders>(script.Pass(seconds(60))), IsEmpty());
+  EXPECT_THAT(Of<CheckWatchedFolders>(script.Pass(seconds(60))), IsEmpty());
   SeenFolder(In({"a.nrrd"}));  // of a look that was under way
   EXPECT_THAT(Names(), ElementsAre("block", "other"));
   EXPECT_THAT(ToClients<FrameFailed>(script.Client(kClient, Frame(1, 1, "a"))), SizeIs(1))

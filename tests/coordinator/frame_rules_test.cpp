@@ -301,7 +301,7 @@ TEST(CoordinatorFrames, TroubleIsTriedAgainWithPausesAndThenReported) {
   auto groups = HandedOut(script.Submit(kClient, Frame(1, 2)));
   const auto trouble = [&](const GroupAssignment& group, WorkerId worker) {
     return script.Worker(script.WorkerOf(worker),
-                         WorkerTrouble{77, worker, group.key, 0, Status::ResourceExhausted("slab of 9 GB, budget 1 GB")});
+                         WorkerTrouble{77, worker, group.key, 0, Status::ResourceExhausted("padded box of 9 GB, budget 1 GB")});
   };
   const WorkerId display = groups.at(0).display;
   const WorkerId other = display == 1 ? 2 : 1;
@@ -320,7 +320,7 @@ TEST(CoordinatorFrames, TroubleIsTriedAgainWithPausesAndThenReported) {
     if (attempt == 5) {
       const Status status = ToClients<FrameFailed>(actions)[0].message.status;
       EXPECT_EQ(status.code(), StatusCode::kResourceExhausted);
-      EXPECT_THAT(status.message(), HasSubstr("worker " + std::to_string(other) + ": slab of 9 GB, budget 1 GB"));
+      EXPECT_THAT(status.message(), HasSubstr("worker " + std::to_string(other) + ": padded box of 9 GB, budget 1 GB"));
     }
   }
   EXPECT_EQ(script.QueryStatus().running, 0U);

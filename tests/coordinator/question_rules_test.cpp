@@ -51,7 +51,7 @@ TEST_F(QuestionRules, AnAnswerWaitsForALookAtTheFiles) {
   EXPECT_THAT(first, SizeIs(1)) << "it was read after the question";
   const Actions second = script.Client(kClient, Question(2));
   EXPECT_THAT(Of<AnswerQuestion>(second), IsEmpty());
-  ASSERT_THAT(Of<LookAtDataset>(second), SizeIs(1));
+  ASSERT_THAT(Of<CheckDatasetFiles>(second), SizeIs(1));
   // The files have changed: the answer is of the new ones.
   const Actions changed = script.Step(DatasetSeen{"block", script.loads.back().load, true});
   EXPECT_THAT(Of<AnswerQuestion>(changed), IsEmpty());

@@ -16,7 +16,7 @@ TEST(CoordinatorWorkers, RepeatedRegisterGetsTheSameWelcome) {
   EXPECT_EQ(again[0].message, (Welcome{.epoch = 77,
                                        .incarnation = 1,
                                        .worker = worker.id,
-                                       .slabs_endpoint = "inproc://slabs",
+                                       .voxels_endpoint = "inproc://voxels",
                                        .heartbeat_ms = 500,
                                        .timeout_ms = 6000}));
   EXPECT_EQ(script.QueryStatus().workers.size(), 1U);

@@ -73,10 +73,10 @@ std::vector<std::vector<std::byte>> RecordedHeaders() {
   client.Send(SubmitFrame{.request = 1, .frame = request});
   const auto assignment = worker.Await<GroupAssignment>();
 
-  RecordedPeer slabs(context, welcome.slabs_endpoint, headers);
-  slabs.Send(ChunkRequest{
+  RecordedPeer boxes(context, welcome.voxels_endpoint, headers);
+  boxes.Send(ChunkRequest{
       .epoch = welcome.epoch, .worker = welcome.worker, .dataset = assignment.setup.dataset, .box = assignment.group.placements.at(0).box});
-  slabs.Await<Chunk>();
+  boxes.Await<Chunk>();
   client.Send(ClientPing{.nonce = 2, .open = {1}});
   client.Await<ClientPong>();
   client.Send(StatusQuery{.nonce = 3});

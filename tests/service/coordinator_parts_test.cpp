@@ -1,4 +1,4 @@
-// The parts round the coordinator's machine: names of connections, samples of boxes, the slabs plane, the catalogue.
+// The parts round the coordinator's machine: names of connections, samples of boxes, the voxels plane, the catalogue.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -20,7 +20,7 @@
 #include "coordinator/catalogue.h"
 #include "coordinator/dataset_id.h"
 #include "coordinator/peer_table.h"
-#include "coordinator/slab_server.h"
+#include "coordinator/voxel_server.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
@@ -152,14 +152,14 @@ TEST(DatasetId, IsTheSameForTheSameVoxelsUnderTheSameNameOnly) {
   EXPECT_NE(IdOf("ball", copy), id);
 }
 
-class SlabServerTest : public testing::Test {
+class VoxelServerTest : public testing::Test {
  protected:
   static constexpr Epoch kEpoch = 77;
 
-  SlabServerTest()
+  VoxelServerTest()
       : random_(1),
         volume_(RandomVolume({300, 70, 60}, ScalarType::kUint8, random_)),  // two chunks
-        server_(SlabServer::Start(context_, {"inproc://slab-server-test"}, kEpoch).value()),
+        server_(VoxelServer::Start(context_, {"inproc://voxel-server-test"}, kEpoch).value()),
         worker_(Socket::Dealer(context_).value()) {
     server_->Publish(5, {.volume = volume_});
     CHECK(worker_.Connect(server_->endpoint()).ok());
@@ -185,11 +185,11 @@ class SlabServerTest : public testing::Test {
   Context context_;
   Random random_;
   std::shared_ptr<const Volume> volume_;
-  std::unique_ptr<SlabServer> server_;
+  std::unique_ptr<VoxelServer> server_;
   Socket worker_;
 };
 
-TEST_F(SlabServerTest, ChunksPutTogetherAreTheBox) {
+TEST_F(VoxelServerTest, ChunksPutTogetherAreTheBox) {
   const Box box = volume_->block.box;
   server_->Publish(6, {.bricks = std::make_shared<const BrickedVoxels>(volume_->block)});
   for (DatasetId dataset : {5U, 6U}) {
@@ -208,7 +208,7 @@ TEST_F(SlabServerTest, ChunksPutTogetherAreTheBox) {
 }
 
 // The chunks of a dataset with layers are those of its volume, then those of each layer.
-TEST_F(SlabServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
+TEST_F(VoxelServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
   const Box box = volume_->block.box;
   VoxelBlock labels = MakeVoxelBlock(box, ScalarType::kUint16), overlay = MakeVoxelBlock(box, ScalarType::kFloat32);
   for (std::int64_t i = 0; i < box.voxel_count(); ++i) {
@@ -238,7 +238,7 @@ TEST_F(SlabServerTest, ChunksOfLayersFollowThoseOfTheVolume) {
   }
 }
 
-TEST_F(SlabServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
+TEST_F(VoxelServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
   const Box whole = volume_->block.box, part = {whole.begin, {whole.end.x / 2, whole.end.y / 3, whole.end.z}};
   const auto cells = std::make_shared<const MeshCutter>(
       std::make_shared<const Mesh>(MakeTetrahedralCube(whole.size(), 30, random_, 0.2, [](const Vec3& p) { return p.z; })));
@@ -264,7 +264,7 @@ TEST_F(SlabServerTest, ChunksOfCellsAreTheCellsOfTheBox) {
                 "cells of a dataset that has none");
 }
 
-TEST_F(SlabServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {
+TEST_F(VoxelServerTest, RequestsThatCannotBeMetAreRefusedWithTheReason) {
   const Box box = volume_->block.box;
   ExpectRefused({.epoch = kEpoch, .worker = 1, .dataset = 6, .box = box, .chunk = 0}, StatusCode::kNotFound, "dataset 6");
   const ChunkRequest stale{.epoch = kEpoch - 1, .worker = 1, .dataset = 6, .box = box, .chunk = 1};
@@ -282,12 +282,12 @@ std::size_t ResidentBytes() {
   return resident * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
-TEST_F(SlabServerTest, AConnectionThatAsksAndNeverReadsCostsLittleMemory) {
+TEST_F(VoxelServerTest, AConnectionThatAsksAndNeverReadsCostsLittleMemory) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "the address sanitizer keeps memory that was freed";
 #endif
   constexpr int kRequests = 2000;
-  const auto server = SlabServer::Start(context_, {"tcp://127.0.0.1:*"}, kEpoch).value();
+  const auto server = VoxelServer::Start(context_, {"tcp://127.0.0.1:*"}, kEpoch).value();
   server->Publish(5, {.volume = volume_});
   Socket greedy = Socket::Dealer(context_, {.send_high_water_mark = kRequests, .receive_high_water_mark = 1}).value();
   worker_ = Socket::Dealer(context_).value();

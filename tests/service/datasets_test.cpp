@@ -98,10 +98,10 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   const auto expected = [&] {
     const Layers layers = ReadLayers({.labels = labels.string(), .label_colors = table.string()}, volume_->description.geometry).value();
     const FramePlan plan = PlanFrame(request, 1, Summarize(LayeredVolume{volume_, layers}), Roster{{1}}).value();
-    SlabData slab(CutBlock(volume_->block, volume_->block.box), SlabLayers{BrickedVoxels(layers.labels->block), {}});
+    BoxData data(CutBlock(volume_->block, volume_->block.box), BoxLayers{BrickedVoxels(layers.labels->block), {}});
     RankReport report;
     LocalImage frame =
-        MakeRenderer(*plan.setup.renderer)->Render(slab, volume_->block.box, plan.setup, {}, RenderControl(), report).value();
+        MakeRenderer(*plan.setup.renderer)->Render(data, volume_->block.box, plan.setup, {}, RenderControl(), report).value();
     return FinishPicture(frame, plan.setup);
   };
   const auto expect_shows = [&](const LocalImage& image) {

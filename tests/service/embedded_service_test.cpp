@@ -78,12 +78,12 @@ std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume&
   const FramePlan plan = PlanFrame(request, 1, Summarize(volume), roster).value();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
-  SlabData slab(std::move(copy));
+  BoxData data(std::move(copy));
   RenderControl control;
   RankReport report;
   for (std::size_t group = 2; group < plan.groups.size(); ++group) {
     for (const Placement& placement : plan.groups[group].placements) {
-      EXPECT_TRUE(MakeRenderer(*plan.setup.renderer)->Render(slab, placement.box, plan.setup, {}, control, report).ok());
+      EXPECT_TRUE(MakeRenderer(*plan.setup.renderer)->Render(data, placement.box, plan.setup, {}, control, report).ok());
     }
   }
   return report.drawn_voxels;

@@ -184,18 +184,18 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
 }
 
 TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
-  const SlabKey slab{.dataset = 4, .box = {{0, 0, 0}, {10, 10, 5}}, .types = ScalarType::kUint16};
-  Chunk chunk{.epoch = 1, .dataset = 4, .box = slab.box, .chunk = 0};
+  const BoxKey padded{.dataset = 4, .box = {{0, 0, 0}, {10, 10, 5}}, .types = ScalarType::kUint16};
+  Chunk chunk{.epoch = 1, .dataset = 4, .box = padded.box, .chunk = 0};
   const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(1000, std::byte{7})), Codec::kZstd, chunk);
   const auto store = [&](const Chunk& header, const Bytes& bytes) {
-    executor_.Perform(StoreChunk{slab, header, bytes});
+    executor_.Perform(StoreChunk{padded, header, bytes});
     const auto stored = outputs_.NextEvent<ChunkStored>();
-    EXPECT_EQ(stored.slab, slab);
+    EXPECT_EQ(stored.padded, padded);
     EXPECT_EQ(stored.chunk, header.chunk);
     return stored.status.code();
   };
-  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound) << "no such slab yet";
-  executor_.Perform(OpenSlab{slab});
+  EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound) << "no such padded box yet";
+  executor_.Perform(OpenBox{padded});
   Chunk damaged = chunk;
   damaged.digest ^= 1;
   EXPECT_EQ(store(damaged, payload), StatusCode::kDataLoss);
@@ -207,7 +207,7 @@ TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {
   EXPECT_EQ(store(damaged, payload), StatusCode::kDataLoss);
   EXPECT_EQ(store(chunk, payload), StatusCode::kOk);
   EXPECT_EQ(store(chunk, payload), StatusCode::kOk) << "a duplicate changes nothing";
-  executor_.Perform(DropSlab{slab});
+  executor_.Perform(DropBox{padded});
   EXPECT_EQ(store(chunk, payload), StatusCode::kNotFound);
 }
 
@@ -216,31 +216,31 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   FrameRequest request = TestRequest(Splatting(), 20);
   request.size = {1024, 1024};
   const FramePlan plan = PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value();
-  const SlabKey slab{.dataset = 1, .box = volume->block.box, .types = volume->block.type};
-  executor_.Perform(OpenSlab{slab});
+  const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type};
+  executor_.Perform(OpenBox{padded});
   const Bytes samples(volume, volume->block.bytes);
   ASSERT_LE(samples.size(), kChunkBytes);
-  Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = 0};
+  Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
   const Bytes payload = PackChunk(samples, Codec::kRaw, chunk);
-  executor_.Perform(StoreChunk{slab, chunk, payload});
+  executor_.Perform(StoreChunk{padded, chunk, payload});
   ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
 
   const auto setup = std::make_shared<const FrameSetup>(plan.setup);
-  executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 1});
+  executor_.Perform(StartRender{.key = kKey, .padded = padded, .placement = {.box = padded.box, .worker = 1}, .setup = setup, .image = 1});
   executor_.Perform(CancelRender{1});
   auto done = outputs_.NextEvent<RenderDone>();
   EXPECT_EQ(done.image, 1U);
   EXPECT_TRUE(done.status.ok() || done.status.code() == StatusCode::kCancelled) << done.status.message();
 
-  executor_.Perform(DropSlab{slab});  // but its last render goes on
-  executor_.Perform(OpenSlab{slab});
-  executor_.Perform(StoreChunk{slab, chunk, payload});
+  executor_.Perform(DropBox{padded});  // but its last render goes on
+  executor_.Perform(OpenBox{padded});
+  executor_.Perform(StoreChunk{padded, chunk, payload});
   ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
-  executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = 2});
-  executor_.Perform(DropSlab{slab});
+  executor_.Perform(StartRender{.key = kKey, .padded = padded, .placement = {.box = padded.box, .worker = 1}, .setup = setup, .image = 2});
+  executor_.Perform(DropBox{padded});
   done = outputs_.NextEvent<RenderDone>();
   EXPECT_TRUE(done.status.ok()) << done.status.message();
-  EXPECT_GT(done.slab_bytes, 0U);
+  EXPECT_GT(done.box_bytes, 0U);
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
 }
 
@@ -252,7 +252,7 @@ class StepwiseRenderer : public Renderer {
   };
   explicit StepwiseRenderer(Steps& steps) : steps_(steps) {}
 
-  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
+  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
                             RankReport&) override {
     if (FrameBounds(setup).pixel_count() >= 64 * 64) {
       ForEachPiece(3, control, [this](std::int32_t) {
@@ -274,17 +274,17 @@ TEST(ExecutorPauses, ARenderThatPausesLetsThatOfAnotherClientPass) {
   Executor executor(outputs.outbox, Codec::kRaw, 1, [&](const RendererKind&) { return std::make_unique<StepwiseRenderer>(steps); });
   const std::shared_ptr<const Volume> volume = TestSphere(8);
   const auto start = [&](ClientId client, std::int32_t size, ImageHandle image) {
-    const SlabKey slab{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = image};
-    executor.Perform(OpenSlab{slab});
-    Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = 0};
+    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = image};
+    executor.Perform(OpenBox{padded});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
     const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
-    executor.Perform(StoreChunk{slab, chunk, payload});
+    executor.Perform(StoreChunk{padded, chunk, payload});
     ASSERT_TRUE(outputs.NextEvent<ChunkStored>().status.ok());
     FrameRequest request = TestRequest(FindRenderer("mip"), 20);
     request.size = {size, size};
     const auto setup = std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
     executor.Perform(StartRender{
-        .client = client, .key = kKey, .slab = slab, .placement = {.box = slab.box, .worker = 1}, .setup = setup, .image = image});
+        .client = client, .key = kKey, .padded = padded, .placement = {.box = padded.box, .worker = 1}, .setup = setup, .image = image});
   };
   start(1, 64, 1);
   steps.begun.acquire();
@@ -307,68 +307,69 @@ TEST(ExecutorPauses, ARenderThatPausesLetsThatOfAnotherClientPass) {
   EXPECT_EQ(outputs.NextEvent<RenderDone>().status.code(), StatusCode::kCancelled) << "a render that pauses can be cancelled";
 }
 
-TEST_F(ExecutorTest, WhatIsCopiedFromOtherSlabsIsWhatWouldHaveArrived) {
+TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {
   const auto volume = std::make_shared<const Volume>(AsGrid(*TestSphere(60), 6));
   const Box whole = volume->block.box;
   for (const RendererKind* renderer : Renderers()) {
     const FramePlan plan = PlanFrame(TestRequest(renderer, 20), 1, SummaryOf(*volume), Roster{{1}}).value();
     const auto setup = std::make_shared<const FrameSetup>(plan.setup);
-    const auto store = [&](const SlabKey& slab, const Box& box) {
+    const auto store = [&](const BoxKey& padded, const Box& box) {
       Chunk chunk{.epoch = 1, .dataset = 1, .box = box, .chunk = 0};
       const VoxelBlock samples = CutBlock(volume->block, box);
       ASSERT_LE(samples.bytes.size(), kChunkBytes);
       const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(samples.bytes.begin(), samples.bytes.end())), Codec::kRaw, chunk);
-      executor_.Perform(StoreChunk{slab, chunk, payload});
+      executor_.Perform(StoreChunk{padded, chunk, payload});
       const auto stored = outputs_.NextEvent<ChunkStored>();
       EXPECT_TRUE(stored.status.ok()) << stored.status.message();
       EXPECT_EQ(stored.box, box);
     };
-    // Cells are not copied: each slab that is rendered from gets its own.
-    const auto store_cells = [&](const SlabKey& slab) {
-      std::vector<std::byte> cells = EncodeMesh(MeshCutter(volume->cells).Cut(slab.box));
+    // Cells are not copied: each padded box that is rendered from gets its own.
+    const auto store_cells = [&](const BoxKey& padded) {
+      std::vector<std::byte> cells = EncodeMesh(MeshCutter(volume->cells).Cut(padded.box));
       ASSERT_LE(cells.size(), kChunkBytes);
-      Chunk chunk{.epoch = 1, .dataset = 1, .box = slab.box, .chunk = kFirstCellChunk, .cell_bytes = cells.size()};
+      Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = kFirstCellChunk, .cell_bytes = cells.size()};
       const Bytes payload = PackChunk(Bytes(std::move(cells)), Codec::kRaw, chunk);
-      executor_.Perform(StoreChunk{slab, chunk, payload});
+      executor_.Perform(StoreChunk{padded, chunk, payload});
       const auto stored = outputs_.NextEvent<ChunkStored>();
       EXPECT_TRUE(stored.status.ok()) << stored.status.message();
     };
-    const auto render = [&](const SlabKey& slab, ImageHandle image) {
-      executor_.Perform(StartRender{.key = kKey, .slab = slab, .placement = {.box = whole, .worker = 1}, .setup = setup, .image = image});
+    const auto render = [&](const BoxKey& padded, ImageHandle image) {
+      executor_.Perform(
+          StartRender{.key = kKey, .padded = padded, .placement = {.box = whole, .worker = 1}, .setup = setup, .image = image});
       const auto done = outputs_.NextEvent<RenderDone>();
       EXPECT_TRUE(done.status.ok()) << done.status.message();
       return done.report;
     };
     const auto key = [&](const Box& box, std::uint64_t generation) {
-      return SlabKey{.dataset = 1, .box = box, .types = {volume->block.type, plan.setup.layers}, .generation = generation};
+      return BoxKey{.dataset = 1, .box = box, .types = {volume->block.type, plan.setup.layers}, .generation = generation};
     };
-    const SlabKey direct = key(whole, 1), lower = key({{0, 0, 0}, {60, 60, 30}}, 2), side = key({{20, 0, 0}, {60, 60, 50}}, 3),
-                  put_together = key(whole, 4);
-    executor_.Perform(OpenSlab{direct, {}});
+    const BoxKey direct = key(whole, 1), lower = key({{0, 0, 0}, {60, 60, 30}}, 2), side = key({{20, 0, 0}, {60, 60, 50}}, 3),
+                 put_together = key(whole, 4);
+    executor_.Perform(OpenBox{direct, {}});
     store(direct, whole);
     store_cells(direct);
     const RankReport expected = render(direct, 1);
     EXPECT_GT(expected.image_pixels, 0U);
 
     // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
-    executor_.Perform(OpenSlab{lower, {}});
+    executor_.Perform(OpenBox{lower, {}});
     store(lower, lower.box);
-    executor_.Perform(OpenSlab{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}});
+    executor_.Perform(OpenBox{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}});
     store(side, {{20, 0, 30}, {60, 60, 50}});
-    executor_.Perform(OpenSlab{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}});
+    executor_.Perform(OpenBox{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}});
     store(put_together, {{0, 0, 30}, {20, 60, 50}});
     store(put_together, {{0, 0, 50}, {60, 60, 60}});
     store_cells(put_together);
-    executor_.Perform(DropSlab{lower});
-    executor_.Perform(DropSlab{side});
+    executor_.Perform(DropBox{lower});
+    executor_.Perform(DropBox{side});
     const RankReport report = render(put_together, 2);
     EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
     EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
     EXPECT_EQ(report.image_bounds, expected.image_bounds);
     EXPECT_EQ(report.image_pixels, expected.image_pixels);
     for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
-    executor_.Perform(DropSlab{direct});
-    executor_.Perform(DropSlab{put_together});
+    executor_.Perform(DropBox{direct});
+    executor_.Perform(DropBox{put_together});
   }
 }
 

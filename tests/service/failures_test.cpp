@@ -106,7 +106,7 @@ TEST_P(TaskFailuresTest, OfAllWorkersAreToldAtOnceAndTheServiceLivesOn) {
   EXPECT_EQ(client_->QueryStatus().value().workers_lost, 0U);
 }
 
-INSTANTIATE_TEST_SUITE_P(Tasks, TaskFailuresTest, testing::Values("slab", "render", "encode", "combine", "picture", "send"),
+INSTANTIATE_TEST_SUITE_P(Tasks, TaskFailuresTest, testing::Values("box", "render", "encode", "combine", "picture", "send"),
                          [](const auto& test) { return std::string(test.param); });
 
 TEST_F(FailuresTest, ARendererThatThrowsIsReportedWithWhatItSaid) {

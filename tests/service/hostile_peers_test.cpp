@@ -60,7 +60,7 @@ class HostilePeers : public testing::TestWithParam<bool> {
 
   void SetUp() override {
     CoordinatorOptions options;
-    options.client_endpoint = options.worker_endpoint = options.slabs_endpoint = "tcp://127.0.0.1:*";
+    options.client_endpoint = options.worker_endpoint = options.voxels_endpoint = "tcp://127.0.0.1:*";
     if (has_keys()) options.keys_folder = directory_ / "keys";
     options.catalogue["ball"] = [volume = volume_]() -> Result<std::shared_ptr<const Volume>> { return volume; };
     coordinator_ = CoordinatorService::Start(coordinator_context_, std::move(options)).value();
@@ -78,7 +78,7 @@ class HostilePeers : public testing::TestWithParam<bool> {
 
     ports_ = {{coordinator_->client_endpoint(), Takes<ClientToCoordinator>, KeysOf(Role::kClient)},
               {coordinator_->worker_endpoint(), Takes<WorkerToCoordinator>, KeysOf(Role::kWorker)},
-              {welcome.slabs_endpoint, Takes<WorkerToSlabs>, KeysOf(Role::kWorker)}};
+              {welcome.voxels_endpoint, Takes<WorkerToVoxels>, KeysOf(Role::kWorker)}};
     // The keys of images planes are known to the workers of a group alone.
     for (const auto& worker : workers_)
       ports_.push_back({worker->images_endpoint(), Takes<WorkerToWorker>, KeysOf(Role::kWorker), !has_keys()});

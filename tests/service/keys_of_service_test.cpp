@@ -34,7 +34,7 @@ class KeysOfServiceTest : public testing::Test {
 
   void StartCoordinator() {
     CoordinatorOptions options;
-    options.client_endpoint = options.worker_endpoint = options.slabs_endpoint = "tcp://127.0.0.1:*";
+    options.client_endpoint = options.worker_endpoint = options.voxels_endpoint = "tcp://127.0.0.1:*";
     options.keys_folder = folder();
     options.catalogue["ball"] = [volume = volume_]() -> Result<std::shared_ptr<const Volume>> { return volume; };
     Result<std::unique_ptr<CoordinatorService>> started = CoordinatorService::Start(coordinator_context_, std::move(options));

@@ -42,12 +42,12 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   CHECK(plan.ok()) << plan.status().message();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
-  SlabLayers layers;
+  BoxLayers layers;
   layers.cells = volume.cells;
-  SlabData slab(std::move(copy), std::move(layers));
+  BoxData data(std::move(copy), std::move(layers));
   RenderControl control;
   RankReport report;
-  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(slab, volume.block.box, plan->setup, {}, control, report);
+  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(data, volume.block.box, plan->setup, {}, control, report);
   CHECK(image.ok()) << image.status().message();
   return FinishPicture(*std::move(image), plan->setup);
 }

@@ -27,8 +27,7 @@ inline LocalImage Picture(std::uint64_t seed) {
 // The worker's part of every frame.
 class FixedPicture : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&,
-                            RankReport&) override {
+  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup&, const OcclusionMask&, const std::atomic<bool>&, RankReport&) override {
     return Picture(1);
   }
 };
@@ -38,11 +37,11 @@ class WorkerAndPeer : public testing::Test {
   // The images planes are at `images_endpoint`: inproc for whom the workers' memory matters, a wildcard port for whom the link does.
   explicit WorkerAndPeer(WorkerOptions options = {}, const std::string& images_endpoint = "inproc://images")
       : control_(*Socket::Router(context_)),
-        slabs_(*Socket::Router(context_)),
+        voxels_(*Socket::Router(context_)),
         images_(*Socket::Router(context_)),
         to_worker_(*Socket::Dealer(context_)) {
     const bool inproc = images_endpoint.starts_with("inproc");
-    CHECK(control_.Bind("inproc://control").ok() && slabs_.Bind("inproc://slabs").ok());
+    CHECK(control_.Bind("inproc://control").ok() && voxels_.Bind("inproc://voxels").ok());
     peer_images_ = images_.Bind(inproc ? images_endpoint + ".peer" : images_endpoint).value();
     options.coordinator_endpoint = "inproc://control";
     options.images_endpoint = inproc ? images_endpoint + ".worker" : images_endpoint;
@@ -52,7 +51,7 @@ class WorkerAndPeer : public testing::Test {
     memory_scope_ = peer_scope_ = hello.memory_scope;
     worker_images_ = hello.images_endpoint;
     CHECK(to_worker_.Connect(worker_images_).ok());
-    SendControl(Welcome{kEpoch, hello.incarnation, kWorker, "inproc://slabs", 1000, 60000});
+    SendControl(Welcome{kEpoch, hello.incarnation, kWorker, "inproc://voxels", 1000, 60000});
   }
 
   void SendControl(MessageView message) { ASSERT_TRUE(control_.Send(identity_, Encode(message)).ok()); }
@@ -63,7 +62,7 @@ class WorkerAndPeer : public testing::Test {
   AnyMessage AwaitEither() {
     const Time deadline = MonotonicNow() + std::chrono::seconds(30);
     while (MonotonicNow() < deadline) {
-      Socket* const sockets[] = {&control_, &slabs_, &images_};
+      Socket* const sockets[] = {&control_, &voxels_, &images_};
       Wait(sockets, nullptr, std::chrono::seconds(1));
       for (Socket* socket : sockets) {
         while (auto incoming = socket->TryReceive()) {
@@ -86,7 +85,7 @@ class WorkerAndPeer : public testing::Test {
   void Serve(const std::string& identity, const ChunkRequest& request) {
     Chunk chunk = {.epoch = kEpoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
     const Bytes payload = PackChunk(Bytes(std::vector<std::byte>(std::size_t(request.box.voxel_count()))), Codec::kRaw, chunk);
-    ASSERT_TRUE(slabs_.Send(identity, Encode(chunk), payload).ok());
+    ASSERT_TRUE(voxels_.Send(identity, Encode(chunk), payload).ok());
   }
 
   // Rank 0, the root, is `root`; both ranks render everything.
@@ -115,7 +114,7 @@ class WorkerAndPeer : public testing::Test {
   }
 
   Context context_;
-  Socket control_, slabs_, images_, to_worker_;
+  Socket control_, voxels_, images_, to_worker_;
   std::unique_ptr<WorkerService> worker_;
   std::string identity_;  // of the worker's control connection
   std::string worker_images_, peer_images_;

@@ -86,9 +86,9 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
       tally_.Add(Count::kHiddenBoxes);
       continue;
     }
-    const std::pair<WorkerId, Box> slab{placement.worker, SlabBox(placement.box, assignment.setup)};
-    frame.slabs.insert(slab);
-    if (fetched_.count(slab) == 0) frame.all_cached = false;
+    const std::pair<WorkerId, Box> padded{placement.worker, PaddedBox(placement.box, assignment.setup)};
+    frame.padded_boxes.insert(padded);
+    if (fetched_.count(padded) == 0) frame.all_cached = false;
   }
   const auto [known, added] = frame.groups.emplace(assignment.key.group, boxes);
   EXPECT_EQ(known->second, boxes) << "another attempt has other boxes";
@@ -181,7 +181,7 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
     EXPECT_EQ(moved, 0U) << "voxels that were there moved again";
     tally_.Add(Count::kCachedFrames);
   }
-  fetched_.insert(frame->second.slabs.begin(), frame->second.slabs.end());
+  fetched_.insert(frame->second.padded_boxes.begin(), frame->second.padded_boxes.end());
 }
 
 }  // namespace slabstream

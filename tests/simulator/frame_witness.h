@@ -34,12 +34,12 @@ class FrameWitness {
     FrameSetup setup;
     std::map<std::uint32_t, std::vector<BoxId>> groups;
     std::map<BoxId, Box> boxes;
-    WorkerId display = 0;                      // of this attempt
-    std::set<std::uint32_t> handed_out;        // groups of this attempt
-    std::map<WorkerId, std::uint32_t> done;    // groups that a display worker has said are done: the first so many
-    std::set<std::pair<WorkerId, Box>> slabs;  // who needed which voxels
-    std::set<BoxId> left_out;                  // boxes that were hidden as a whole, in any attempt
-    bool all_cached = true;                    // when it was handed out, workers held all voxels that it needs
+    WorkerId display = 0;                             // of this attempt
+    std::set<std::uint32_t> handed_out;               // groups of this attempt
+    std::map<WorkerId, std::uint32_t> done;           // groups that a display worker has said are done: the first so many
+    std::set<std::pair<WorkerId, Box>> padded_boxes;  // who needed which voxels
+    std::set<BoxId> left_out;                         // boxes that were hidden as a whole, in any attempt
+    bool all_cached = true;                           // when it was handed out, workers held all voxels that it needs
     bool over = false;
     std::size_t unfinished() const {  // handed out, and not done as the display worker sees it
       const auto known = done.find(display);

@@ -9,7 +9,7 @@
 #include "common/volume/box.h"
 #include "common/wire/digest.h"
 #include "common/wire/ids.h"
-#include "common/wire/slab_messages.h"
+#include "common/wire/voxel_messages.h"
 
 namespace slabstream {
 

@@ -63,84 +63,85 @@ void ModelWorker::CheckCredit() {
   }
 }
 
-void ModelWorker::Perform(const OpenSlab& action) {
-  EXPECT_TRUE(slabs_.try_emplace(action.slab).second) << "a slab is opened twice";
-  for (const OpenSlab::Copy& copy : action.copies) {
-    EXPECT_TRUE(Complete(copy.from)) << "a slab is copied from that is not open or not complete";
-    EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.slab.dataset && copy.from.types == action.slab.types);
-    slabs_[action.slab].copied.push_back(copy);
+void ModelWorker::Perform(const OpenBox& action) {
+  EXPECT_TRUE(boxes_.try_emplace(action.padded).second) << "a padded box is opened twice";
+  for (const OpenBox::Copy& copy : action.copies) {
+    EXPECT_TRUE(Complete(copy.from)) << "a padded box is copied from that is not open or not complete";
+    EXPECT_TRUE(copy.from.box.Contains(copy.box) && copy.from.dataset == action.padded.dataset && copy.from.types == action.padded.types);
+    boxes_[action.padded].copied.push_back(copy);
   }
 }
 
 double ModelWorker::Begin(Job&, const StoreChunk& action) {
-  EXPECT_EQ(slabs_.count(action.slab), 1U) << "a chunk is stored in a slab that is not open";
-  EXPECT_TRUE(action.slab.box.Contains(action.chunk.box));
+  EXPECT_EQ(boxes_.count(action.padded), 1U) << "a chunk is stored in a padded box that is not open";
+  EXPECT_TRUE(action.padded.box.Contains(action.chunk.box));
   if (IsCellChunk(action.chunk.chunk)) {
-    EXPECT_TRUE(action.slab.types.layers.cells) << "cells of a dataset that has none";
-    EXPECT_EQ(action.chunk.box, action.slab.box) << "cells are those of the whole slab";
+    EXPECT_TRUE(action.padded.types.layers.cells) << "cells of a dataset that has none";
+    EXPECT_EQ(action.chunk.box, action.padded.box) << "cells are those of the whole padded box";
   }
   return speed_.store;
 }
 
 ChunkStored ModelWorker::Stored(const StoreChunk& store) {
-  requested_.erase({store.slab.dataset, store.chunk.box, store.chunk.chunk});
+  requested_.erase({store.padded.dataset, store.chunk.box, store.chunk.chunk});
   Status status;
   if (random_.Chance(faults_.damage_chunk)) {
     status = Status::DataLoss("digest of a chunk");
-  } else if (const auto open = slabs_.find(store.slab); open != slabs_.end()) {
+  } else if (const auto open = boxes_.find(store.padded); open != boxes_.end()) {
     const bool of_cells = IsCellChunk(store.chunk.chunk);
     if (of_cells) tally_.Add(Count::kCellChunks);
     std::set<std::uint32_t>& stored = of_cells ? open->second.cell_chunks : open->second.chunks[store.chunk.box];
     stored.insert(store.chunk.chunk);
   }
-  return {store.slab, store.chunk.box, store.chunk.chunk, status};
+  return {store.padded, store.chunk.box, store.chunk.chunk, status};
 }
 
 // All chunks of the boxes that it has any of, and these with the copied ones tile it; and all chunks of its cells.
-bool ModelWorker::Complete(const SlabKey& key) const {
-  const auto open = slabs_.find(key);
-  if (open == slabs_.end()) return false;
+bool ModelWorker::Complete(const BoxKey& key) const {
+  const auto open = boxes_.find(key);
+  if (open == boxes_.end()) return false;
   std::vector<Box> boxes;
   for (const auto& [box, chunks] : open->second.chunks) {
     if (chunks.size() != ChunkCount(box, key.types)) return false;
     boxes.push_back(box);
   }
-  for (const OpenSlab::Copy& copy : open->second.copied) boxes.push_back(copy.box);
+  for (const OpenBox::Copy& copy : open->second.copied) boxes.push_back(copy.box);
   if (key.types.layers.cells && open->second.cell_chunks.size() != CellChunkCount(cells_.BytesOf(key.dataset, key.box))) return false;
   return Assemble(key.box, boxes).missing.empty();
 }
 
-void ModelWorker::Perform(const DropSlab& action) {
-  EXPECT_EQ(slabs_.erase(action.slab), 1U) << "a slab is dropped that is not open";
-  for (const auto& [key, slab] : slabs_) {
-    for (const OpenSlab::Copy& copy : slab.copied)
-      EXPECT_TRUE(slab.rendered || copy.from != action.slab) << "a slab is dropped that is copied from";
+void ModelWorker::Perform(const DropBox& action) {
+  EXPECT_EQ(boxes_.erase(action.padded), 1U) << "a padded box is dropped that is not open";
+  for (const auto& [key, padded] : boxes_) {
+    for (const OpenBox::Copy& copy : padded.copied)
+      EXPECT_TRUE(padded.rendered || copy.from != action.padded) << "a padded box is dropped that is copied from";
   }
-  for (const auto& [image, rendering] : rendering_) EXPECT_NE(rendering.slab, action.slab) << "a slab is dropped while it is rendered from";
+  for (const auto& [image, rendering] : rendering_)
+    EXPECT_NE(rendering.padded, action.padded) << "a padded box is dropped while it is rendered from";
 }
 
 double ModelWorker::Begin(Job&, const StartRender& action) {
-  const std::set<SlabKey> touched = Touched(action.slab);
+  const std::set<BoxKey> touched = Touched(action.padded);
   for (const auto& [image, rendering] : rendering_) {
     EXPECT_NE(rendering.client, action.client) << "two renders of a client at a time";
-    for (const SlabKey& slab : Touched(rendering.slab)) EXPECT_FALSE(touched.contains(slab)) << "two renders touch a slab";
+    for (const BoxKey& padded : Touched(rendering.padded)) EXPECT_FALSE(touched.contains(padded)) << "two renders touch a padded box";
     tally_.Add(Count::kRendersBesideOthers);
   }
-  EXPECT_TRUE(Complete(action.slab)) << "a slab is rendered from before it is complete";
-  EXPECT_TRUE(action.slab.box.Contains(SlabBox(action.placement.box, *action.setup))) << "a slab without the voxels of its box";
-  EXPECT_EQ(action.slab.dataset, action.setup->dataset);
+  EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
+  EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.box, *action.setup))) << "a padded box without the voxels of its box";
+  EXPECT_EQ(action.padded.dataset, action.setup->dataset);
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);
   const bool large = std::uint64_t(FrameBounds(*action.setup).pixel_count()) >= kLargePixels;
   const double seconds = speed_.render * random_.Real(0.5, 2) * (large ? speed_.large : 1);
-  rendering_[action.image] = {action.client, action.slab, seconds};
+  rendering_[action.image] = {action.client, action.padded, seconds};
   return seconds;
 }
 
-// What rendering from the slab reads: until it has been rendered from, those that it is copied from, too.
-std::set<SlabKey> ModelWorker::Touched(const SlabKey& slab) const {
-  std::set<SlabKey> touched = {slab};
-  const ModelSlab& open = slabs_.at(slab);
-  for (const OpenSlab::Copy& copy : open.copied) {
+// What rendering from the padded box reads: until it has been rendered from, those that it is copied from, too.
+std::set<BoxKey> ModelWorker::Touched(const BoxKey& padded) const {
+  std::set<BoxKey> touched = {padded};
+  const ModelBox& open = boxes_.at(padded);
+  for (const OpenBox::Copy& copy : open.copied) {
     if (!open.rendered) touched.insert(copy.from);
   }
   return touched;
@@ -155,7 +156,7 @@ RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
     status = Status::ResourceExhausted("no memory to render");
   }
   if (status.ok()) {
-    slabs_.at(render.slab).rendered = true;
+    boxes_.at(render.padded).rendered = true;
     const PixelBounds frame = FrameBounds(*render.setup);
     images_.Render(render.image, render.placement.id, std::uint64_t(frame.pixel_count()), [&](std::uint64_t i) {
       const auto width = std::uint64_t(frame.width());
@@ -166,7 +167,7 @@ RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
   }
   RankReport report;
   report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds * 1e9);
-  return {render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.slab.box.voxel_count()) * 2};
+  return {render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.padded.box.voxel_count()) * 2};
 }
 
 double ModelWorker::Begin(Job&, const StartCombine& action) {

@@ -1,5 +1,5 @@
-// ModelWorker: what a simulated worker has in place of voxels and pixels. Images are symbolic; of its slabs it knows which chunks they
-// hold. It checks that its machine uses both as an executor would have to demand it.
+// ModelWorker: what a simulated worker has in place of voxels and pixels. Images are symbolic; of its padded boxes it knows which chunks
+// they hold. It checks that its machine uses both as an executor would have to demand it.
 #pragma once
 
 #include <cstdint>
@@ -45,8 +45,8 @@ class ModelWorker {
   // As in Conditions.
   WorkCost Begin(Job& job);
   WorkerEvent Answer(Job& job);
-  void Perform(const OpenSlab& action);
-  void Perform(const DropSlab& action);
+  void Perform(const OpenBox& action);
+  void Perform(const DropBox& action);
   void Perform(const ReleaseImage& action) { images_.Release(action.image); }
   void Perform(const StopProcess&);
   void OnRequest(const ChunkRequest& request);
@@ -54,7 +54,7 @@ class ModelWorker {
 
   bool stopped() const { return stopped_; }
   std::size_t images() const { return images_.size(); }
-  std::size_t slabs() const { return slabs_.size(); }
+  std::size_t boxes() const { return boxes_.size(); }
 
  private:
   struct Outstanding {
@@ -62,10 +62,10 @@ class ModelWorker {
     Time requested;
   };
   using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
-  struct ModelSlab {
+  struct ModelBox {
     std::map<Box, std::set<std::uint32_t>> chunks;  // of voxels, stored, by box
     std::set<std::uint32_t> cell_chunks;            // stored
-    std::vector<OpenSlab::Copy> copied;
+    std::vector<OpenBox::Copy> copied;
     bool rendered = false;
   };
 
@@ -79,8 +79,8 @@ class ModelWorker {
   bool LacksMemory(std::uint64_t pixels);
   RenderDone Rendered(const StartRender& render, bool cancelled);
   ChunkStored Stored(const StoreChunk& store);
-  bool Complete(const SlabKey& key) const;
-  std::set<SlabKey> Touched(const SlabKey& slab) const;
+  bool Complete(const BoxKey& key) const;
+  std::set<BoxKey> Touched(const BoxKey& padded) const;
 
   const Node node_;
   const WorkerConfig config_;
@@ -97,12 +97,12 @@ class ModelWorker {
   SymbolicImages images_;
   struct Rendering {
     ClientId client = 0;
-    SlabKey slab;
+    BoxKey padded;
     double seconds = 0;
   };
   std::map<ImageHandle, Rendering> rendering_;   // begun and not ended, paused or not
   std::map<ImageHandle, OcclusionMask> hidden_;  // found, and not yet told
-  std::map<SlabKey, ModelSlab> slabs_;           // that are open
+  std::map<BoxKey, ModelBox> boxes_;             // that are open
   std::map<ChunkName, Outstanding> requested_;   // and not yet stored, as the credit counts
 };
 

@@ -18,7 +18,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// 8 MiB: a slab has 1 to 8 chunks. Voxels of four bytes, since plans cost time by voxel.
+// 8 MiB: a padded box has 1 to 8 chunks. Voxels of four bytes, since plans cost time by voxel.
 constexpr Index3 kVolumeSize{256, 64, 128};
 
 // Values up to 50 show nothing.
@@ -29,7 +29,7 @@ TransferFunction StepTransfer() {
   return transfer;
 }
 
-// Whole layers of bricks across x are empty, so that some slabs show nothing.
+// Whole layers of bricks across x are empty, so that some boxes show nothing.
 void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;

@@ -69,7 +69,7 @@ void Simulation::AddClient() {
 void Simulation::StartCoordinator() {
   CoordinatorConfig config;
   config.epoch = random_.Integer<Epoch>(1, std::uint64_t{1} << 62);
-  config.slabs_endpoint = "slabs";
+  config.voxels_endpoint = "voxels";
   config.worker_timeout = seconds(3);
   config.worker_wait = seconds(5);
   config.vacancy_grace = milliseconds(random_.Integer(500, 8000));
@@ -114,7 +114,7 @@ void Simulation::Run() {
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
   const int clients = random_.Integer(1, 3);
   for (int i = 0; i < clients; ++i) AddClient();
-  // Without faults nobody asks before all workers are there: slots, and so slabs, then stay as they are.
+  // Without faults nobody asks before all workers are there: slots, and so padded boxes, then stay as they are.
   const Duration first = faults_.none() ? Duration(milliseconds(500)) : Duration{};
   for (const auto& client : clients_) {
     const int requests = random_.Integer(1, 4);
@@ -236,7 +236,7 @@ void Simulation::CheckTables() {
     EXPECT_EQ(sizes.early_images, 0U) << node;
     EXPECT_EQ(sizes.renders, 0U) << node;
     EXPECT_EQ(sizes.chunk_requests, 0U) << node;
-    EXPECT_EQ(sizes.slabs, workers_[node].slabs()) << node;
+    EXPECT_EQ(sizes.boxes, workers_[node].boxes()) << node;
   }
   const FrameSizes sizes = service_.coordinator().sizes();
   EXPECT_EQ(sizes.clients, 0U);
@@ -324,14 +324,14 @@ void Simulation::Perform(const LoadDataset& action) {
   TellDatasets(when, DatasetLoaded{action.name, action.load, voxels_, world_.summary, 0, stamp});
 }
 
-void Simulation::Perform(const LookAtDataset& action) {
+void Simulation::Perform(const CheckDatasetFiles& action) {
   DatasetSeen seen{action.name, action.load, action.stamp->digest != voxels_};
   if (random_.Chance(current_.fail_load / 5)) seen.changed = Status::NotFound("the file of the volume is gone");
   TellDatasets(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), seen);
 }
 
 // A file of another name comes and goes.
-void Simulation::Perform(const LookAtFolders& action) {
+void Simulation::Perform(const CheckWatchedFolders& action) {
   FoldersSeen seen;
   for (const std::string& folder : action.folders) {
     FoundData found;
@@ -459,13 +459,13 @@ Arrivals Simulation::ToPeer(Node to, Job& sends) {
 
 void Simulation::Perform(Node node, SendChunkRequest& action) {
   workers_[node].OnRequest(action.request);
-  const auto request = std::get<ChunkRequest>(OnTheWay(WorkerToSlabs(action.request)));
-  const Arrivals asked = network_.Send({int(node), kSlabServerEnd}, service_.now());
+  const auto request = std::get<ChunkRequest>(OnTheWay(WorkerToVoxels(action.request)));
+  const Arrivals asked = network_.Send({int(node), kVoxelServerEnd}, service_.now());
   for (int i = 0; i < asked.count; ++i) {
     service_.queue().At(asked.times[i], [this, node, request] {
       if (!service_.coordinator_runs() || request.epoch != epoch_) return;
       const auto answer = Widen<MessageToWorker>(OnTheWay(AnswerOf(request)));
-      const Arrivals answered = network_.Send({kSlabServerEnd, int(node)}, service_.now());
+      const Arrivals answered = network_.Send({kVoxelServerEnd, int(node)}, service_.now());
       for (int j = 0; j < answered.count; ++j) {
         service_.queue().At(answered.times[j], [this, node, answer] { service_.StepWorker(node, MessageReceived{answer, {}}); });
       }
@@ -473,7 +473,7 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
   }
 }
 
-SlabsToWorker Simulation::AnswerOf(const ChunkRequest& request) {
+VoxelsToWorker Simulation::AnswerOf(const ChunkRequest& request) {
   if (!published_.contains(request.dataset)) {
     return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")};
   }

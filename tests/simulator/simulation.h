@@ -6,7 +6,7 @@
 //   some may be left out, but only where the frame's termination allows it
 //   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
 //   all groups of a frame are of the same voxels, in every attempt, and those stay until its end, whatever becomes of the file
-//   no image is left, read after its release or released twice; no slab is rendered from before it is complete; credits are kept
+//   no image is left, read after its release or released twice; no padded box is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, but for one of each other client, nor of one frame with masks
 //   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is finished, as long
 //   as a worker is there all the time
@@ -46,7 +46,7 @@ namespace slabstream {
 
 // Ends of links, and names of connections: workers 0, 1, ...; clients from kClientEnds on.
 inline constexpr int kClientEnds = 1 << 20, kHostileClientEnds = kClientEnds + (1 << 10);
-inline constexpr int kCoordinatorEnd = -1, kSlabServerEnd = -2;
+inline constexpr int kCoordinatorEnd = -1, kVoxelServerEnd = -2;
 
 class Simulation : private Conditions {
  public:
@@ -104,7 +104,7 @@ class Simulation : private Conditions {
   Messages OnTheWay(const Messages& message) const;
   void FromClientNode(std::size_t client, const ClientToFrames& message);
   void AskDatasets(PeerToken client, const ClientToDatasets& message, const Bytes& payload = {});
-  SlabsToWorker AnswerOf(const ChunkRequest& request);
+  VoxelsToWorker AnswerOf(const ChunkRequest& request);
 
   // ---- Conditions
   using Conditions::Perform;
@@ -112,8 +112,8 @@ class Simulation : private Conditions {
   WorkerEvent Answer(Job& job) override;
   bool CancelsInTime() override { return random_.Chance(0.7); }
   void Perform(Node node, SendChunkRequest& action) override;
-  void Perform(Node node, const OpenSlab& action) override { workers_[node].Perform(action); }
-  void Perform(Node node, const DropSlab& action) override { workers_[node].Perform(action); }
+  void Perform(Node node, const OpenBox& action) override { workers_[node].Perform(action); }
+  void Perform(Node node, const DropBox& action) override { workers_[node].Perform(action); }
   void Perform(Node node, const ReleaseImage& action) override { workers_[node].Perform(action); }
   void Perform(Node node, const StopProcess& action) override { workers_[node].Perform(action); }
   void AfterStep(Node node) override { workers_[node].CheckCredit(); }
@@ -134,8 +134,8 @@ class Simulation : private Conditions {
   void Perform(const Note&) {}
   void Perform(const LoadDataset& action);
   void Perform(const UnloadDataset& action) { published_.erase(action.dataset); }
-  void Perform(const LookAtDataset& action);
-  void Perform(const LookAtFolders& action);
+  void Perform(const CheckDatasetFiles& action);
+  void Perform(const CheckWatchedFolders& action);
   void Perform(const FindDatasets& action);
   void Perform(const AnswerQuestion& action);
   void Perform(const BeginUpload& action);
@@ -179,7 +179,7 @@ class Simulation : private Conditions {
     std::uint64_t bytes = 0, expected = 0;
   };
   std::map<UploadId, Stored> stored_;
-  std::set<DatasetId> published_;  // by the slab server
+  std::set<DatasetId> published_;  // by the voxel server
 };
 
 }  // namespace slabstream

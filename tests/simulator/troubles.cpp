@@ -186,7 +186,7 @@ void Simulation::Cut() {
     case 0: link = {kCoordinatorEnd, worker()}; break;
     case 1: link = {worker(), worker()}; break;
     case 2: link = {kCoordinatorEnd, client}; break;
-    default: link = {kSlabServerEnd, worker()}; break;
+    default: link = {kVoxelServerEnd, worker()}; break;
   }
   if (random_.Chance(0.5)) std::swap(link.first, link.second);
   tally_.Add(Count::kCuts);

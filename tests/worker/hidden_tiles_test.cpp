@@ -103,7 +103,7 @@ TEST_F(HiddenTilesTest, ABoxThatTheyHideAsAWholeIsNeitherFetchedNorRendered) {
   assignment.display = kPeer;
   assignment.hidden = tile;
   const Actions told = Tell(assignment);
-  EXPECT_THAT(All<OpenSlab>(told), IsEmpty());
+  EXPECT_THAT(All<OpenBox>(told), IsEmpty());
   EXPECT_THAT(All<SendChunkRequest>(told), IsEmpty());
   EXPECT_THAT(All<StartRender>(told), IsEmpty());
   const auto made = All<StartCombine>(told);

@@ -55,7 +55,7 @@ class WorkerMachineTest : public testing::Test {
   }
 
   static Welcome WelcomeTo(Incarnation incarnation, Epoch epoch = kEpoch, WorkerId worker = kSelf) {
-    return {epoch, incarnation, worker, "inproc://slabs", 500, 6000};
+    return {epoch, incarnation, worker, "inproc://voxels", 500, 6000};
   }
 
   Actions Tell(WorkerEvent event) { return machine->Step(std::move(event), now); }
@@ -88,8 +88,8 @@ class WorkerMachineTest : public testing::Test {
     a.setup.sheets.height = 2;
     a.setup.termination = 0;
     for (Rank rank = 0; rank < placements.size(); ++rank) {
-      const std::int32_t slab = std::int32_t(group * 4 + rank);
-      a.group.placements.push_back({BoxId(slab), {{0, 0, slab * 64}, {128, 128, slab * 64 + 64}}, placements[rank]});
+      const std::int32_t padded = std::int32_t(group * 4 + rank);
+      a.group.placements.push_back({BoxId(padded), {{0, 0, padded * 64}, {128, 128, padded * 64 + 64}}, placements[rank]});
     }
     a.group.schedule = {"fan-in", Rank(placements.size()), 0};
     a.peers = {{kSelf, "inproc://self"}, {kPeer, "inproc://peer"}};
@@ -132,7 +132,7 @@ class WorkerMachineTest : public testing::Test {
       if (const auto* request = std::get_if<SendChunkRequest>(&actions[i])) {
         more = Tell(Answer(request->request));
       } else if (const auto* store = std::get_if<StoreChunk>(&actions[i])) {
-        more = Tell(ChunkStored{store->slab, store->chunk.box, store->chunk.chunk, {}});
+        more = Tell(ChunkStored{store->padded, store->chunk.box, store->chunk.chunk, {}});
       } else {
         others.push_back(actions[i]);
       }

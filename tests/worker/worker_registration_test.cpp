@@ -28,8 +28,8 @@ TEST_F(WorkerRegistrationTest, RegistersUntilWelcome) {
   EXPECT_THAT(Tell(WelcomeTo(999)), IsEmpty()) << "a welcome to somebody else";
   const Actions welcomed = Tell(WelcomeTo(1000));
   EXPECT_EQ(machine->worker(), kSelf);
-  ASSERT_THAT(All<ConnectSlabs>(welcomed), SizeIs(1));
-  EXPECT_EQ(All<ConnectSlabs>(welcomed)[0].endpoint, "inproc://slabs");
+  ASSERT_THAT(All<ConnectVoxels>(welcomed), SizeIs(1));
+  EXPECT_EQ(All<ConnectVoxels>(welcomed)[0].endpoint, "inproc://voxels");
   EXPECT_THAT(Sent<Heartbeat>(welcomed), SizeIs(1));
   EXPECT_THAT(Tell(WelcomeTo(1000)), IsEmpty()) << "a second copy changes nothing";
 }
@@ -149,7 +149,7 @@ TEST_F(WorkerRegistrationTest, LosingTheCoordinatorReleasesEverything) {
   const Actions lost = After(seconds(6));
   EXPECT_THAT(All<CancelRender>(lost), SizeIs(1));
   EXPECT_THAT(All<ReleaseImage>(lost), ElementsAre(testing::Field(&ReleaseImage::image, first.image)));
-  EXPECT_THAT(All<DropSlab>(lost), IsEmpty());
+  EXPECT_THAT(All<DropBox>(lost), IsEmpty());
   EXPECT_THAT(All<ReleaseImage>(Rendered(second)), SizeIs(1));
 }
 

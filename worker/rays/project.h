@@ -27,7 +27,7 @@ struct SampleBounds {
 
   std::size_t bytes() const { return (cells.capacity() + blocks.capacity()) * sizeof(float); }
 };
-SampleBounds BoundSamples(const CellRanges& cells, float sign);
+SampleBounds BoundSamples(const MacrocellRanges& cells, float sign);
 
 // How samples become values: value = clamp((sample - low) * scale, 0, 1).
 struct ValueScale {

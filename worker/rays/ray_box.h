@@ -1,7 +1,7 @@
 // RayBox: one box for the ray kernels. Neither copies nor owns.
 #pragma once
 
-#include "worker/rays/cell_ranges.h"
+#include "worker/rays/macrocell_ranges.h"
 #include "worker/rays/padded_voxels.h"
 #include "worker/rays/view_rays.h"
 
@@ -12,7 +12,7 @@ struct RayBox {
   const std::byte* samples = nullptr;  // of voxel origin - 1: PaddedVoxels::samples
   Index3 origin;                       // of the voxels' box, less 1: no sample has a floor below
   std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
-  Index3 cells;                        // CellRanges::counts
+  Index3 cells;                        // MacrocellRanges::counts
   Float3 low{}, high{};                // the box owns the positions p with low <= p < high on every axis
   RayReach reach;                      // of the positions that may matter
   bool at_border = false;              // the box touches the volume's border

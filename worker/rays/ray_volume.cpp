@@ -19,13 +19,13 @@ std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most
   return layers;
 }
 
-const std::vector<RayPiece>& RayVolume::PiecesOf(const SlabData& slab) {
+const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
   if (!pieces_.empty()) return pieces_;
-  const VoxelBricks bricks = slab.bricks();
-  for (const Box& layer : CutIntoLayers(bricks.box(), slab.widest_type(), kMostRayBytes)) {
+  const VoxelBricks bricks = data.bricks();
+  for (const Box& layer : CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes)) {
     RayPiece piece;
     piece.voxels = Pad(bricks, layer);
-    piece.cells = FindCellRanges(piece.voxels);
+    piece.cells = FindMacrocellRanges(piece.voxels);
     pieces_.push_back(std::move(piece));
   }
   return pieces_;

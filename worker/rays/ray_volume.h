@@ -1,4 +1,5 @@
-// RayVolume: the voxels of a slab as ray kernels read them. Image-order renderers share it, and it stays with the slab between frames.
+// RayVolume: the voxels of a padded box as ray kernels read them. Image-order renderers share it, and it stays with the padded box between
+// frames.
 #pragma once
 
 #include <cstddef>
@@ -7,20 +8,20 @@
 
 #include "common/view/camera.h"
 #include "worker/rays/ray_box.h"
-#include "worker/renderers/slab_data.h"
+#include "worker/renderers/box_data.h"
 
 namespace slabstream {
 
-// Kernels can address only so many bytes. A larger slab is cut into pieces along z, which are rendered like boxes of a partition.
+// Kernels can address only so many bytes. A larger padded box is cut into pieces along z, which are rendered like boxes of a partition.
 struct RayPiece {
   PaddedVoxels voxels;
-  CellRanges cells;
+  MacrocellRanges cells;
 };
 
-class RayVolume : public SlabCache {
+class RayVolume : public BoxCache {
  public:
   // Made by the first call. Parallel.
-  const std::vector<RayPiece>& PiecesOf(const SlabData& slab);
+  const std::vector<RayPiece>& PiecesOf(const BoxData& data);
 
   std::size_t bytes() const override;
 

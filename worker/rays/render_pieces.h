@@ -1,4 +1,4 @@
-// RenderPieces: the image of a box of a slab, from the pieces that kernels can address (RayPiece).
+// RenderPieces: the image of a box, from the pieces that kernels can address (RayPiece).
 #pragma once
 
 #include <span>

@@ -5,7 +5,7 @@
 
 namespace slabstream {
 
-SampleBounds BoundSamples(const CellRanges& cells, float sign) {
+SampleBounds BoundSamples(const MacrocellRanges& cells, float sign) {
   constexpr int kCellsABlock = kBlockShift - kCellShift;  // log2
   const Index3& counts = cells.counts;
   SampleBounds bounds;
@@ -15,7 +15,7 @@ SampleBounds BoundSamples(const CellRanges& cells, float sign) {
   for (Index3 cell; cell.z < counts.z; ++cell.z) {
     for (cell.y = 0; cell.y < counts.y; ++cell.y) {
       for (cell.x = 0; cell.x < counts.x; ++cell.x) {
-        const CellRange& range = cells.ranges[NumberIn(counts, cell)];
+        const MacrocellRange& range = cells.ranges[NumberIn(counts, cell)];
         const float bound = range.min > range.max ? std::numeric_limits<float>::lowest() : sign > 0 ? range.max : -range.min;
         bounds.cells.push_back(bound);
         float& block = bounds.blocks[NumberIn(bounds.block_counts, cell / (1 << kCellsABlock))];

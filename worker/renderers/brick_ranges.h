@@ -1,5 +1,5 @@
-// BrickRanges: least and greatest stored sample of each brick of a slab. With it, bricks that a transfer function does not show are skipped
-// without reading voxels.
+// BrickRanges: least and greatest stored sample of each brick of a padded box. With it, bricks that a transfer function does not show are
+// skipped without reading voxels.
 #pragma once
 
 #include <tbb/parallel_for.h>

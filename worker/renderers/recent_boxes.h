@@ -1,5 +1,6 @@
-// RecentBoxes: what a renderer made for the boxes of a slab that it used last. Boxes are limited by their voxels, not by their number: the
-// boxes of one partition never overlap, so however many there are, all are kept. Boxes that overlap come from partitions that changed.
+// RecentBoxes: what a renderer made for boxes inside a padded box that it used last. Boxes are limited by their voxels, not by their
+// number: the boxes of one partition never overlap, so however many there are, all are kept. Boxes that overlap come from partitions that
+// changed.
 #pragma once
 
 #include <algorithm>
@@ -27,12 +28,12 @@ class RecentBoxes {
     return &entries_.front().value;
   }
 
-  // Drops the boxes not used for longest until the rest, with this one, hold at most kMostSlabs times `slab_voxels`. `box` lies in the slab
-  // and is not kept yet.
-  const Value& Add(const Box& box, Value value, std::int64_t slab_voxels) {
+  // Drops the boxes not used for longest until the rest, with this one, hold at most kMostTimes times `padded_voxels`. `box` lies in the
+  // padded box and is not kept yet.
+  const Value& Add(const Box& box, Value value, std::int64_t padded_voxels) {
     entries_.push_front({box, std::move(value)});
     voxels_ += box.voxel_count();
-    while (voxels_ > kMostSlabs * slab_voxels && entries_.size() > 1) {
+    while (voxels_ > kMostTimes * padded_voxels && entries_.size() > 1) {
       voxels_ -= entries_.back().box.voxel_count();
       entries_.pop_back();
     }
@@ -47,7 +48,7 @@ class RecentBoxes {
   const std::list<Entry>& entries() const { return entries_; }  // most recently used first
 
  private:
-  static constexpr std::int64_t kMostSlabs = 4;  // partitions that frames may use in turn
+  static constexpr std::int64_t kMostTimes = 4;  // partitions that frames may use in turn
 
   std::list<Entry> entries_;
   std::int64_t voxels_ = 0;  // of all boxes

@@ -13,8 +13,8 @@
 #include "common/image/local_image.h"
 #include "common/image/occlusion_mask.h"
 #include "common/stats/report.h"
+#include "worker/renderers/box_data.h"
 #include "worker/renderers/render_control.h"
-#include "worker/renderers/slab_data.h"
 
 namespace slabstream {
 
@@ -22,11 +22,11 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  // Local image of `box` in setup.format. `slab` holds the voxels and halo (SlabBox) of the box. Pixels that `hidden` hides may be left
+  // Local image of `box` in setup.format. `data` holds the voxels and halo (PaddedBox) of the box. Pixels that `hidden` hides may be left
   // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads, without pauses. If it is cancelled
   // it stops soon and returns Cancelled; it pauses between pieces (`control`). Called within the task arena of the worker's render threads:
   // parallel algorithms of oneTBB use as many threads as the worker has.
-  virtual Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  virtual Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                                     const RenderControl& control, RankReport& report) = 0;
 };
 

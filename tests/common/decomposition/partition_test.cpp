@@ -112,9 +112,9 @@ TEST(Decompositions, ResizedBoxesAreCutAlongTheSameAxes) {
       const Partition full = entry.make(even);
       DecompositionRequest uneven = request;
       std::vector<double> heavier =
-          CellWork({size, std::vector<CellOccupancy>(std::size_t(OccupancyCells(size).x) * std::size_t(OccupancyCells(size).y) *
-                                                         std::size_t(OccupancyCells(size).z),
-                                                     CellOccupancy{.voxels = 1})});
+          MacrocellWork({size, std::vector<CellOccupancy>(std::size_t(OccupancyCells(size).x) * std::size_t(OccupancyCells(size).y) *
+                                                              std::size_t(OccupancyCells(size).z),
+                                                          CellOccupancy{.voxels = 1})});
       for (double& cell : heavier) cell *= random.Real(1, 3);
       const WorkField heavier_work(size, heavier);
       uneven.work = &heavier_work;

@@ -104,7 +104,7 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
   }
 }
 
-TEST(PlanFrame, ChoosesTheFewestGroupsWhoseSlabsStayUnderTheTarget) {
+TEST(PlanFrame, ChoosesTheFewestGroupsWhoseBoxesStayUnderTheTarget) {
   const VolumeSummary summary = FullSummary({64, 64, 1000});
   const std::int64_t slice_bytes = 64 * 64;
   const auto groups = [&](std::int64_t target_slices, int workers) {
@@ -140,7 +140,7 @@ TEST(PlanFrame, ChoosesGroupsByTheLargestBoxThatShowsSomething) {
     // Slabs across the whole volume become as thin as their halo allows, and stay too large.
     if (entry.one_axis) continue;
     for (const Placement& placement : placements) {
-      EXPECT_LE(SlabBox(placement.box, plan.setup).voxel_count(), kTarget) << entry.name;
+      EXPECT_LE(PaddedBox(placement.box, plan.setup).voxel_count(), kTarget) << entry.name;
     }
   }
 }

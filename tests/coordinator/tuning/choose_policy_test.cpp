@@ -54,13 +54,13 @@ struct Question {
   FrameRequest request = SomeRequest();
   VolumeSummary summary;
   MachineModel machine = ServiceMachine({}, {});
-  std::int64_t slab_bytes_target = kSlabBytesTarget;
+  std::int64_t box_bytes_target = kBoxBytesTarget;
   std::uint32_t slots = 1;
 
   PolicyChoice Choose(const Policy& policy) {
     request.policy = policy;
     Result<PolicyChoice> choice =
-        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .slab_bytes_target = slab_bytes_target});
+        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .box_bytes_target = box_bytes_target});
     EXPECT_TRUE(choice.ok()) << choice.status().message();
     return *choice;
   }
@@ -201,7 +201,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
                        .summary = &question.summary,
                        .slots = question.slots,
                        .machine = &question.machine,
-                       .slab_bytes_target = question.slab_bytes_target,
+                       .box_bytes_target = question.box_bytes_target,
                        .now = &now,
                        .least_gain = 0.95};
   EXPECT_EQ(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
@@ -211,7 +211,7 @@ TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
 
 TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
   Question question{.summary = FullSummary({256, 256, 256}), .slots = 2};
-  question.slab_bytes_target = 3 << 20;
+  question.box_bytes_target = 3 << 20;
   for (const DecompositionEntry& entry : Decompositions()) {
     Policy asked = Automatic();
     asked.decomposition = entry.name;
@@ -220,7 +220,7 @@ TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
     const Layout layout = MakeLayout(
         {.summary = &question.summary, .transfer = &transfer, .policy = &choice.policy, .renderer = Splatting(), .slots = question.slots});
     for (const Box& box : layout.partition.boxes()) {
-      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.slab_bytes_target)
+      EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.box_bytes_target)
           << entry.name << ", " << choice.policy.groups << " groups";
     }
   }
@@ -259,7 +259,7 @@ TEST(ChoosePolicy, TellsWhatIsWrongWithARequest) {
   EXPECT_EQ(ChoosePolicy({.frame = &question.request,
                           .summary = &question.summary,
                           .machine = &question.machine,
-                          .slab_bytes_target = question.slab_bytes_target})
+                          .box_bytes_target = question.box_bytes_target})
                 .status()
                 .code(),
             StatusCode::kNotFound);

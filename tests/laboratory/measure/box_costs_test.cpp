@@ -30,7 +30,7 @@ TEST(BoxCosts, CountsOfBoxesAddUpToThoseOfTheVolume) {
     std::uint64_t occupied = 0;
     for (std::size_t i = 0; i < costs.size(); ++i) {
       EXPECT_EQ(costs[i].box, slabs.boxes()[i]);
-      EXPECT_EQ(costs[i].voxel_bytes, std::uint64_t(SlabBox(costs[i].box, setup).voxel_count()) * sizeof(float));
+      EXPECT_EQ(costs[i].voxel_bytes, std::uint64_t(PaddedBox(costs[i].box, setup).voxel_count()) * sizeof(float));
       EXPECT_TRUE(whole[0].bounds.Contains(costs[i].bounds));
       occupied += costs[i].occupied_voxels;
     }

@@ -297,8 +297,8 @@ TEST(Isosurfaces, OpaqueOnesEndRays) {
     options.termination = kDefaultTermination;
     const FrameSetup setup = MakeSetup(half, options);
     RankReport report;
-    const auto slab = CutSlab(half, half.block.box);
-    (void)MakeRenderer(*setup.renderer)->Render(*slab, half.block.box, setup, {}, RenderControl(), report).value();
+    const auto data = CutBox(half, half.block.box);
+    (void)MakeRenderer(*setup.renderer)->Render(*data, half.block.box, setup, {}, RenderControl(), report).value();
     return double(report.drawn_voxels);
   };
   TransferFunction with_surface = options.transfer;
@@ -351,9 +351,9 @@ TEST(Isosurfaces, AreDrawnWhereBricksSaySo) {
     int left_out = 0, drawn = 0;
     for (const Box& box : partition.boxes()) {
       RankReport report;
-      const auto slab = CutSlab(volume, SlabBox(box, setup));
-      (void)MakeRenderer(*renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
-      if (bricks.AnyVisible(SlabBox(box, setup))) {
+      const auto data = CutBox(volume, PaddedBox(box, setup));
+      (void)MakeRenderer(*renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
+      if (bricks.AnyVisible(PaddedBox(box, setup))) {
         drawn += report.drawn_voxels > 0 ? 1 : 0;
       } else {
         ++left_out;

@@ -1,4 +1,4 @@
-// What renderers keep of the boxes of one slab: all boxes of a partition, and little of partitions that are gone.
+// What renderers keep of the boxes of one padded box: all boxes of a partition, and little of partitions that are gone.
 #include "worker/renderers/recent_boxes.h"
 
 #include <gtest/gtest.h>
@@ -75,12 +75,12 @@ TEST(RecentBoxes, DropsOfOverlappingBoxesTheLeastRecentlyUsed) {
 TEST(SurfaceCache, FindsNothingAnewForFortyBoxesInTurn) {
   const Volume volume = Blobs();
   const FrameSetup setup = SetupFor(volume, ZBuffer());
-  const auto slab = CutSlab(volume, volume.block.box);
-  auto& cache = slab->CacheOf<SurfaceCache>();
+  const auto data = CutBox(volume, volume.block.box);
+  auto& cache = data->CacheOf<SurfaceCache>();
   std::vector<const FaceSite*> sites;
-  for (const Box& box : FortyBoxes()) sites.push_back(cache.Of(*slab, setup, box).sites.data());
+  for (const Box& box : FortyBoxes()) sites.push_back(cache.Of(*data, setup, box).sites.data());
   std::vector<const FaceSite*> again;
-  for (const Box& box : FortyBoxes()) again.push_back(cache.Of(*slab, setup, box).sites.data());
+  for (const Box& box : FortyBoxes()) again.push_back(cache.Of(*data, setup, box).sites.data());
   EXPECT_EQ(sites, again);
   EXPECT_EQ(std::set(sites.begin(), sites.end()).size(), sites.size()) << "memory of a dropped surface was used again";
 }
@@ -88,13 +88,13 @@ TEST(SurfaceCache, FindsNothingAnewForFortyBoxesInTurn) {
 TEST(SplatCache, FindsNothingAnewForFortyBoxesAlongThreeAxes) {
   const Volume volume = Blobs();
   FrameSetup setup = SetupFor(volume, Splatting());
-  const auto slab = CutSlab(volume, volume.block.box);
-  auto& cache = slab->CacheOf<SplatCache>();
-  std::vector<const OccupiedCells*> first, again;
-  for (std::vector<const OccupiedCells*>* round : {&first, &again}) {
+  const auto data = CutBox(volume, volume.block.box);
+  auto& cache = data->CacheOf<SplatCache>();
+  std::vector<const OccupiedVoxels*> first, again;
+  for (std::vector<const OccupiedVoxels*>* round : {&first, &again}) {
     for (const Axis axis : kAxes) {
       setup.camera.traversal_axis = axis;
-      for (const Box& box : FortyBoxes()) round->push_back(&cache.Occupied(*slab, setup, box));
+      for (const Box& box : FortyBoxes()) round->push_back(&cache.Occupied(*data, setup, box));
     }
   }
   EXPECT_EQ(first, again);
@@ -105,19 +105,19 @@ TEST(SplatCache, FindsNothingAnewForFortyBoxesAlongThreeAxes) {
 TEST(SurfaceCache, FollowsAMovingBorder) {
   const Volume volume = Blobs();
   const FrameSetup setup = SetupFor(volume, ZBuffer());
-  const auto whole = CutSlab(volume, volume.block.box);
+  const auto whole = CutBox(volume, volume.block.box);
   const std::size_t empty = whole->bytes();
   const std::size_t of_whole = whole->CacheOf<SurfaceCache>().Of(*whole, setup, volume.block.box).bytes();
   for (int axis = 0; axis < 3; ++axis) {
-    const auto slab = CutSlab(volume, volume.block.box);
+    const auto data = CutBox(volume, volume.block.box);
     for (std::int32_t step = 0; step < 50; ++step) {
       const std::int32_t border = step % 2 == 0 ? 12 + step : 61 - step;
       for (const bool lower : {true, false}) {
         Box box = volume.block.box;
         (lower ? box.end : box.begin)[axis] = border;
-        const auto fresh = CutSlab(volume, volume.block.box);
-        ExpectEqual(slab->CacheOf<SurfaceCache>().Of(*slab, setup, box), fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, box));
-        EXPECT_LT(slab->bytes(), empty + 5 * of_whole) << step;
+        const auto fresh = CutBox(volume, volume.block.box);
+        ExpectEqual(data->CacheOf<SurfaceCache>().Of(*data, setup, box), fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, box));
+        EXPECT_LT(data->bytes(), empty + 5 * of_whole) << step;
       }
     }
   }
@@ -127,11 +127,11 @@ TEST(SurfaceCache, FollowsAMovingBorder) {
 TEST(SurfaceCache, ForgetsSurfacesOfOtherVoxels) {
   const Volume volume = Blobs();
   FrameSetup setup = SetupFor(volume, ZBuffer());
-  const auto slab = CutSlab(volume, volume.block.box);
-  const std::size_t faces = slab->CacheOf<SurfaceCache>().Of(*slab, setup, volume.block.box).normals.size();
+  const auto data = CutBox(volume, volume.block.box);
+  const std::size_t faces = data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box).normals.size();
   setup.transfer.opacities = {{150, 0, 0.5, 0}, {200, 1, 0.5, 0}};
-  const auto fresh = CutSlab(volume, volume.block.box);
-  const Surface& surface = slab->CacheOf<SurfaceCache>().Of(*slab, setup, volume.block.box);
+  const auto fresh = CutBox(volume, volume.block.box);
+  const Surface& surface = data->CacheOf<SurfaceCache>().Of(*data, setup, volume.block.box);
   ExpectEqual(surface, fresh->CacheOf<SurfaceCache>().Of(*fresh, setup, volume.block.box));
   EXPECT_NE(surface.normals.size(), faces);
 }

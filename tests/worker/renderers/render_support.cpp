@@ -122,24 +122,24 @@ Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random) {
   return clipping;
 }
 
-std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box) { return std::make_unique<SlabData>(CutBlock(volume.block, box)); }
+std::unique_ptr<BoxData> CutBox(const Volume& volume, const Box& box) { return std::make_unique<BoxData>(CutBlock(volume.block, box)); }
 
 Volume VolumeFor(const RendererKind& kind, Volume volume) { return kind.Can(Ability::kCells) ? AsGrid(volume) : std::move(volume); }
 
-std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
-  const Box slab_box = Grown(box, halo, volume.block.box);
-  SlabLayers layers;
+std::unique_ptr<BoxData> BoxFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo) {
+  const Box padded_box = Grown(box, halo, volume.block.box);
+  BoxLayers layers;
   if (kind.Can(Ability::kCells) && volume.cells != nullptr)
-    layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(slab_box));
-  return std::make_unique<SlabData>(CutBlock(volume.block, slab_box), std::move(layers));
+    layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(padded_box));
+  return std::make_unique<BoxData>(CutBlock(volume.block, padded_box), std::move(layers));
 }
 
 namespace {
 
 LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
-  const auto slab = SlabFor(*setup.renderer, volume, box, setup.halo);
+  const auto data = BoxFor(*setup.renderer, volume, box, setup.halo);
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
+  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
 }
 
 }  // namespace
@@ -219,9 +219,9 @@ void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& 
   std::bernoulli_distribution hidden(part);
   for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
   const LocalImage whole = RenderWhole(volume, setup);
-  const auto slab = SlabFor(*setup.renderer, volume, volume.block.box, 0);
+  const auto data = BoxFor(*setup.renderer, volume, volume.block.box, 0);
   RankReport report;
-  const LocalImage masked = MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, mask, RenderControl(), report).value();
+  const LocalImage masked = MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, mask, RenderControl(), report).value();
   for (int y = 0; y < frame.height(); ++y) {
     for (int x = 0; x < frame.width(); ++x) {
       if (!mask.Hides(x, y)) {

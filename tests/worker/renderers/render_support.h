@@ -50,18 +50,18 @@ ViewParameters RandomView(Projection projection, std::mt19937& random);
 Clipping RandomClipping(const VolumeGeometry& geometry, std::mt19937& random);
 
 // The voxels of `box`, which lies in the volume.
-std::unique_ptr<SlabData> CutSlab(const Volume& volume, const Box& box);
+std::unique_ptr<BoxData> CutBox(const Volume& volume, const Box& box);
 
 // The volume, or a grid that stands for it (AsGrid) if `kind` draws cells.
 Volume VolumeFor(const RendererKind& kind, Volume volume);
 // What `kind` renders `box` from: voxels, and the volume's cells if it draws cells.
-std::unique_ptr<SlabData> SlabFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo = kHalo);
+std::unique_ptr<BoxData> BoxFor(const RendererKind& kind, const Volume& volume, const Box& box, std::int32_t halo = kHalo);
 // The frame, of the whole volume as one box.
 LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
 // Hides each tile of the frame with probability `part`: every other pixel keeps its bits, and if all tiles are hidden
 // nothing is drawn.
 void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random);
-// Each box of the partition from its own slab, combined in visibility order.
+// Each box of the partition from its own padded box, combined in visibility order.
 LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
 // The picture, of the whole volume as one box.
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);

@@ -10,8 +10,8 @@
 namespace slabstream::mip {
 namespace {
 
-// Bounds of a slab's cells, by piece.
-class BoundsCache : public SlabCache {
+// Bounds of a padded box's cells, by piece.
+class BoundsCache : public BoxCache {
  public:
   const std::vector<SampleBounds>& Of(const std::vector<RayPiece>& pieces, float sign) {
     std::vector<SampleBounds>& bounds = by_sign_[sign > 0 ? 1 : 0];
@@ -35,16 +35,16 @@ class BoundsCache : public SlabCache {
 
 class MipRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const ProjectionMode mode = ModeOf(setup);
     // If data values fall as stored samples rise, the largest value belongs to the least sample.
     const ValueMapping& mapping = setup.description.mapping;
     const bool largest = (mode == ProjectionMode::kMaximum) == (mapping.scale >= 0);
-    const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
+    const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     const float sign = largest ? 1.0F : -1.0F;
-    const std::vector<SampleBounds>* const bounds = mode == ProjectionMode::kMean ? nullptr : &slab.CacheOf<BoundsCache>().Of(pieces, sign);
+    const std::vector<SampleBounds>* const bounds = mode == ProjectionMode::kMean ? nullptr : &data.CacheOf<BoundsCache>().Of(pieces, sign);
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);

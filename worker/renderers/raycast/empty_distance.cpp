@@ -45,7 +45,7 @@ class Sweep {
 
 }  // namespace
 
-std::vector<std::uint8_t> VisibleCells(const CellRanges& cells, const VisibleSamples& visible) {
+std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, const VisibleSamples& visible) {
   std::vector<std::uint8_t> distance(cells.ranges.size() + kEmptyDistancePadding, 255);
   for (std::size_t i = 0; i < cells.ranges.size(); ++i) {
     if (visible.AnyBetween(cells.ranges[i].min, cells.ranges[i].max)) distance[i] = 0;
@@ -53,7 +53,7 @@ std::vector<std::uint8_t> VisibleCells(const CellRanges& cells, const VisibleSam
   return distance;
 }
 
-std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible) {
+std::vector<std::uint8_t> EmptyDistances(const MacrocellRanges& cells, const VisibleSamples& visible) {
   return EmptyDistances(cells.counts, VisibleCells(cells, visible));
 }
 

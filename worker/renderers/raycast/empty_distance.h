@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "worker/rays/cell_ranges.h"
+#include "worker/rays/macrocell_ranges.h"
 #include "worker/rays/ray_look.h"
 
 namespace slabstream {
@@ -13,10 +13,10 @@ namespace slabstream {
 inline constexpr std::size_t kEmptyDistancePadding = 3;  // bytes after the last distance: kernels read four at a time
 
 // [z][y][x] and the padding; at most 255.
-std::vector<std::uint8_t> EmptyDistances(const CellRanges& cells, const VisibleSamples& visible);
+std::vector<std::uint8_t> EmptyDistances(const MacrocellRanges& cells, const VisibleSamples& visible);
 // The same where more is visible: `distance` has the padding, 0 in visible cells and 255 elsewhere.
 std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance);
 // What it begins with.
-std::vector<std::uint8_t> VisibleCells(const CellRanges& cells, const VisibleSamples& visible);
+std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, const VisibleSamples& visible);
 
 }  // namespace slabstream

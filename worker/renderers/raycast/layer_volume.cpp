@@ -4,19 +4,19 @@
 
 namespace slabstream {
 
-const std::vector<LayerPiece>& LayerVolume::PiecesOf(const SlabData& slab, std::span<const RayPiece> pieces, const LayerLooks& looks) {
+const std::vector<LayerPiece>& LayerVolume::PiecesOf(const BoxData& data, std::span<const RayPiece> pieces, const LayerLooks& looks) {
   pieces_.resize(pieces.size());
-  const auto make = [&](const std::optional<BrickedVoxels>& voxels, PaddedVoxels LayerPiece::*padded, CellRanges LayerPiece::*cells) {
-    CHECK(voxels.has_value()) << "a layer is shown that the slab does not have";
+  const auto make = [&](const std::optional<BrickedVoxels>& voxels, PaddedVoxels LayerPiece::*padded, MacrocellRanges LayerPiece::*cells) {
+    CHECK(voxels.has_value()) << "a layer is shown that the data does not have";
     for (std::size_t i = 0; i < pieces.size(); ++i) {
       LayerPiece& piece = pieces_[i];
       if ((piece.*padded).samples != nullptr) continue;
       piece.*padded = Pad(*voxels, pieces[i].voxels.box);
-      piece.*cells = FindCellRanges(piece.*padded);
+      piece.*cells = FindMacrocellRanges(piece.*padded);
     }
   };
-  if (looks.labels) make(slab.layers().labels, &LayerPiece::labels, &LayerPiece::label_cells);
-  if (looks.overlay) make(slab.layers().overlay, &LayerPiece::overlay, &LayerPiece::overlay_cells);
+  if (looks.labels) make(data.layers().labels, &LayerPiece::labels, &LayerPiece::label_cells);
+  if (looks.overlay) make(data.layers().overlay, &LayerPiece::overlay, &LayerPiece::overlay_cells);
   return pieces_;
 }
 

@@ -1,4 +1,5 @@
-// LayerVolume: the layers of a slab as the ray caster reads them, piece by piece like RayVolume. It stays with the slab between frames.
+// LayerVolume: the layers of a padded box as the ray caster reads them, piece by piece like RayVolume. It stays with the padded box between
+// frames.
 #pragma once
 
 #include <span>
@@ -13,14 +14,14 @@ namespace slabstream {
 // Empty: the layer was not needed so far.
 struct LayerPiece {
   PaddedVoxels labels, overlay;
-  CellRanges label_cells, overlay_cells;
+  MacrocellRanges label_cells, overlay_cells;
 };
 
-class LayerVolume : public SlabCache {
+class LayerVolume : public BoxCache {
  public:
-  // With the layers that `looks` shows, which the slab has; `pieces` are those of its RayVolume. Made by the first call that needs a layer.
-  // Parallel.
-  const std::vector<LayerPiece>& PiecesOf(const SlabData& slab, std::span<const RayPiece> pieces, const LayerLooks& looks);
+  // With the layers that `looks` shows, which the padded box has; `pieces` are those of its RayVolume. Made by the first call that needs a
+  // layer. Parallel.
+  const std::vector<LayerPiece>& PiecesOf(const BoxData& data, std::span<const RayPiece> pieces, const LayerLooks& looks);
 
   std::size_t bytes() const override;
 

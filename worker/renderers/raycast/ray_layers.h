@@ -1,5 +1,5 @@
-// RayLayers: the layers of one piece of a slab, and the tables by which the ray caster shows them. Neither copies nor owns. Samples are
-// padded like those of the volume (PaddedVoxels), so that a voxel has the same index in all of them.
+// RayLayers: the layers of one piece of a padded box, and the tables by which the ray caster shows them. Neither copies nor owns. Samples
+// are padded like those of the volume (PaddedVoxels), so that a voxel has the same index in all of them.
 #pragma once
 
 #include <cstddef>

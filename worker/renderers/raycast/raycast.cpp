@@ -1,7 +1,7 @@
 // The ray caster's pixel half (Levoy 1988 and 1990; as a part of a sort-last renderer, Ma et al. 1993). docs/rendering.md defines what it
 // computes.
 //
-//   1. once a slab: pad its voxels (RayVolume) and find the range of each small cell
+//   1. once a padded box: pad its voxels (RayVolume) and find the range of each small cell
 //   2. once a transfer function, and look of layers: for each cell, find the distance to the nearest visible one (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
 #include <cmath>
@@ -20,13 +20,13 @@
 namespace slabstream::raycast {
 namespace {
 
-// Of one piece of a slab.
+// Of one piece of a padded box.
 struct Visibility {
   std::vector<std::uint8_t> distances;
   SampledRegion region;  // positions in visible cells; empty if low.x > high.x
 };
 
-// What is visible of a slab: samples of the volume, and what layers add.
+// What is visible of a padded box: samples of the volume, and what layers add.
 struct VisibleValues {
   VisibleSamples volume;
   std::optional<MatterLabels> labels = {};
@@ -37,7 +37,7 @@ struct VisibleValues {
 // `layers`: of the piece; null if none is shown.
 Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers) {
   std::vector<std::uint8_t> cells_shown = VisibleCells(piece.cells, visible.volume);
-  const auto add = [&](const CellRanges& of, const auto& shown) {
+  const auto add = [&](const MacrocellRanges& of, const auto& shown) {
     for (std::size_t i = 0; i < of.ranges.size(); ++i) {
       if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) cells_shown[i] = 0;
     }
@@ -62,7 +62,7 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, con
   return result;
 }
 
-// The layers that a frame shows of a slab.
+// The layers that a frame shows of a padded box.
 struct ShownLayers {
   const std::vector<LayerPiece>* pieces = nullptr;  // null: none
   std::optional<LabelTables> labels;
@@ -86,11 +86,11 @@ struct ShownLayers {
   }
 };
 
-ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const FrameSetup& setup, double steps_per_voxel) {
+ShownLayers LayersOf(BoxData& data, std::span<const RayPiece> pieces, const FrameSetup& setup, double steps_per_voxel) {
   ShownLayers shown;
   const LayerLooks& looks = setup.looks;
   if (!looks.any()) return shown;
-  shown.pieces = &slab.CacheOf<LayerVolume>().PiecesOf(slab, pieces, looks);
+  shown.pieces = &data.CacheOf<LayerVolume>().PiecesOf(data, pieces, looks);
   if (looks.labels) shown.labels = MakeLabelTables(*looks.labels, steps_per_voxel, setup.transfer.opacity_distance);
   if (looks.overlay) {
     const VolumeDescription description{.geometry = setup.description.geometry, .type = ScalarType::kFloat32, .mapping = {}};
@@ -102,8 +102,8 @@ ShownLayers LayersOf(SlabData& slab, std::span<const RayPiece> pieces, const Fra
   return shown;
 }
 
-// The visible parts of a slab, kept until other values are visible.
-class VisibilityCache : public SlabCache {
+// The visible parts of a padded box, kept until other values are visible.
+class VisibilityCache : public BoxCache {
  public:
   // By piece.
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
@@ -134,15 +134,15 @@ class VisibilityCache : public SlabCache {
 
 class RaycastRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
-    const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
+    const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     const RayLook look =
-        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
-    const ShownLayers shown = LayersOf(slab, pieces, setup, samples_per_voxel);
-    const std::vector<Visibility>& visible = slab.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
+        MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
+    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);

@@ -1,9 +1,9 @@
 // The pixel half of multi-pass shears (Hanrahan 1990; the pipeline of Figure 4b in Yagel and Machiraju 1995). docs/rendering.md defines
 // what it computes.
 //
-//   1. once a slab: find the range of each small cube of voxels (VoxelRanges)
+//   1. once a padded box: find the range of each small cube of voxels (VoxelRanges)
 //   2. once an order of the axes: store the voxels so that beams of the first pass are contiguous (TurnedVoxels)
-//   3. once a transfer function, too: find where anything can be visible (ActiveCells)
+//   3. once a transfer function, too: find where anything can be visible (ActiveMacrocells)
 //   4. once a frame: tiles of the picture are separate tasks (ShearTile)
 #include <tbb/enumerable_thread_specific.h>
 
@@ -24,34 +24,34 @@ namespace {
 
 using AxisOrder = std::array<Axis, 3>;
 
-class ShearCache : public SlabCache {
+class ShearCache : public BoxCache {
  public:
-  const TurnedVoxels& TurnedTo(const AxisOrder& axes, const SlabData& slab) {
+  const TurnedVoxels& TurnedTo(const AxisOrder& axes, const BoxData& data) {
     if (turned_.samples == nullptr || turned_.axes != axes) {
       turned_ = {};  // first, so that there are never two
-      turned_ = Turn(slab.bricks(), axes);
+      turned_ = Turn(data.bricks(), axes);
     }
     return turned_;
   }
 
-  const ActiveCells& ActiveFor(const VisibleSamples& visible, const AxisOrder& axes, const SlabData& slab) {
-    if (!ranges_) ranges_ = FindVoxelRanges(slab.bricks());
+  const ActiveMacrocells& ActiveFor(const VisibleSamples& visible, const AxisOrder& axes, const BoxData& data) {
+    if (!ranges_) ranges_ = FindVoxelRanges(data.bricks());
     if (!active_for_ || active_for_ != std::tuple(visible, axes)) {
-      active_ = FindActiveCells(*ranges_, visible, axes);
+      active_ = FindActiveMacrocells(*ranges_, visible, axes);
       active_for_.emplace(visible, axes);
     }
     return active_;
   }
 
   std::size_t bytes() const override {
-    return turned_.bytes() + active_.active.capacity() + (ranges_ ? ranges_->ranges.capacity() * sizeof(CellRange) : 0);
+    return turned_.bytes() + active_.active.capacity() + (ranges_ ? ranges_->ranges.capacity() * sizeof(MacrocellRange) : 0);
   }
 
  private:
   TurnedVoxels turned_;
   std::optional<VoxelRanges> ranges_;
   std::optional<std::tuple<VisibleSamples, AxisOrder>> active_for_;
-  ActiveCells active_;
+  ActiveMacrocells active_;
 };
 
 ShearPasses PassesOf(const ViewRays& rays) {
@@ -90,7 +90,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const Render
 
 class ShearRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
@@ -98,15 +98,15 @@ class ShearRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, geometry, samples_per_voxel, setup.clip);
     const ShearPasses passes = PassesOf(rays);
     const RayLook look =
-        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
+        MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
     const VisibleSamples visible(look);
-    ShearCache& cache = slab.CacheOf<ShearCache>();
+    ShearCache& cache = data.CacheOf<ShearCache>();
     ShearWork work = {.rays = &rays,
                       .passes = &passes,
                       .kernel = MakeCubicKernel(Kernel(int(setup.parameters.at(kKernel)))),
                       .supersampling = SupersamplingOf(setup.parameters),
-                      .voxels = &cache.TurnedTo(passes.axes, slab),
-                      .active = &cache.ActiveFor(visible, passes.axes, slab),
+                      .voxels = &cache.TurnedTo(passes.axes, data),
+                      .active = &cache.ActiveFor(visible, passes.axes, data),
                       .look = &look,
                       .visible = &visible,
                       .hidden = &hidden,

@@ -20,7 +20,7 @@
 #include "common/image/occlusion_mask.h"
 #include "worker/rays/ray_look.h"
 #include "worker/rays/view_rays.h"
-#include "worker/renderers/shear/active_cells.h"
+#include "worker/renderers/shear/active_macrocells.h"
 #include "worker/renderers/shear/cubic_kernel.h"
 #include "worker/renderers/shear/shear_passes.h"
 #include "worker/renderers/shear/turned_voxels.h"
@@ -36,7 +36,7 @@ struct ShearWork {
   CubicKernel kernel;
   int supersampling = 1;  // beams, and slices, for each of the volume
   const TurnedVoxels* voxels = nullptr;
-  const ActiveCells* active = nullptr;
+  const ActiveMacrocells* active = nullptr;
   const RayLook* look = nullptr;
   const VisibleSamples* visible = nullptr;
   Float3 low{}, high{};                   // the box owns the positions p with low <= p < high on every axis of the volume

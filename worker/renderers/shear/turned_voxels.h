@@ -1,5 +1,5 @@
-// TurnedVoxels: the samples of a slab in the order in which passes read them, so that every beam of the first pass is contiguous. The axes
-// are those of ShearPasses.
+// TurnedVoxels: the samples of a padded box in the order in which passes read them, so that every beam of the first pass is contiguous. The
+// axes are those of ShearPasses.
 #pragma once
 
 #include <algorithm>

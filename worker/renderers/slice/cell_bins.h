@@ -55,7 +55,7 @@ class CellBins {
   // The part of a tile that lies in `pixels`.
   PixelBounds TileAt(std::int32_t tile) const;
   // Its cells, in ascending order.
-  std::span<const Entry> CellsOf(std::int32_t tile) const {
+  std::span<const Entry> VoxelsOf(std::int32_t tile) const {
     return std::span(entries_).subspan(first_[std::size_t(tile)], first_[std::size_t(tile) + 1] - first_[std::size_t(tile)]);
   }
 

@@ -18,7 +18,7 @@
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "worker/rays/view_rays.h"
-#include "worker/renderers/slab_data.h"
+#include "worker/renderers/box_data.h"
 
 namespace slabstream::slice {
 
@@ -33,8 +33,8 @@ struct alignas(32) PointBounds {
   float begin[4], end[4];  // x, y, k; end[3]: 1 if the point does not lie before the eye, else 0
 };
 
-// The points of a slab's cells. Their memory stays with the slab, since taking it anew costs more than finding the points.
-class FramePoints : public SlabCache {
+// The points of a padded box's cells. Their memory stays with the padded box, since taking it anew costs more than finding the points.
+class FramePoints : public BoxCache {
  public:
   AlignedVector<FramePoint> points;
   AlignedVector<PointBounds> bounds;

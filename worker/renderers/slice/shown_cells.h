@@ -1,4 +1,4 @@
-// ShownCells: the tetrahedra of a slab of which anything may be visible. Kept until other values are visible.
+// ShownCells: the tetrahedra of a padded box of which anything may be visible. Kept until other values are visible.
 #pragma once
 
 #include <cstddef>
@@ -10,13 +10,13 @@
 #include "common/mesh/mesh.h"
 #include "common/volume/summary.h"
 #include "worker/rays/ray_look.h"
-#include "worker/renderers/slab_data.h"
+#include "worker/renderers/box_data.h"
 
 namespace slabstream::slice {
 
-class ShownCells : public SlabCache {
+class ShownCells : public BoxCache {
  public:
-  // Numbers of tetrahedra, ascending. Those with a value that is not finite are not among them. `mesh` is the slab's. Parallel.
+  // Numbers of tetrahedra, ascending. Those with a value that is not finite are not among them. `mesh` is the padded box's. Parallel.
   std::span<const std::uint32_t> Of(const Mesh& mesh, const VisibleSamples& visible);
 
   std::size_t bytes() const override { return ranges_.capacity() * sizeof(ranges_[0]) + shown_.capacity() * sizeof(shown_[0]); }

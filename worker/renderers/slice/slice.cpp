@@ -34,18 +34,18 @@ RayReach SetBox(const Box& box, SliceWork& work) {
 
 class SliceRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
-    if (slab.layers().cells == nullptr) {
+    if (data.layers().cells == nullptr) {
       return Status::InvalidArgument("renderer slice draws the cells of unstructured grids, but the dataset has none");
     }
     StageClock clock(report);
-    const Mesh& mesh = *slab.layers().cells;
+    const Mesh& mesh = *data.layers().cells;
     const double planes_per_voxel = setup.parameters.at(0);
     const VolumeGeometry& geometry = setup.description.geometry;
     const RayLook look =
-        MakeRayLook(slab.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
-    const std::span<const std::uint32_t> shown = slab.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
+        MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
+    const std::span<const std::uint32_t> shown = data.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
     clock.Charge(Stage::kPrepare);
     if (shown.empty()) {
       clock.Finish(Stage::kRender, control);
@@ -55,7 +55,7 @@ class SliceRenderer : public Renderer {
     const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
     SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
     const RayReach reach = SetBox(box, work);
-    FramePoints& points = slab.CacheOf<FramePoints>();
+    FramePoints& points = data.CacheOf<FramePoints>();
     space.Place(mesh.points, points);
     work.points = &points;
     const Result<CellBins> bins = CellBins::Make(points.bounds, mesh.tetrahedra, shown, reach.pixels, reach.begin, reach.end,
@@ -79,7 +79,7 @@ class SliceRenderer : public Renderer {
     std::atomic<std::uint64_t> drawn = 0;
     tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
     ForEachTile(bins.tiles(), control, report, [&](std::int32_t number) {
-      const std::span<const CellBins::Entry> cells = bins.CellsOf(number);
+      const std::span<const CellBins::Entry> cells = bins.VoxelsOf(number);
       if (cells.empty()) return;
       const PixelBounds tile = bins.TileAt(number);
       const std::size_t pixel = std::size_t(tile.y_begin - image.bounds.y_begin) * width + std::size_t(tile.x_begin - image.bounds.x_begin);

@@ -24,7 +24,7 @@ namespace slabstream::slice {
 inline constexpr std::size_t kTilePixels = std::size_t(kTileWidth) * kTileHeight, kRowPadding = 16;  // kernels may rewrite what lies behind
 
 // A cell that reaches into the chunk.
-struct ActiveCell {
+struct ActiveMacrocell {
   CellShape shape;
   std::int32_t k_begin, k_end;  // planes that it may reach into
   std::int32_t y_begin, y_end;  // rows of the tile
@@ -44,7 +44,7 @@ struct TileRoom {
   alignas(64) float values[kChunkPlanes * kTilePixels + kRowPadding];  // [plane][y][x], NaN: no cell
   std::vector<std::size_t> chunk_first;                                // of `ordered`, by chunk
   std::vector<std::uint32_t> ordered;                                  // the tile's cells
-  std::vector<ActiveCell> cells;                                       // rooms of active cells
+  std::vector<ActiveMacrocell> cells;                                  // rooms of active cells
   std::vector<std::uint32_t> active, vacant;                           // of `cells`
 };
 
@@ -123,7 +123,7 @@ HWY_INLINE void CutRows(const CellShape& shape, const Lanes& lanes, Doubles y, h
 
 // Writes the values of a cell's samples in the chunk's planes [k_begin, k_end). Rows or planes are taken to lanes, whichever needs fewer
 // vectors; every sample has the same bits either way.
-HWY_NOINLINE void CutCell(const ActiveCell& cell, const Chunk& chunk, std::int32_t k_begin, std::int32_t k_end) {
+HWY_NOINLINE void CutCell(const ActiveMacrocell& cell, const Chunk& chunk, std::int32_t k_begin, std::int32_t k_end) {
   const DoubleTag dd;
   const CellShape& shape = cell.shape;
   const std::int32_t planes = k_end - k_begin, rows = cell.y_end - cell.y_begin;
@@ -306,7 +306,7 @@ HWY_NOINLINE void Activate(const SliceWork& work, std::uint32_t cell, std::int32
     room.vacant.push_back(std::uint32_t(room.cells.size()));
     room.cells.emplace_back();
   }
-  ActiveCell& active = room.cells[room.vacant.back()];
+  ActiveMacrocell& active = room.cells[room.vacant.back()];
   if (!MakeCellShape(points, values, x0, work.space->perspective() && mesh.at == ValuesAt::kPoints, active.shape)) return;
   active.k_begin = std::max(bounds.k_begin, work.k_begin);
   active.k_end = std::min(bounds.k_end, work.k_end);
@@ -366,7 +366,7 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     }
     std::size_t kept = 0;
     for (const std::uint32_t place : room.active) {
-      const ActiveCell& cell = room.cells[place];
+      const ActiveMacrocell& cell = room.cells[place];
       CutCell(cell, planes, std::max(cell.k_begin, k_begin), std::min(cell.k_end, k_end));
       if (cell.k_end > k_end) {
         room.active[kept++] = place;

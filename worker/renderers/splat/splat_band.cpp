@@ -170,7 +170,7 @@ void SplatBand::FindNeeded(const SliceSamples& slice) {
 }
 
 void SplatBand::FindOctets(std::int32_t beam) {
-  const OccupiedCells& cells = pass_.cells;
+  const OccupiedVoxels& cells = pass_.cells;
   const std::size_t number = cells.Beam(slice_, beam);
   const std::int32_t cell_count = pass_.octet_count / kCellOctets;
   // Cells of the occupied box: there is nothing before them.
@@ -206,7 +206,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
 
 // Beams of a slice are contiguous in memory; those of the next slice are elsewhere.
 void SplatBand::PrefetchCells(std::int32_t slice, std::int32_t beam) const {
-  const OccupiedCells& cells = pass_.cells;
+  const OccupiedVoxels& cells = pass_.cells;
   if (slice < cells.occupied.begin[cells.axes.c] || slice >= cells.occupied.end[cells.axes.c]) return;
   const std::size_t number = cells.Beam(slice, beam);
   __builtin_prefetch(&cells.first_record[number]);

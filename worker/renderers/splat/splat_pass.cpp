@@ -4,9 +4,9 @@
 
 namespace slabstream {
 
-SplatPass::SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
+SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
                      const OcclusionMask& hidden_tiles)
-    : cells(occupied_cells),
+    : cells(occupied_voxels),
       setup(frame_setup),
       hidden(hidden_tiles),
       clip(frame_setup),

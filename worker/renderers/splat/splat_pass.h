@@ -7,7 +7,7 @@
 
 #include "common/image/occlusion_mask.h"
 #include "worker/kernels/segment_set.h"
-#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/occupied_voxels.h"
 #include "worker/renderers/splat/sheet_opacity.h"
 #include "worker/renderers/splat/slice_clip.h"
 #include "worker/renderers/splat/slice_samples.h"
@@ -15,7 +15,7 @@
 namespace slabstream {
 
 struct SplatPass {
-  SplatPass(const OccupiedCells& occupied_cells, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
+  SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
             const OcclusionMask& hidden_tiles);
 
   const SliceSamples& Slice(std::int32_t k) const { return slices[std::size_t(k - cells.occupied.begin[cells.axes.c])]; }
@@ -24,7 +24,7 @@ struct SplatPass {
     return &reached[std::size_t(k - cells.occupied.begin[cells.axes.c]) * std::size_t(octet_count)];
   }
 
-  const OccupiedCells& cells;
+  const OccupiedVoxels& cells;
   const FrameSetup& setup;
   const OcclusionMask& hidden;
   SliceClip clip;

@@ -31,11 +31,11 @@ void AddTo(RankReport& sum, const RankReport& part) {
 
 class SplattingRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
-    const ClassificationTable& table = slab.Classification(setup);
-    const OccupiedCells& cells = slab.CacheOf<SplatCache>().Occupied(slab, setup, box);
+    const ClassificationTable& table = data.Classification(setup);
+    const OccupiedVoxels& cells = data.CacheOf<SplatCache>().Occupied(data, setup, box);
     report.occupied_voxels += cells.occupied_in_box;
     clock.Charge(Stage::kPrepare);
     LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});

@@ -1,4 +1,4 @@
-// TurnCellBeams: transposes masks 32 x 32 voxels at a time and distributes records to their beams. Slices of one z go to beams of their
+// TurnVoxelBeams: transposes masks 32 x 32 voxels at a time and distributes records to their beams. Slices of one z go to beams of their
 // own, so they are the tasks.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/base/check.h"
-#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/occupied_voxels.h"
 
 namespace slabstream {
 namespace {
@@ -31,7 +31,7 @@ void Transpose(Block& block) {
   }
 }
 
-void TurnMasks(const CellBeams& from, std::int32_t z, CellBeams& to) {
+void TurnMasks(const VoxelBeams& from, std::int32_t z, VoxelBeams& to) {
   const Box& box = from.box;
   const std::size_t z_beams = std::size_t(z - box.begin.z) * from.Stride(Axis::kZ);
   for (std::int32_t y_cell = 0; y_cell < to.cell_count; ++y_cell) {
@@ -55,7 +55,7 @@ void TurnMasks(const CellBeams& from, std::int32_t z, CellBeams& to) {
   }
 }
 
-void TurnRecords(const CellBeams& from, std::int32_t z, CellBeams& to) {
+void TurnRecords(const VoxelBeams& from, std::int32_t z, VoxelBeams& to) {
   const Box& box = from.box;
   std::vector<VoxelRecord*> next(std::size_t(box.size().x));  // next record of the beam of each x
   for (std::size_t x = 0; x < next.size(); ++x) {
@@ -76,9 +76,9 @@ void TurnRecords(const CellBeams& from, std::int32_t z, CellBeams& to) {
 
 }  // namespace
 
-CellBeams TurnCellBeams(const CellBeams& along_x) {
+VoxelBeams TurnVoxelBeams(const VoxelBeams& along_x) {
   CHECK(along_x.u == Axis::kX && along_x.inner == Axis::kY);
-  CellBeams turned;
+  VoxelBeams turned;
   turned.u = Axis::kY;
   turned.inner = Axis::kZ;
   const Box& box = turned.box = along_x.box;

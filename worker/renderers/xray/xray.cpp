@@ -11,10 +11,10 @@ namespace {
 
 class XrayRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
-    const std::vector<RayPiece>& pieces = slab.CacheOf<RayVolume>().PiecesOf(slab);
+    const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     clock.Charge(Stage::kPrepare);
 
     const VolumeDescription& volume = setup.description;

@@ -25,16 +25,16 @@ std::size_t PlaceIn(const KeyBand& band, std::int32_t x, std::int32_t y) {
 
 }  // namespace
 
-CutFaces::CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels)
+CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels)
     : region_(setup.clip),
       rays_(setup.clip, setup.camera, box),
-      voxels_(slab.voxels()),
+      voxels_(data.voxels()),
       box_(box),
       keep_(setup.clip.mode == ClipMode::kKeep),
       slack_(kSlack * Least(setup.description.geometry.spacing)),
       margin_(kMargin * Least(setup.description.geometry.spacing)),
       least_depth_(keep_ ? rays_.least_enter() : rays_.least_leave()),
-      table_(slab.Classification(setup)),
+      table_(data.Classification(setup)),
       opaque_(opaque),
       labels_(labels),
       bricks_(CubesOver(setup.description.geometry.size, kFaceBrick)) {

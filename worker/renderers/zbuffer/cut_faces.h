@@ -17,7 +17,7 @@
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
 #include "worker/renderers/bin_lookup.h"
-#include "worker/renderers/slab_data.h"
+#include "worker/renderers/box_data.h"
 #include "worker/renderers/zbuffer/clip_rays.h"
 #include "worker/renderers/zbuffer/shown_labels.h"
 
@@ -34,9 +34,9 @@ struct CutPixel {
 
 class CutFaces {
  public:
-  // `box`: no other voxels are drawn. `opaque`: the bins of opaque voxels, by the slab's table. `labels`: null if they are not shown. All
-  // must outlive this. The setup's clip region is not empty.
-  CutFaces(SlabData& slab, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
+  // `box`: no other voxels are drawn. `opaque`: the bins of opaque voxels, by the padded box's table. `labels`: null if they are not shown.
+  // All must outlive this. The setup's clip region is not empty.
+  CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const BinSelection& opaque, const ShownLabels* labels);
 
   // Pixels outside see nothing of the box that lies in the clip region.
   const PixelBounds& bounds() const { return rays_.bounds(); }

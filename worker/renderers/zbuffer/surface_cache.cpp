@@ -7,32 +7,32 @@
 
 namespace slabstream {
 
-void SurfaceCache::ShowLabels(const SlabData& slab, const LayerLooks& looks) {
+void SurfaceCache::ShowLabels(const BoxData& data, const LayerLooks& looks) {
   std::optional<ShownLabels> labels;
   if (looks.labels) {
-    CHECK(slab.layers().labels.has_value()) << "labels are shown that the slab does not have";
-    labels = {&*slab.layers().labels, UsesOf(*looks.labels)};
-    if (!label_ranges_) label_ranges_.emplace(*slab.layers().labels);
+    CHECK(data.layers().labels.has_value()) << "labels are shown that the data does not have";
+    labels = {&*data.layers().labels, UsesOf(*looks.labels)};
+    if (!label_ranges_) label_ranges_.emplace(*data.layers().labels);
   }
   if (labels.has_value() == labels_.has_value() && (!labels || labels->uses == labels_->uses)) return;
   surfaces_.Clear();
   labels_ = std::move(labels);
 }
 
-const Surface& SurfaceCache::Of(SlabData& slab, const FrameSetup& setup, const Box& box) {
-  const ClassificationTable& table = slab.Classification(setup);
+const Surface& SurfaceCache::Of(BoxData& data, const FrameSetup& setup, const Box& box) {
+  const ClassificationTable& table = data.Classification(setup);
   if (BinSelection bins = SelectBins(table, 0); bins != opaque_bins_) {
     surfaces_.Clear();
     opaque_bins_ = std::move(bins);
   }
-  ShowLabels(slab, setup.looks);
+  ShowLabels(data, setup.looks);
   if (const Surface* kept = surfaces_.Find(box)) return *kept;
   std::vector<KnownSurface> known;
   for (const auto& [other, surface] : surfaces_.entries()) {
     if (!Intersection(other, box).empty()) known.push_back({other, &surface});
   }
-  const BrickRanges& ranges = slab.ranges();  // first: bricks are read faster than the block
-  const VoxelBlock& voxels = slab.voxels();
+  const BrickRanges& ranges = data.ranges();  // first: bricks are read faster than the block
+  const VoxelBlock& voxels = data.voxels();
   const OpaqueVoxels opaque = {table, opaque_bins_, ranges, labels(), label_ranges_ ? &*label_ranges_ : nullptr};
   return surfaces_.Add(box, FindSurface(voxels, opaque, setup.description.geometry.spacing, box, known), voxels.box.voxel_count());
 }

@@ -1,4 +1,4 @@
-// SurfaceCache: the surfaces of a slab's boxes. The Z-buffer keeps them between frames until the transfer function makes other voxels
+// SurfaceCache: the surfaces of a padded box's boxes. The Z-buffer keeps them between frames until the transfer function makes other voxels
 // opaque, or labels are shown in another way.
 #pragma once
 
@@ -6,16 +6,16 @@
 
 #include <optional>
 
+#include "worker/renderers/box_data.h"
 #include "worker/renderers/recent_boxes.h"
-#include "worker/renderers/slab_data.h"
 #include "worker/renderers/zbuffer/surface.h"
 
 namespace slabstream {
 
-class SurfaceCache : public SlabCache {
+class SurfaceCache : public BoxCache {
  public:
-  // Faces of the opaque voxels of `box`, which lies in the slab. Valid until the next call.
-  const Surface& Of(SlabData& slab, const FrameSetup& setup, const Box& box);
+  // Faces of the opaque voxels of `box`, which lies in the padded box. Valid until the next call.
+  const Surface& Of(BoxData& data, const FrameSetup& setup, const Box& box);
   // Of the voxels that were opaque at the last call; valid until the next one.
   const BinSelection& opaque_bins() const { return opaque_bins_; }
   const ShownLabels* labels() const { return labels_ ? &*labels_ : nullptr; }  // null: they are not shown
@@ -23,7 +23,7 @@ class SurfaceCache : public SlabCache {
   std::size_t bytes() const override;
 
  private:
-  void ShowLabels(const SlabData& slab, const LayerLooks& looks);
+  void ShowLabels(const BoxData& data, const LayerLooks& looks);
 
   BinSelection opaque_bins_;
   std::optional<ShownLabels> labels_;

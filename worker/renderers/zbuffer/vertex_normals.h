@@ -5,7 +5,7 @@
 // hard-edged surface, so these do not show as streaks.
 //
 // Single precision without fused operations; each vertex uses samples at most two voxels from the cells that share it. So the bits are the
-// same in every slab that holds these samples.
+// same in every padded box that holds these samples.
 #pragma once
 
 #include <array>

@@ -169,16 +169,16 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
 
 class ZBufferRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(SlabData& slab, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
+  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
-    const ClassificationTable& table = slab.Classification(setup);
-    auto& cache = slab.CacheOf<SurfaceCache>();
-    const Surface& surface = cache.Of(slab, setup, box);
+    const ClassificationTable& table = data.Classification(setup);
+    auto& cache = data.CacheOf<SurfaceCache>();
+    const Surface& surface = cache.Of(data, setup, box);
     std::optional<CutFaces> cuts;
     // Cuts lie in opaque voxels; without these there are no faces either.
     if (!setup.clip.empty() && !surface.opaque_hull.empty()) {
-      cuts.emplace(slab, setup, surface.opaque_hull, cache.opaque_bins(), cache.labels());
+      cuts.emplace(data, setup, surface.opaque_hull, cache.opaque_bins(), cache.labels());
     }
     clock.Charge(Stage::kPrepare);
 

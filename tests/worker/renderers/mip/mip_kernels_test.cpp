@@ -21,7 +21,7 @@ struct Scene {
       : camera(view),
         rays(MakeViewRays(camera, volume.description.geometry, rate, clip)),
         padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
-        cells(FindCellRanges(padded)),
+        cells(FindMacrocellRanges(padded)),
         ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)),
         bounds(BoundSamples(cells, mode == Mode::kMinimum ? -1 : 1)) {
     work = {.rays = &rays, .box = &ray_box, .values = {10, 1.0F / 180}};
@@ -39,7 +39,7 @@ struct Scene {
   Camera camera;
   ViewRays rays;
   PaddedVoxels padded;
-  CellRanges cells;
+  MacrocellRanges cells;
   RayBox ray_box;
   SampleBounds bounds;
   ProjectWork work;

@@ -26,11 +26,11 @@ const VolumeGeometry kGeometry = {{24, 20, 22}, {1, 1, 1}, {}};
 
 std::shared_ptr<const Volume> Shared(Volume volume) { return std::make_shared<const Volume>(std::move(volume)); }
 
-std::unique_ptr<SlabData> CutLayered(const LayeredVolume& volume, const Box& box) {
-  SlabLayers layers;
+std::unique_ptr<BoxData> CutLayered(const LayeredVolume& volume, const Box& box) {
+  BoxLayers layers;
   if (volume.layers.labels != nullptr) layers.labels.emplace(CutBlock(volume.layers.labels->block, box));
   if (volume.layers.overlay != nullptr) layers.overlay.emplace(CutBlock(volume.layers.overlay->block, box));
-  return std::make_unique<SlabData>(CutBlock(volume.volume->block, box), std::move(layers));
+  return std::make_unique<BoxData>(CutBlock(volume.volume->block, box), std::move(layers));
 }
 
 FrameSetup LayeredSetup(const LayeredVolume& volume, SetupOptions options, LayerLooks looks) {
@@ -43,9 +43,9 @@ FrameSetup LayeredSetup(const LayeredVolume& volume, SetupOptions options, Layer
 }
 
 LocalImage Rendered(const LayeredVolume& volume, const FrameSetup& setup, const Box& box) {
-  const auto slab = CutLayered(volume, SlabBox(box, setup));
+  const auto data = CutLayered(volume, PaddedBox(box, setup));
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
+  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
 }
 LocalImage Rendered(const LayeredVolume& volume, const FrameSetup& setup) {
   return Rendered(volume, setup, volume.volume->description.geometry.bounds());
@@ -170,7 +170,7 @@ TEST(Labels, TintMixesColours) {
   for (const Rgb& color : ColorsOf(image)) EXPECT_TRUE(IsNear(color, {0.25F, 0, 0.75F}));
 }
 
-// The surface of a slab of a label at right angles to the view is lit as one: its normal looks at the viewer everywhere.
+// The surface of a padded box of a label at right angles to the view is lit as one: its normal looks at the viewer everywhere.
 TEST(Labels, NormalsOfAPlaneAreThoseOfThePlane) {
   LayeredVolume volume{.volume = Shared(MakeVolume(kGeometry, ScalarType::kUint8, [](const Index3&) { return 0; }))};
   volume.layers.labels = Shared(MakeVolume(kGeometry, ScalarType::kUint8, [](const Index3& v) { return v.y >= 8 ? 1 : 0; }));
@@ -288,13 +288,13 @@ TEST(Layers, AgreeWithTheReference) {
     const double rate = i % 4 == 1 ? 2.5 : 1;
     const Volume& volume = *c.volume.volume;
     const ViewRays rays = MakeViewRays(c.setup.camera, volume.description.geometry, rate, c.setup.clip);
-    const auto slab = CutLayered(c.volume, volume.block.box);
+    const auto data = CutLayered(c.volume, volume.block.box);
     RayVolume ray_volume;
     LayerVolume layer_volume;
-    const auto& pieces = ray_volume.PiecesOf(*slab);
-    const auto& layer_pieces = layer_volume.PiecesOf(*slab, pieces, c.setup.looks);
+    const auto& pieces = ray_volume.PiecesOf(*data);
+    const auto& layer_pieces = layer_volume.PiecesOf(*data, pieces, c.setup.looks);
     const RayLook look =
-        MakeRayLook(slab->Classification(c.setup), c.setup.transfer, c.setup.description, c.setup.camera, c.setup.shading, rate);
+        MakeRayLook(data->Classification(c.setup), c.setup.transfer, c.setup.description, c.setup.camera, c.setup.shading, rate);
     RayLayers layers;
     std::optional<LabelTables> tables;
     std::optional<RayLook> overlay;

@@ -22,7 +22,7 @@ struct Scene {
       : camera(setup.camera),
         rays(MakeViewRays(camera, volume.description.geometry, rate, setup.clip)),
         padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
-        cells(FindCellRanges(padded)),
+        cells(FindMacrocellRanges(padded)),
         look(MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description, camera, setup.shading,
                          rate)),
         distances(EmptyDistances(cells, VisibleSamples(look))),
@@ -33,7 +33,7 @@ struct Scene {
   Camera camera;
   ViewRays rays;
   PaddedVoxels padded;
-  CellRanges cells;
+  MacrocellRanges cells;
   RayLook look;
   std::vector<std::uint8_t> distances;
   RayBox ray_box;

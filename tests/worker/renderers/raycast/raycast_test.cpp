@@ -1,4 +1,4 @@
-// The ray caster as a renderer: analytic truth, what may be hidden or left out, and slabs that are rendered in pieces.
+// The ray caster as a renderer: analytic truth, what may be hidden or left out, and padded boxes that are rendered in pieces.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -93,16 +93,16 @@ TEST(Raycast, BoxesWithoutDrawnVoxelsShowNothing) {
   const Partition partition = CutIntoSlabs(volume, 16, Axis::kX);
   int left_out = 0;
   for (const Box& box : partition.boxes()) {
-    if (bricks.AnyVisible(SlabBox(box, setup))) continue;
+    if (bricks.AnyVisible(PaddedBox(box, setup))) continue;
     ++left_out;
     RankReport report;
-    const auto slab = CutSlab(volume, SlabBox(box, setup));
-    (void)MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
+    const auto data = CutBox(volume, PaddedBox(box, setup));
+    (void)MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
     EXPECT_EQ(report.drawn_voxels, 0U);
   }
   RankReport report;
-  const auto slab = CutSlab(volume, volume.block.box);
-  (void)MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, {}, RenderControl(), report).value();
+  const auto data = CutBox(volume, volume.block.box);
+  (void)MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, RenderControl(), report).value();
   EXPECT_GT(report.drawn_voxels, 0U);
   EXPECT_LT(left_out, 16);
 }

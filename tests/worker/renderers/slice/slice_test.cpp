@@ -521,7 +521,7 @@ TEST(Slice, TilesOfCellsAreLimited) {
   const Result<slice::CellBins> bins = make(slice::CellBins::kMostEntries);
   ASSERT_EQ(bins.status(), Status::Ok());
   std::size_t entries = 0;
-  for (std::int32_t tile = 0; tile < bins->tiles(); ++tile) entries += bins->CellsOf(tile).size();
+  for (std::int32_t tile = 0; tile < bins->tiles(); ++tile) entries += bins->VoxelsOf(tile).size();
   EXPECT_GE(entries, cells.size());
   EXPECT_EQ(make(entries).status(), Status::Ok());
   EXPECT_EQ(make(entries - 1).status().code(), StatusCode::kInvalidArgument);
@@ -583,9 +583,9 @@ TEST(Slice, DrawsBadCellsWithoutHarm) {
 TEST(Slice, RefusesDatasetsWithoutCells) {
   const Volume volume = MakeBlock({{9, 8, 7}, {1, 1, 1}});
   const FrameSetup setup = SliceSetup(volume, {});
-  const auto slab = SlabFor(*setup.renderer, volume, volume.block.box);
+  const auto data = BoxFor(*setup.renderer, volume, volume.block.box);
   RankReport report;
-  const auto result = MakeRenderer(*setup.renderer)->Render(*slab, volume.block.box, setup, {}, RenderControl(), report);
+  const auto result = MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, RenderControl(), report);
   EXPECT_EQ(result.status().code(), StatusCode::kInvalidArgument);
 }
 

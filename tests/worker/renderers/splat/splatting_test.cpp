@@ -165,9 +165,9 @@ TEST(Splatting, TerminationSkipsVoxelsBehindAnOpaqueFront) {
   options.size = {256, 256};
   options.termination = 1.0 / 1024;
   const FrameSetup setup = MakeSetup(block, options);
-  const auto slab = CutSlab(block, block.block.box);
+  const auto data = CutBox(block, block.block.box);
   RankReport report;
-  ASSERT_TRUE(MakeRenderer(*Splatting())->Render(*slab, block.block.box, setup, {}, RenderControl(), report).ok());
+  ASSERT_TRUE(MakeRenderer(*Splatting())->Render(*data, block.block.box, setup, {}, RenderControl(), report).ok());
   EXPECT_EQ(report.occupied_voxels, 48U * 48 * 48);
   EXPECT_LT(report.drawn_voxels, report.occupied_voxels / 2);
 }

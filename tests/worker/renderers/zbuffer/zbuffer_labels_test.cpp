@@ -19,10 +19,10 @@ struct Labelled {
   Volume volume, labels;
 };
 
-std::unique_ptr<SlabData> CutLabelled(const Labelled& data, const Box& box) {
-  SlabLayers layers;
+std::unique_ptr<BoxData> CutLabelled(const Labelled& data, const Box& box) {
+  BoxLayers layers;
   layers.labels.emplace(CutBlock(data.labels.block, box));
-  return std::make_unique<SlabData>(CutBlock(data.volume.block, box), std::move(layers));
+  return std::make_unique<BoxData>(CutBlock(data.volume.block, box), std::move(layers));
 }
 
 FrameSetup LabelledSetup(const Labelled& data, SetupOptions options, std::optional<LabelLook> look) {
@@ -34,7 +34,7 @@ FrameSetup LabelledSetup(const Labelled& data, SetupOptions options, std::option
 }
 
 LocalImage Rendered(const Labelled& data, const FrameSetup& setup, const Box& box) {
-  const auto slab = CutLabelled(data, SlabBox(box, setup));
+  const auto slab = CutLabelled(data, PaddedBox(box, setup));
   RankReport report;
   return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
 }
@@ -176,7 +176,7 @@ TEST(ZBufferLabels, SurfacesHaveTheNormalsOfTheirBorder) {
   }
 }
 
-TEST(ZBufferLabels, ASlabFollowsTheLook) {
+TEST(ZBufferLabels, ABoxFollowsTheLook) {
   const Labelled data = Block();
   const auto slab = CutLabelled(data, data.volume.block.box);
   const auto renderer = MakeRenderer(*ZBuffer());

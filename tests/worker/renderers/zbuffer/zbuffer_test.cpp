@@ -143,9 +143,9 @@ TEST(ZBuffer, DrawsVoxelsFromHalfTheLargestOpacityOn) {
   SetupOptions options = Options(Projection::kOrthographic, 3);
   options.transfer.opacities = {{0, 0, 0.5, 0}, {50, 0.2, 0.5, 0}, {100, 0.5, 0.5, 0}, {101, 1, 0.5, 0}};  // 101 does not occur
   const FrameSetup setup = MakeSetup(volume, options);
-  const auto slab = CutSlab(volume, volume.block.box);
+  const auto data = CutBox(volume, volume.block.box);
   RankReport report;
-  const LocalImage image = MakeRenderer(*ZBuffer())->Render(*slab, volume.block.box, setup, {}, RenderControl(), report).value();
+  const LocalImage image = MakeRenderer(*ZBuffer())->Render(*data, volume.block.box, setup, {}, RenderControl(), report).value();
   for (std::size_t i = 0; i < image.depth.size(); ++i) {
     if (std::isfinite(image.depth[i])) {
       EXPECT_GE(image.voxel[i] % 8 * 2, 4U);  // FaceIndex ends with x / 2

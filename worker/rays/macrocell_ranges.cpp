@@ -1,4 +1,4 @@
-#include "worker/rays/cell_ranges.h"
+#include "worker/rays/macrocell_ranges.h"
 
 #include <tbb/parallel_for.h>
 
@@ -33,7 +33,7 @@ class ColumnRanges {
       }
     }
   }
-  CellRange Of(std::size_t begin, std::size_t end) const {
+  MacrocellRange Of(std::size_t begin, std::size_t end) const {
     return {float(*std::min_element(low_.begin() + std::ptrdiff_t(begin), low_.begin() + std::ptrdiff_t(end))),
             float(*std::max_element(high_.begin() + std::ptrdiff_t(begin), high_.begin() + std::ptrdiff_t(end)))};
   }
@@ -44,11 +44,11 @@ class ColumnRanges {
 
 }  // namespace
 
-CellRanges FindCellRanges(const PaddedVoxels& voxels) {
+MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels) {
   // Floors of positions run from box.begin - 1 to box.end - 1, and the voxels read from there to box.end: relative to the first, 0 ... size
   // + 1.
   const Index3 size = voxels.box.size();
-  CellRanges cells;
+  MacrocellRanges cells;
   cells.counts = CubesOver(size + Uniform(1), kCellSide);
   cells.ranges.resize(CountIn(cells.counts));
   const auto end_of = [](std::int32_t cell, std::int32_t voxels_along) { return std::min((cell + 1) * kCellSide + 1, voxels_along + 2); };
@@ -64,7 +64,7 @@ CellRanges FindCellRanges(const PaddedVoxels& voxels) {
             columns.Include(first + z * voxels.slice + std::ptrdiff_t{y} * voxels.row);
           }
         }
-        CellRange* const row = &cells.ranges[NumberIn(cells.counts, {0, cell_y, cell_z})];
+        MacrocellRange* const row = &cells.ranges[NumberIn(cells.counts, {0, cell_y, cell_z})];
         for (std::int32_t cell_x = 0; cell_x < cells.counts.x; ++cell_x) {
           row[cell_x] = columns.Of(std::size_t(cell_x) * kCellSide, std::size_t(end_of(cell_x, size.x)));
         }

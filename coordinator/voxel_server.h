@@ -1,4 +1,4 @@
-// SlabServer: the coordinator's end of the slabs plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
+// VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
 // volumes.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
@@ -27,7 +27,7 @@ namespace slabstream {
 
 inline constexpr int kMaxQueuedChunks = 64;  // several times what a worker's credit allows
 
-class SlabServer {
+class VoxelServer {
  public:
   // The voxels of a dataset: a whole volume, or bricks if they take much less memory. One of the two, or neither. And those of its layers,
   // and its cells.
@@ -62,8 +62,8 @@ class SlabServer {
     std::string endpoint;  // bound
     SocketOptions socket = {};
   };
-  static Result<std::unique_ptr<SlabServer>> Start(Context& context, const Place& place, Epoch epoch, Codec codec = Codec::kRaw);
-  ~SlabServer();  // stops and joins
+  static Result<std::unique_ptr<VoxelServer>> Start(Context& context, const Place& place, Epoch epoch, Codec codec = Codec::kRaw);
+  ~VoxelServer();  // stops and joins
 
   const std::string& endpoint() const { return endpoint_; }
 
@@ -75,7 +75,7 @@ class SlabServer {
   void EndConnections(const std::string& user);
 
  private:
-  SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
+  VoxelServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec);
   void Run(const std::stop_token& stop);
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);

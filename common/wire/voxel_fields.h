@@ -1,11 +1,11 @@
-// Messages of the slabs plane.
+// Messages of the voxels plane.
 #pragma once
 
 #include <algorithm>
 
-#include "common/wire/slab_messages.h"
 #include "common/wire/value_fields.h"
-#include "slabstream/v1/slabs.pb.h"
+#include "common/wire/voxel_messages.h"
+#include "slabstream/v1/voxels.pb.h"
 
 namespace slabstream {
 

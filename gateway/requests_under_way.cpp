@@ -1,4 +1,4 @@
-#include "gateway/errands.h"
+#include "gateway/requests_under_way.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-void Errands::Begin(ReplyFunction reply, const Gone& gone, const Start& start) {
+void RequestsUnderWay::Begin(ReplyFunction reply, const Gone& gone, const Start& start) {
   if (open_ >= most_) {
     metrics_.CountRefusal(what_);
     return reply(Failure(429, fmt::format("{} {} are under way, which is the limit", open_, what_)));

@@ -1,5 +1,5 @@
 // Which voxels are kept for splatting, in which order, and with which normals: against a plain look at every voxel.
-#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/occupied_voxels.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
@@ -62,15 +62,15 @@ class PlainLook {
   const Vec3 spacing_;
 };
 
-void ExpectAsPlainlySeen(const OccupiedCells& cells, const PlainLook& plain, const Box& slab, const Box& wanted) {
+void ExpectAsPlainlySeen(const OccupiedVoxels& cells, const PlainLook& plain, const Box& data, const Box& wanted) {
   const auto [c, u, v] = cells.axes;
   std::uint64_t found = 0, in_box = 0;
-  for (std::int32_t slice = std::max(wanted.begin[c], slab.begin[c]); slice < std::min(wanted.end[c], slab.end[c]); ++slice) {
-    for (std::int32_t row = slab.begin[v]; row < slab.end[v]; ++row) {
+  for (std::int32_t slice = std::max(wanted.begin[c], data.begin[c]); slice < std::min(wanted.end[c], data.end[c]); ++slice) {
+    for (std::int32_t row = data.begin[v]; row < data.end[v]; ++row) {
       const bool has_beam = slice >= cells.box.begin[c] && slice < cells.box.end[c] && row >= cells.box.begin[v] && row < cells.box.end[v];
       const std::size_t beam = has_beam ? cells.Beam(slice, row) : 0;
       std::uint64_t record = has_beam ? cells.first_record[beam] : 0;
-      for (std::int32_t at = slab.begin[u]; at < slab.end[u]; ++at) {
+      for (std::int32_t at = data.begin[u]; at < data.end[u]; ++at) {
         Index3 voxel;
         voxel[c] = slice, voxel[v] = row, voxel[u] = at;
         const std::int32_t cell = at / kCellVoxels - cells.first_cell;
@@ -127,9 +127,9 @@ Scene MakeScene(const Index3& size, ScalarType type, int intervals, unsigned see
   return scene;
 }
 
-VoxelBlock Block(const Volume& volume, const Box& box) { return CutSlab(volume, box)->voxels(); }
+VoxelBlock Block(const Volume& volume, const Box& box) { return CutBox(volume, box)->voxels(); }
 
-TEST(OccupiedCells, AreWhatAPlainLookFinds) {
+TEST(OccupiedVoxels, AreWhatAPlainLookFinds) {
   unsigned seed = 51;
   for (ScalarType type : kTypes) {
     for (int intervals : {1, 3, 9}) {
@@ -141,16 +141,16 @@ TEST(OccupiedCells, AreWhatAPlainLookFinds) {
         const Box whole = scene.volume.block.box;
         const Box inner = {{size.x / 9, size.y / 7, size.z / 8}, {size.x - size.x / 6, size.y, size.z - size.z / 9}};
         const Box wanted = Intersection({{11, 0, 13}, {60, 25, 33}}, inner);
-        for (const auto& [slab_box, wanted_box] : {std::pair(whole, whole), std::pair(inner, wanted.empty() ? inner : wanted)}) {
-          const VoxelBlock block = Block(scene.volume, slab_box);
-          SlabData by_block{VoxelBlock(block)}, by_bricks{BrickedVoxels(block)};
+        for (const auto& [padded_box, wanted_box] : {std::pair(whole, whole), std::pair(inner, wanted.empty() ? inner : wanted)}) {
+          const VoxelBlock block = Block(scene.volume, padded_box);
+          BoxData by_block{VoxelBlock(block)}, by_bricks{BrickedVoxels(block)};
           const PlainLook plain(block, table, scene.setup.description.geometry.spacing);
-          for (SlabData* slab : {&by_block, &by_bricks}) {
+          for (BoxData* data : {&by_block, &by_bricks}) {
             FrameSetup setup = scene.setup;
             for (Axis axis : kAxes) {
               setup.camera.traversal_axis = axis;
               ASSERT_NO_FATAL_FAILURE(
-                  ExpectAsPlainlySeen(slab->CacheOf<SplatCache>().Occupied(*slab, setup, wanted_box), plain, slab_box, wanted_box));
+                  ExpectAsPlainlySeen(data->CacheOf<SplatCache>().Occupied(*data, setup, wanted_box), plain, padded_box, wanted_box));
             }
           }
         }
@@ -164,19 +164,19 @@ std::vector<T> Kept(const LargeArray<T>& array, std::size_t count) {
   return {array.get(), array.get() + count};
 }
 
-TEST(OccupiedCells, DoNotDependOnThreads) {
+TEST(OccupiedVoxels, DoNotDependOnThreads) {
   const Scene scene = MakeScene({90, 80, 70}, ScalarType::kUint8, 2, 52);
   const ClassificationTable table = Classify(scene.setup.transfer, scene.setup.description, scene.setup.range);
   const BinSelection selection = SelectBins(table, 0);
   const auto find = [&](int threads) {
     tbb::task_arena arena(threads);
     return arena.execute([&] {
-      CellBeams along_x = FindCellBeams(scene.volume.block, BrickRanges(scene.volume.block), table, selection, {1, 1, 1});
-      CellBeams along_y = TurnCellBeams(along_x);
+      VoxelBeams along_x = FindVoxelBeams(scene.volume.block, BrickRanges(scene.volume.block), table, selection, {1, 1, 1});
+      VoxelBeams along_y = TurnVoxelBeams(along_x);
       return std::pair(std::move(along_x), std::move(along_y));
     });
   };
-  const auto expect_equal = [](const CellBeams& a, const CellBeams& b) {
+  const auto expect_equal = [](const VoxelBeams& a, const VoxelBeams& b) {
     ASSERT_EQ(a.box, b.box);
     ASSERT_EQ(a.record_count(), b.record_count());
     EXPECT_EQ(Kept(a.masks, a.cells()), Kept(b.masks, b.cells()));
@@ -193,7 +193,7 @@ TEST(OccupiedCells, DoNotDependOnThreads) {
 }
 
 // What lies outside of all that is occupied costs no beams.
-TEST(OccupiedCells, EmptyRoundingsAreNotKept) {
+TEST(OccupiedVoxels, EmptyRoundingsAreNotKept) {
   const auto bytes_in = [](std::int32_t side) {
     const std::int32_t first = side / 2 - 32;
     const Volume volume = MakeVolume({{side, side, side}, {1, 1, 1}}, ScalarType::kUint8, [&](const Index3& v) {
@@ -202,7 +202,7 @@ TEST(OccupiedCells, EmptyRoundingsAreNotKept) {
     });
     const FrameSetup setup = MakeSetup(volume, {});
     const ClassificationTable table = Classify(setup.transfer, setup.description, setup.range);
-    return FindCellBeams(volume.block, BrickRanges(volume.block), table, SelectBins(table, 0), {1, 1, 1}).bytes();
+    return FindVoxelBeams(volume.block, BrickRanges(volume.block), table, SelectBins(table, 0), {1, 1, 1}).bytes();
   };
   EXPECT_EQ(bytes_in(64), bytes_in(128));
 }

@@ -1,11 +1,11 @@
-// FindCellBeams: two passes over the bricks that may hold anything, with a row of bricks along x as a task. The first pass marks occupied
+// FindVoxelBeams: two passes over the bricks that may hold anything, with a row of bricks along x as a task. The first pass marks occupied
 // voxels, which determines where each beam's records begin; the second fills in the records.
 #include <algorithm>
 #include <array>
 #include <bit>
 
 #include "worker/kernels/brick_normals.h"
-#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/occupied_voxels.h"
 
 namespace slabstream {
 namespace {
@@ -34,7 +34,7 @@ class BeamFinder {
     }
   }
 
-  CellBeams Find() && {
+  VoxelBeams Find() && {
     const Box& box = beams_.box;
     if (box.empty()) return std::move(beams_);
     beams_.first_cell = box.begin.x / kCellVoxels;
@@ -210,13 +210,13 @@ class BeamFinder {
   const Vec3 spacing_;
   const std::vector<SampleInterval<T>> intervals_;
   std::vector<std::uint8_t> shows_;  // by brick: 1 if it may hold a selected sample
-  CellBeams beams_;
+  VoxelBeams beams_;
 };
 
 }  // namespace
 
-CellBeams FindCellBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
-                        const BinSelection& selection, const Vec3& spacing) {
+VoxelBeams FindVoxelBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
+                          const BinSelection& selection, const Vec3& spacing) {
   return VisitScalarType(voxels.type(), [&]<class T>(const T*) {
     const BinLookup<T> lookup(table, selection);
     return BeamFinder<T>(voxels, bricks, lookup, spacing).Find();

@@ -1,4 +1,4 @@
-#include "worker/renderers/shear/active_cells.h"
+#include "worker/renderers/shear/active_macrocells.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,9 +12,9 @@ namespace {
 std::int32_t FloorDiv(std::int32_t a, std::int32_t b) { return a >= 0 ? a / b : -((b - 1 - a) / b); }
 
 template <class T>
-CellRange RangeIn(const BrickView<T>& brick, const Box& box) {
+MacrocellRange RangeIn(const BrickView<T>& brick, const Box& box) {
   constexpr float kLargest = std::numeric_limits<float>::max();
-  CellRange range{kLargest, -kLargest};
+  MacrocellRange range{kLargest, -kLargest};
   for (std::int32_t z = box.begin.z; z < box.end.z; ++z) {
     for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
       const T* const row = brick.Row(y, z) + (box.begin.x - brick.begin.x);
@@ -77,7 +77,7 @@ VoxelRanges FindVoxelRanges(const VoxelBricks& voxels) {
   return result;
 }
 
-bool ActiveCells::Any(float x_low, float x_high, float y_low, float y_high, float z) const {
+bool ActiveMacrocells::Any(float x_low, float x_high, float y_low, float y_high, float z) const {
   const auto cell = [&](std::size_t i, float p) {
     const float number = std::floor(p * (1.0F / kCell)) - float(first[i]);
     return std::int32_t(std::clamp(number, 0.0F, float(counts[i] - 1)));
@@ -93,7 +93,7 @@ bool ActiveCells::Any(float x_low, float x_high, float y_low, float y_high, floa
   return false;
 }
 
-ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& visible, const std::array<Axis, 3>& axes) {
+ActiveMacrocells FindActiveMacrocells(const VoxelRanges& ranges, const VisibleSamples& visible, const std::array<Axis, 3>& axes) {
   // In cubes, by place in `axes`. A sample is made from voxels up to 6, 4 and 2 away (ShearPasses: "Reach"), by way of lattice points on
   // its ray that lie less than 2 slices away.
   constexpr std::int32_t kReach[3] = {2, 2, 1};
@@ -102,7 +102,7 @@ ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& vis
   tbb::parallel_for(std::size_t{0}, std::size_t(counts.z), [&](std::size_t z) {
     const std::size_t plane = std::size_t(counts.x) * std::size_t(counts.y);
     for (std::size_t i = z * plane; i < (z + 1) * plane; ++i) {
-      const CellRange& range = ranges.ranges[i];
+      const MacrocellRange& range = ranges.ranges[i];
       // Between a lower sample somewhere and the largest one here lie all values between them.
       near[i] = range.min <= range.max && visible.AnyBetween(-std::numeric_limits<float>::max(), range.max);
     }
@@ -111,7 +111,7 @@ ActiveCells FindActiveCells(const VoxelRanges& ranges, const VisibleSamples& vis
   for (std::size_t i = 0; i < 3; ++i) near = Grow(near, strides[Number(axes[i])], counts[axes[i]], kReach[i]);
 
   constexpr std::int32_t kCubes = kCell / kRangeSide;
-  ActiveCells result;
+  ActiveMacrocells result;
   std::size_t cells = 1;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int32_t begin = ranges.first[axes[i]], end = begin + counts[axes[i]];

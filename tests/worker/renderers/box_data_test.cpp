@@ -1,4 +1,4 @@
-// What is kept of a slab between frames, and the behaviour that both pipelines share.
+// What is kept of a padded box between frames, and the behaviour that both pipelines share.
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
@@ -27,16 +27,16 @@ double StoredAt(const Volume& volume, const Index3& v) {
 }
 
 // A ramp has the same gradient everywhere, at the border too, whatever the spacing.
-TEST(OccupiedCells, NormalsAreThoseOfTheGradient) {
+TEST(OccupiedVoxels, NormalsAreThoseOfTheGradient) {
   const Vec3 spacing = {0.5, 2, 1};
   const Volume ramp =
       MakeVolume({{20, 18, 16}, spacing}, ScalarType::kFloat32, [&](const Index3& v) { return 1 + 2.0 * v.x + 3.0 * v.y + 1.0 * v.z; });
   const Vec3 expected = Normalized(Vec3{2, 3, 1} / spacing);
-  const auto slab = CutSlab(ramp, ramp.block.box);
+  const auto data = CutBox(ramp, ramp.block.box);
   FrameSetup setup = MakeSetup(ramp, {});
   for (Axis axis : kAxes) {
     setup.camera.traversal_axis = axis;
-    for (const VoxelRecord& record : slab->CacheOf<SplatCache>().Occupied(*slab, setup, ramp.block.box).records) {
+    for (const VoxelRecord& record : data->CacheOf<SplatCache>().Occupied(*data, setup, ramp.block.box).records) {
       ASSERT_NE(record.normal, kNoGradient);
       ASSERT_GT(std::abs(Dot(DecodeNormal(record.normal), expected)), 0.9999);
     }
@@ -44,16 +44,16 @@ TEST(OccupiedCells, NormalsAreThoseOfTheGradient) {
 }
 
 // On hard-edged noise, with rows of many lengths and volumes one voxel thick.
-TEST(OccupiedCells, NormalsAreThoseOfTheirDefinition) {
+TEST(OccupiedVoxels, NormalsAreThoseOfTheirDefinition) {
   const unsigned seed = 35;
   std::mt19937 random(seed);
   for (ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
     for (Index3 size : {Index3{37, 7, 5}, Index3{16, 3, 4}, Index3{1, 9, 9}, Index3{33, 1, 2}}) {
       const Volume noise = MakeVolume({size, {0.5, 2, 1}}, type, [&](const Index3&) { return 1 + random() % 2 * 100; });
-      const auto slab = CutSlab(noise, noise.block.box);
+      const auto data = CutBox(noise, noise.block.box);
       FrameSetup setup = MakeSetup(noise, {});
       setup.camera.traversal_axis = Axis::kZ;  // records are in memory order
-      const auto& records = slab->CacheOf<SplatCache>().Occupied(*slab, setup, noise.block.box).records;
+      const auto& records = data->CacheOf<SplatCache>().Occupied(*data, setup, noise.block.box).records;
       ASSERT_EQ(records.size(), std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z));
       std::size_t record = 0;
       for (Index3 v; v.z < size.z; ++v.z) {
@@ -74,15 +74,15 @@ TEST(OccupiedCells, NormalsAreThoseOfTheirDefinition) {
 
 // A ball of voxels that are either full or empty: on its surface normals point outwards within some degrees, although no sample tells where
 // between two voxels the surface lies. (Differences of the six neighbours: 21 degrees on average, and no gradient in every seventh voxel.)
-TEST(OccupiedCells, NormalsOfAHardEdgedBallAreTheBalls) {
+TEST(OccupiedVoxels, NormalsOfAHardEdgedBallAreTheBalls) {
   constexpr double kRadius = 25;
   const Vec3 middle = {30, 30, 30};
   const Volume ball = MakeVolume({{61, 61, 61}, {1, 1, 1}}, ScalarType::kUint8,
                                  [&](const Index3& v) { return Length(ToVec3(v) - middle) <= kRadius ? 100.0 : 0.0; });
-  const auto slab = CutSlab(ball, ball.block.box);
+  const auto data = CutBox(ball, ball.block.box);
   FrameSetup setup = MakeSetup(ball, {});
   setup.camera.traversal_axis = Axis::kZ;  // records are in memory order
-  const auto& records = slab->CacheOf<SplatCache>().Occupied(*slab, setup, ball.block.box).records;
+  const auto& records = data->CacheOf<SplatCache>().Occupied(*data, setup, ball.block.box).records;
   double sum = 0;
   int count = 0;
   std::size_t record = 0;
@@ -107,7 +107,7 @@ TEST(OccupiedCells, NormalsOfAHardEdgedBallAreTheBalls) {
 TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
   const Volume volume = MakeBlobs({{40, 30, 20}, {1, 1, 1}}, ScalarType::kUint8, 32);
   const Box box = {{8, 8, 0}, {32, 22, 20}};
-  const auto slab = CutSlab(volume, Grown(box, 8, volume.block.box));
+  const auto data = CutBox(volume, Grown(box, 8, volume.block.box));
   const FrameSetup setup = MakeSetup(volume, {});
   const ClassificationTable table = Classify(setup.transfer, setup.description, setup.range);
   const float threshold = 0.5F * MaxOpacity(table, setup.description, setup.range);
@@ -118,7 +118,7 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
     return v;
   };
   const BinSelection bins = SelectBins(table, threshold);
-  const Surface surface = FindSurface(slab->voxels(), {table, bins, slab->ranges()}, {1, 1, 1}, box);
+  const Surface surface = FindSurface(data->voxels(), {table, bins, data->ranges()}, {1, 1, 1}, box);
   std::size_t expected = 0;
   for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
     for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {
@@ -153,31 +153,31 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
   EXPECT_EQ(next, expected);
 }
 
-TEST(SlabData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
+TEST(BoxData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
   const Volume volume = MakeBlobs({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, 33);
-  const auto slab = CutSlab(volume, volume.block.box);
-  const std::size_t before = slab->bytes();
+  const auto data = CutBox(volume, volume.block.box);
+  const std::size_t before = data->bytes();
   SetupOptions options;
   FrameSetup setup = MakeSetup(volume, options);
-  const OccupiedCells* first = &slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box);
-  EXPECT_GE(slab->bytes(), before + first->records.size() * sizeof(VoxelRecord));
+  const OccupiedVoxels* first = &data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box);
+  EXPECT_GE(data->bytes(), before + first->records.size() * sizeof(VoxelRecord));
   const VoxelRecord* records = first->records.data();
   const std::size_t record_count = first->records.size();
 
   // Other opacities and colours of the same voxels, and the same axis again after another one: nothing is made anew.
   setup.transfer = Ramp(0.7);
-  EXPECT_EQ(slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box).records.data(), records);
+  EXPECT_EQ(data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box).records.data(), records);
   setup.camera.traversal_axis = setup.camera.traversal_axis == Axis::kX ? Axis::kY : Axis::kX;
-  EXPECT_NE(slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box).records.data(), records);
+  EXPECT_NE(data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box).records.data(), records);
   setup.camera.traversal_axis = MakeSetup(volume, options).camera.traversal_axis;
-  EXPECT_EQ(slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box).records.data(), records);
+  EXPECT_EQ(data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box).records.data(), records);
 
   setup.transfer.opacities = {{100, 0, 0.5, 0}, {200, 1, 0.5, 0}};  // fewer voxels
-  EXPECT_LT(slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box).records.size(), record_count + 1);
+  EXPECT_LT(data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box).records.size(), record_count + 1);
   const FrameSetup fresh = setup;
-  const auto fresh_slab = CutSlab(volume, volume.block.box);
-  EXPECT_EQ(slab->CacheOf<SplatCache>().Occupied(*slab, setup, volume.block.box).records.size(),
-            fresh_slab->CacheOf<SplatCache>().Occupied(*fresh_slab, fresh, volume.block.box).records.size());
+  const auto fresh_box = CutBox(volume, volume.block.box);
+  EXPECT_EQ(data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box).records.size(),
+            fresh_box->CacheOf<SplatCache>().Occupied(*fresh_box, fresh, volume.block.box).records.size());
 }
 
 // A volume without a drawn voxel. Every finite voxel of an intensity projection is drawn.
@@ -201,9 +201,9 @@ TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
     options.renderer = kind;
     options.view.zoom = 100;
     const FrameSetup setup = MakeSetup(block, options);
-    const auto slab = SlabFor(*kind, block, block.block.box);
+    const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    const LocalImage image = MakeRenderer(*kind)->Render(*slab, block.block.box, setup, {}, RenderControl(), report).value();
+    const LocalImage image = MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, RenderControl(), report).value();
     EXPECT_EQ(image.bounds, FrameBounds(setup));
     EXPECT_LT(report.drawn_voxels, block.block.box.voxel_count() / 20);
   }
@@ -214,11 +214,11 @@ TEST(Renderers, StopWhenCancelled) {
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
-    const auto slab = SlabFor(*kind, block, block.block.box);
+    const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
     RenderControl cancelled;
     cancelled.Cancel();
-    const auto result = MakeRenderer(*kind)->Render(*slab, block.block.box, MakeSetup(block, options), {}, cancelled, report);
+    const auto result = MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, cancelled, report);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.status().code(), StatusCode::kCancelled);
   }
@@ -234,8 +234,8 @@ TEST(Renderers, PausesChangeNoBit) {
     const FrameSetup setup = MakeSetup(block, options);
     const auto render = [&](const RenderControl& control) {
       RankReport report;
-      const auto slab = SlabFor(*kind, block, block.block.box);
-      return MakeRenderer(*kind)->Render(*slab, block.block.box, setup, {}, control, report).value();
+      const auto data = BoxFor(*kind, block, block.block.box);
+      return MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, control, report).value();
     };
     const LocalImage expected = render(RenderControl());
     RenderControl control;
@@ -260,9 +260,9 @@ TEST(Renderers, ReportTheirStages) {
   for (const RendererKind* kind : Renderers()) {
     SetupOptions options;
     options.renderer = kind;
-    const auto slab = SlabFor(*kind, block, block.block.box);
+    const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    ASSERT_TRUE(MakeRenderer(*kind)->Render(*slab, block.block.box, MakeSetup(block, options), {}, RenderControl(), report).ok());
+    ASSERT_TRUE(MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, RenderControl(), report).ok());
     ASSERT_EQ(report.spans.size(), 1U);
     EXPECT_EQ(report.spans[0].stage, Stage::kRender);
     std::int64_t stages = 0;

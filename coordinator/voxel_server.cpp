@@ -1,4 +1,4 @@
-#include "coordinator/slab_server.h"
+#include "coordinator/voxel_server.h"
 
 #include <fmt/format.h>
 
@@ -24,35 +24,35 @@ std::string Text(const Box& box) {
 
 }  // namespace
 
-Result<std::unique_ptr<SlabServer>> SlabServer::Start(Context& context, const Place& place, Epoch epoch, Codec codec) {
+Result<std::unique_ptr<VoxelServer>> VoxelServer::Start(Context& context, const Place& place, Epoch epoch, Codec codec) {
   SocketOptions options = place.socket;
   options.send_high_water_mark = kMaxQueuedChunks;
   Result<Socket> socket = Socket::Router(context, options);
   if (!socket.ok()) return socket.status();
   Result<std::string> bound = socket->Bind(place.endpoint);
   if (!bound.ok()) return bound.status();
-  return std::unique_ptr<SlabServer>(new SlabServer(std::move(*socket), std::move(*bound), epoch, codec));
+  return std::unique_ptr<VoxelServer>(new VoxelServer(std::move(*socket), std::move(*bound), epoch, codec));
 }
 
-SlabServer::SlabServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec)
+VoxelServer::VoxelServer(Socket socket, std::string endpoint, Epoch epoch, Codec codec)
     : endpoint_(std::move(endpoint)),
       epoch_(epoch),
       codec_(codec),
       socket_(std::move(socket)),
       thread_([this](const std::stop_token& stop) { Run(stop); }) {}
 
-SlabServer::~SlabServer() {
+VoxelServer::~VoxelServer() {
   thread_.request_stop();
   wakeup_.Notify();
   thread_.join();
 }
 
-void SlabServer::Publish(DatasetId dataset, Samples samples) {
+void VoxelServer::Publish(DatasetId dataset, Samples samples) {
   const std::lock_guard lock(mutex_);
   samples_.insert_or_assign(dataset, std::move(samples));
 }
 
-void SlabServer::Withdraw(DatasetId dataset) {
+void VoxelServer::Withdraw(DatasetId dataset) {
   Samples unused;  // freed without the lock
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);
@@ -61,13 +61,13 @@ void SlabServer::Withdraw(DatasetId dataset) {
   samples_.erase(found);
 }
 
-SlabServer::Samples SlabServer::Find(DatasetId dataset) {
+VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);
   return found == samples_.end() ? Samples{} : found->second;
 }
 
-void SlabServer::EndConnections(const std::string& user) {
+void VoxelServer::EndConnections(const std::string& user) {
   {
     const std::lock_guard lock(mutex_);
     unwanted_.push_back(user);
@@ -75,12 +75,12 @@ void SlabServer::EndConnections(const std::string& user) {
   wakeup_.Notify();
 }
 
-std::vector<std::string> SlabServer::TakeUnwanted() {
+std::vector<std::string> VoxelServer::TakeUnwanted() {
   const std::lock_guard lock(mutex_);
   return std::exchange(unwanted_, {});
 }
 
-Bytes SlabServer::Cut(const Samples& samples, const Box& box, const ChunkPart& part) {
+Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& part) {
   if (part.layer == Layer::kVolume && samples.volume != nullptr) {
     return BoxSamples(samples.volume, box, part.begin, part.begin + part.bytes);
   }
@@ -93,7 +93,7 @@ Bytes SlabServer::Cut(const Samples& samples, const Box& box, const ChunkPart& p
   return {std::move(buffer), cut};
 }
 
-Result<Bytes> SlabServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
+Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {
   const Bytes all = cell_bytes_.Of(samples.cells, request.box);
   const std::uint64_t begin = BeginOfCellChunk(request.chunk);
   if (begin >= all.size()) {
@@ -105,7 +105,7 @@ Result<Bytes> SlabServer::CutCells(const Samples& samples, const ChunkRequest& r
   return Bytes(owner, all.span().subspan(begin, BytesOfCellChunk(all.size(), request.chunk)));
 }
 
-Status SlabServer::Check(const ChunkRequest& request, const Samples& samples) {
+Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
   if (!samples.any()) return Status::NotFound(fmt::format("chunk request: no dataset {}", request.dataset));
   if (request.box.empty() || !samples.box().Contains(request.box)) {
     return Status::InvalidArgument(
@@ -120,7 +120,7 @@ Status SlabServer::Check(const ChunkRequest& request, const Samples& samples) {
   return Status::Ok();
 }
 
-void SlabServer::Run(const std::stop_token& stop) {
+void VoxelServer::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket_};
   while (!stop.stop_requested()) {
     Wait(sockets, &wakeup_, std::chrono::minutes(1));
@@ -128,15 +128,15 @@ void SlabServer::Run(const std::stop_token& stop) {
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
-      const Status answered = Guarded("slabs plane", [&] { Answer(*incoming); });
+      const Status answered = Guarded("voxels plane", [&] { Answer(*incoming); });
       if (!answered.ok()) complaints_.Warning(answered.message());  // the worker asks again when its request times out
     }
   }
 }
 
-void SlabServer::Answer(const Incoming& incoming) {
-  const Result<WorkerToSlabs> decoded = Decode<WorkerToSlabs>(incoming.header(), incoming.payload().size());
-  if (!decoded.ok()) return complaints_.Warning("slabs plane: dropped a message: " + decoded.status().message());
+void VoxelServer::Answer(const Incoming& incoming) {
+  const Result<WorkerToVoxels> decoded = Decode<WorkerToVoxels>(incoming.header(), incoming.payload().size());
+  if (!decoded.ok()) return complaints_.Warning("voxels plane: dropped a message: " + decoded.status().message());
   const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
   if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
   const Status served = Guarded("chunk request", [&] {
@@ -148,7 +148,7 @@ void SlabServer::Answer(const Incoming& incoming) {
     if (!cut.ok()) return cut.status();
     const Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
     const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
-    if (!sent.ok()) LogDebug("slabs plane: " + sent.message());  // it has gone, or asks again when its request times out
+    if (!sent.ok()) LogDebug("voxels plane: " + sent.message());  // it has gone, or asks again when its request times out
     return Status::Ok();
   });
   if (served.ok()) return;

@@ -1,4 +1,4 @@
-// CellRanges: least and greatest sample of small cells, so that rays leap over cells that show nothing.
+// MacrocellRanges: least and greatest sample of small cells, so that rays leap over cells that show nothing.
 //
 // A cell holds the sample positions p whose floor lies in a cube of kCellSide voxels, counted from box.begin - 1. Trilinear interpolation
 // also reads the next voxel, so a cell's range is that of kCellSide + 1 voxels a side.
@@ -15,18 +15,18 @@ namespace slabstream {
 inline constexpr int kCellShift = 2;
 inline constexpr std::int32_t kCellSide = 1 << kCellShift;  // voxels
 
-struct CellRange {
+struct MacrocellRange {
   float min, max;  // stored samples, finite ones; min > max: there is none
 };
 
-struct CellRanges {
+struct MacrocellRanges {
   Index3 counts;  // of cells, which cover the padded voxels; x fastest
-  std::vector<CellRange> ranges;
+  std::vector<MacrocellRange> ranges;
 
-  std::size_t bytes() const { return ranges.capacity() * sizeof(CellRange); }
+  std::size_t bytes() const { return ranges.capacity() * sizeof(MacrocellRange); }
 };
 
 // Parallel.
-CellRanges FindCellRanges(const PaddedVoxels& voxels);
+MacrocellRanges FindMacrocellRanges(const PaddedVoxels& voxels);
 
 }  // namespace slabstream

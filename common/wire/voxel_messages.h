@@ -1,4 +1,4 @@
-// The slabs plane: voxels and cells, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
+// The voxels plane: voxels and cells, from the coordinator (ROUTER) to workers (DEALER), pulled chunk by chunk.
 //
 // The samples of a box (x fastest) are cut into chunks of kChunkBytes; the last one is shorter. The samples of the volume come first, then
 // those of each layer of the dataset, in the order of kLayers; each begins with a new chunk. A worker requests chunks one by one and never
@@ -99,7 +99,7 @@ struct ChunkRefused {
   friend bool operator==(const ChunkRefused&, const ChunkRefused&) = default;
 };
 
-using WorkerToSlabs = std::variant<ChunkRequest>;
-using SlabsToWorker = std::variant<Chunk, ChunkRefused>;
+using WorkerToVoxels = std::variant<ChunkRequest>;
+using VoxelsToWorker = std::variant<Chunk, ChunkRefused>;
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-// Errands: what requests over HTTP have under way at the service, so many at a time and no more. An errand ends once: by its reply, or
+// RequestsUnderWay: what HTTP requests have under way at the service, so many at a time and no more. Each ends once: by its reply, or
 // because its connection has closed. Functions are called on the io thread, unless their comment names another.
 #pragma once
 
@@ -17,10 +17,10 @@ namespace slabstream {
 
 inline constexpr Duration kAnswerDeadline = std::chrono::minutes(2);  // of the service
 
-class Errands {
+class RequestsUnderWay {
  public:
   // `what` is the plural of one, and the reason of refusals. All must outlive this.
-  Errands(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link, std::string what, int most)
+  RequestsUnderWay(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link, std::string what, int most)
       : io_(io), metrics_(metrics), link_(link), what_(std::move(what)), most_(most) {}
 
   // Any thread: makes the reply on the io thread, if somebody still waits for it.

@@ -17,12 +17,12 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 
-class WorkerSlabsTest : public WorkerMachineTest {
+class WorkerBoxesTest : public WorkerMachineTest {
  public:
   static GroupAssignment Assigned(FrameId frame, std::uint32_t group) { return Assignment(frame, {kSelf}, group, 2); }
 };
 
-TEST_F(WorkerSlabsTest, AsksForChunksWithinItsCredit) {
+TEST_F(WorkerBoxesTest, AsksForChunksWithinItsCredit) {
   WorkerConfig config = Config();
   config.credit_bytes = 2 * kChunkBytes;
   Start(config);
@@ -38,12 +38,12 @@ TEST_F(WorkerSlabsTest, AsksForChunksWithinItsCredit) {
   EXPECT_THAT(All<SendChunkRequest>(arrived), IsEmpty()) << "credit is used until the chunk is stored";
   EXPECT_THAT(All<StoreChunk>(Tell(Answer(first[0].request))), IsEmpty()) << "a second copy changes nothing";
   const StoreChunk store = All<StoreChunk>(arrived)[0];
-  const auto next = All<SendChunkRequest>(Tell(ChunkStored{store.slab, store.chunk.box, 0, {}}));
+  const auto next = All<SendChunkRequest>(Tell(ChunkStored{store.padded, store.chunk.box, 0, {}}));
   ASSERT_THAT(next, SizeIs(1));
   EXPECT_EQ(next[0].request.chunk, 2U);
 }
 
-TEST_F(WorkerSlabsTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
+TEST_F(WorkerBoxesTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
   WorkerConfig config = Config();
   config.chunk_attempts = 3;
   config.credit_bytes = kChunkBytes;
@@ -56,19 +56,19 @@ TEST_F(WorkerSlabsTest, AsksAgainForWhatIsLostOrDamagedAndGivesUp) {
   EXPECT_EQ(All<SendChunkRequest>(again)[0].request, first[0].request);
   const auto stored = All<StoreChunk>(Tell(Answer(first[0].request)));
   ASSERT_THAT(stored, SizeIs(1));
-  again = Tell(ChunkStored{stored[0].slab, stored[0].chunk.box, 0, Status::DataLoss("digest")});
+  again = Tell(ChunkStored{stored[0].padded, stored[0].chunk.box, 0, Status::DataLoss("digest")});
   ASSERT_THAT(All<SendChunkRequest>(again), SizeIs(1));
   const Actions given_up = After(seconds(3));
   const auto trouble = Sent<WorkerTrouble>(given_up);
   ASSERT_THAT(trouble, SizeIs(1));
   EXPECT_EQ(trouble[0].key, (GroupKey{1, 1, 0}));
   EXPECT_EQ(trouble[0].status.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(All<DropSlab>(given_up), SizeIs(1));
-  EXPECT_THAT(All<OpenSlab>(Tell(Assignment(1, {kSelf}, 0, 1, 2))), SizeIs(1)) << "the next attempt begins from nothing";
+  EXPECT_THAT(All<DropBox>(given_up), SizeIs(1));
+  EXPECT_THAT(All<OpenBox>(Tell(Assignment(1, {kSelf}, 0, 1, 2))), SizeIs(1)) << "the next attempt begins from nothing";
 }
 
 // How many chunks the cells of a box have is known when the first one comes.
-TEST_F(WorkerSlabsTest, AsksForCellsAsTheirFirstChunkSays) {
+TEST_F(WorkerBoxesTest, AsksForCellsAsTheirFirstChunkSays) {
   GroupAssignment assignment = Assignment(1, {kSelf});
   assignment.setup.layers.cells = true;
   const auto first = All<SendChunkRequest>(Tell(assignment));
@@ -85,7 +85,7 @@ TEST_F(WorkerSlabsTest, AsksForCellsAsTheirFirstChunkSays) {
   const auto store = [&](const Chunk& chunk) {
     const auto stores = All<StoreChunk>(Tell(chunk));
     EXPECT_THAT(stores, SizeIs(1));
-    return Tell(ChunkStored{stores.at(0).slab, chunk.box, chunk.chunk, {}});
+    return Tell(ChunkStored{stores.at(0).padded, chunk.box, chunk.chunk, {}});
   };
   for (int chunk = 0; chunk < 2; ++chunk) {
     EXPECT_THAT(All<StartRender>(store(Answer(first[std::size_t(chunk)].request))), IsEmpty()) << "the cells are missing";
@@ -101,7 +101,7 @@ TEST_F(WorkerSlabsTest, AsksForCellsAsTheirFirstChunkSays) {
   EXPECT_THAT(All<StartRender>(store(answer(kFirstCellChunk + 1, kBytes))), SizeIs(1));
 }
 
-TEST_F(WorkerSlabsTest, FetchesTheCellsOfAResizedBoxAnew) {
+TEST_F(WorkerBoxesTest, FetchesTheCellsOfAResizedBoxAnew) {
   GroupAssignment assignment = Assignment(1, {kSelf});
   assignment.setup.layers.cells = true;
   Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
@@ -110,12 +110,12 @@ TEST_F(WorkerSlabsTest, FetchesTheCellsOfAResizedBoxAnew) {
   assignment.key.frame = 3;
   assignment.group.placements[0].box = {{0, 0, 10}, {100, 128, 80}};
   const Actions resized = Tell(assignment);
-  ASSERT_THAT(All<OpenSlab>(resized), SizeIs(1));
-  EXPECT_THAT(All<OpenSlab>(resized)[0].copies, IsEmpty());
+  ASSERT_THAT(All<OpenBox>(resized), SizeIs(1));
+  EXPECT_THAT(All<OpenBox>(resized)[0].copies, IsEmpty());
   EXPECT_EQ(All<SendChunkRequest>(resized).back().request.chunk, kFirstCellChunk);
 }
 
-TEST_F(WorkerSlabsTest, ReportsARefusedChunk) {
+TEST_F(WorkerBoxesTest, ReportsARefusedChunk) {
   const auto requests = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
   ASSERT_FALSE(requests.empty());
   const ChunkRequest& request = requests[0].request;
@@ -125,7 +125,7 @@ TEST_F(WorkerSlabsTest, ReportsARefusedChunk) {
   EXPECT_EQ(trouble[0].status, Status::NotFound("no such dataset"));
 }
 
-TEST_F(WorkerSlabsTest, KeepsSlabsForTheNextFrame) {
+TEST_F(WorkerBoxesTest, KeepsBoxesForTheNextFrame) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
   ASSERT_THAT(first, SizeIs(1));
   const Actions done = Rendered(first[0]);
@@ -137,31 +137,31 @@ TEST_F(WorkerSlabsTest, KeepsSlabsForTheNextFrame) {
   EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second)[0]))[0].reports.at(0).voxel_bytes, 0U);
 }
 
-TEST_F(WorkerSlabsTest, ALargerHaloReplacesTheSlabOnceItIsCopied) {
+TEST_F(WorkerBoxesTest, ALargerHaloReplacesTheBoxOnceItIsCopied) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
   Rendered(first.at(0));
   GroupAssignment wider = Assignment(2, {kSelf});
   wider.setup.halo = 16;
   const Actions fed = Feed(Tell(wider));
   ASSERT_THAT(All<StartRender>(fed), SizeIs(1));
-  EXPECT_THAT(All<DropSlab>(fed), IsEmpty());
-  EXPECT_THAT(All<DropSlab>(Rendered(All<StartRender>(fed)[0])), ElementsAre(testing::Field(&DropSlab::slab, first[0].slab)));
+  EXPECT_THAT(All<DropBox>(fed), IsEmpty());
+  EXPECT_THAT(All<DropBox>(Rendered(All<StartRender>(fed)[0])), ElementsAre(testing::Field(&DropBox::padded, first[0].padded)));
   const Actions narrow = Tell(Assignment(3, {kSelf}));
-  EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider slab holds all that the narrower halo needs";
+  EXPECT_THAT(All<SendChunkRequest>(narrow), IsEmpty()) << "the wider padded box holds all that the narrower halo needs";
   EXPECT_THAT(All<StartRender>(narrow), SizeIs(1));
 }
 
-TEST_F(WorkerSlabsTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
+TEST_F(WorkerBoxesTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
   Rendered(first);
   GroupAssignment resized = Assignment(2, {kSelf});
   resized.group.placements[0].box = {{0, 0, 10}, {100, 128, 80}};
   const Actions told = Tell(resized);
-  const auto open = All<OpenSlab>(told);
+  const auto open = All<OpenBox>(told);
   ASSERT_THAT(open, SizeIs(1));
   ASSERT_THAT(open[0].copies, SizeIs(1));
-  EXPECT_EQ(open[0].copies[0].from, first.slab);
-  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the slab of 72 slices goes";
+  EXPECT_EQ(open[0].copies[0].from, first.padded);
+  EXPECT_EQ(open[0].copies[0].box, (Box{{0, 0, 2}, {108, 128, 72}})) << "as far as the padded box of 72 slices goes";
   const auto requests = All<SendChunkRequest>(told);
   ASSERT_THAT(requests, SizeIs(1));
   EXPECT_EQ(requests[0].request.box, (Box{{0, 0, 72}, {108, 128, 88}}));
@@ -179,7 +179,7 @@ TEST_F(WorkerSlabsTest, FetchesOfAResizedBoxWhatItDoesNotHold) {
   EXPECT_THAT(All<StartRender>(held), SizeIs(1));
 }
 
-TEST_F(WorkerSlabsTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
+TEST_F(WorkerBoxesTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
   WorkerConfig config = Config();
   config.cache_bytes = 128 * 128 * 150;
   Start(config);
@@ -188,26 +188,26 @@ TEST_F(WorkerSlabsTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
   GroupAssignment resized = Assignment(2, {kSelf});
   resized.group.placements[0].box = {{0, 0, 10}, {128, 128, 80}};
   const Actions told = Tell(resized);
-  EXPECT_THAT(All<DropSlab>(told), ElementsAre(testing::Field(&DropSlab::slab, first.slab)));
-  EXPECT_THAT(All<OpenSlab>(told).at(0).copies, IsEmpty());
+  EXPECT_THAT(All<DropBox>(told), ElementsAre(testing::Field(&DropBox::padded, first.padded)));
+  EXPECT_THAT(All<OpenBox>(told).at(0).copies, IsEmpty());
 }
 
-TEST_F(WorkerSlabsTest, DropsTheOldestUnusedSlabAboveItsBudget) {
+TEST_F(WorkerBoxesTest, DropsTheOldestUnusedBoxAboveItsBudget) {
   WorkerConfig config = Config();
   config.cache_bytes = 2 * 128 * 128 * 80;
   Start(config);
-  SlabKey oldest;
+  BoxKey oldest;
   for (std::uint32_t group = 0; group < 2; ++group) {
     const auto render = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}, group, 3)))).at(0);
-    if (group == 0) oldest = render.slab;
+    if (group == 0) oldest = render.padded;
     Rendered(render);
   }
-  EXPECT_THAT(All<DropSlab>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropSlab::slab, oldest)));
+  EXPECT_THAT(All<DropBox>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropBox::padded, oldest)));
 }
 
 // The first of two groups of a frame of `size`, or the second. Ray casting.
 GroupAssignment Sized(FrameId frame, std::uint32_t group, ImageSize size) {
-  GroupAssignment a = WorkerSlabsTest::Assigned(frame, group);
+  GroupAssignment a = WorkerBoxesTest::Assigned(frame, group);
   SetRenderer(*FindRenderer("raycast"), a.setup);
   a.setup.sheets = {};
   a.setup.camera = MakeCamera({}, size, a.setup.description.geometry);
@@ -216,7 +216,7 @@ GroupAssignment Sized(FrameId frame, std::uint32_t group, ImageSize size) {
 
 std::uint64_t ImageBytesOf(const GroupAssignment& a) { return GroupImageBytes(a.setup, a.group.placements) + PictureBytes(a.setup); }
 
-TEST_F(WorkerSlabsTest, SlabsTakeMemoryOneAfterTheOtherIfThereIsNoRoomForAll) {
+TEST_F(WorkerBoxesTest, BoxesTakeMemoryOneAfterTheOtherIfThereIsNoRoomForAll) {
   WorkerConfig config = Config();
   config.memory_bytes = kIdleMemoryBytes + 2 * ImageBytesOf(Sized(1, 0, {16, 16})) + 128 * 128 * 100;
   Start(config);
@@ -226,42 +226,42 @@ TEST_F(WorkerSlabsTest, SlabsTakeMemoryOneAfterTheOtherIfThereIsNoRoomForAll) {
   std::vector<StartRender> renders;
   for (const SendChunkRequest& request : asked) {
     for (const StoreChunk& store : All<StoreChunk>(Tell(Answer(request.request)))) {
-      const auto started = All<StartRender>(Tell(ChunkStored{store.slab, store.chunk.box, store.chunk.chunk, {}}));
+      const auto started = All<StartRender>(Tell(ChunkStored{store.padded, store.chunk.box, store.chunk.chunk, {}}));
       renders.insert(renders.end(), started.begin(), started.end());
     }
   }
   ASSERT_THAT(renders, SizeIs(1));
   const Actions after = Rendered(renders[0]);
-  EXPECT_THAT(All<DropSlab>(after), ElementsAre(testing::Field(&DropSlab::slab, renders[0].slab)));
+  EXPECT_THAT(All<DropBox>(after), ElementsAre(testing::Field(&DropBox::padded, renders[0].padded)));
   EXPECT_THAT(All<StartRender>(Feed(after)), SizeIs(1));
 }
 
 // A worker stays under its limit: what images of frames need, cached voxels give up.
-TEST_F(WorkerSlabsTest, ImagesOfFramesTakeRoomFromCachedVoxels) {
-  constexpr std::uint64_t kSlab = 128 * 128 * 80;
+TEST_F(WorkerBoxesTest, ImagesOfFramesTakeRoomFromCachedVoxels) {
+  constexpr std::uint64_t kBox = 128 * 128 * 80;
   const GroupAssignment large = Sized(2, 0, {512, 512});
   const std::uint64_t images = ImageBytesOf(large);
-  ASSERT_GT(images, 2 * kSlab);
+  ASSERT_GT(images, 2 * kBox);
   WorkerConfig config = Config();
-  config.memory_bytes = kIdleMemoryBytes + images + kSlab;
+  config.memory_bytes = kIdleMemoryBytes + images + kBox;
   Start(config);
-  std::vector<SlabKey> cached;
+  std::vector<BoxKey> cached;
   for (std::uint32_t group = 0; group < 2; ++group) {
     const auto render = All<StartRender>(Feed(Tell(Sized(1, group, {16, 16})))).at(0);
-    cached.push_back(render.slab);
-    EXPECT_THAT(All<DropSlab>(Rendered(render)), IsEmpty());
+    cached.push_back(render.padded);
+    EXPECT_THAT(All<DropBox>(Rendered(render)), IsEmpty());
   }
-  EXPECT_THAT(All<DropSlab>(Tell(large)), ElementsAre(testing::Field(&DropSlab::slab, cached[1])))
+  EXPECT_THAT(All<DropBox>(Tell(large)), ElementsAre(testing::Field(&DropBox::padded, cached[1])))
       << "the one that the frame does not need";
 }
 
 // What renderers derive from voxels grows and shrinks with the frames.
-TEST_F(WorkerSlabsTest, CountsTheBytesThatTheLastFrameOfASlabReported) {
+TEST_F(WorkerBoxesTest, CountsTheBytesThatTheLastFrameOfABoxReported) {
   constexpr std::uint64_t kVoxels = 128U * 128 * 72;
   FrameId frame = 0;
-  const auto cached_after = [&](std::uint64_t slab_bytes, const Status& status) {
+  const auto cached_after = [&](std::uint64_t box_bytes, const Status& status) {
     const StartRender render = All<StartRender>(Feed(Tell(Assignment(++frame, {kSelf})))).at(0);
-    Tell(RenderDone{render.key, render.rank, render.image, status, {}, slab_bytes});
+    Tell(RenderDone{render.key, render.rank, render.image, status, {}, box_bytes});
     return Sent<Heartbeat>(After(seconds(2))).back().cached_bytes;
   };
   EXPECT_EQ(cached_after(5 * kVoxels, {}), 5 * kVoxels);
@@ -270,18 +270,18 @@ TEST_F(WorkerSlabsTest, CountsTheBytesThatTheLastFrameOfASlabReported) {
   EXPECT_EQ(cached_after(3 * kVoxels, Status::Internal("render")), 3 * kVoxels) << "derived before the frame failed";
 }
 
-TEST_F(WorkerSlabsTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
+TEST_F(WorkerBoxesTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf})))).at(0);
   Rendered(first);
   for (const Epoch epoch : {kEpoch, kEpoch + 1}) {
     Tell(Retire{epoch});
-    EXPECT_THAT(All<DropSlab>(Tell(WelcomeTo(1001 + epoch - kEpoch, epoch))), IsEmpty());
+    EXPECT_THAT(All<DropBox>(Tell(WelcomeTo(1001 + epoch - kEpoch, epoch))), IsEmpty());
   }
   GroupAssignment again = Assignment(1, {kSelf});
   again.epoch = kEpoch + 1;
   const Actions actions = Tell(again);
   EXPECT_THAT(All<SendChunkRequest>(actions), IsEmpty());
-  EXPECT_EQ(All<StartRender>(actions).at(0).slab, first.slab);
+  EXPECT_EQ(All<StartRender>(actions).at(0).padded, first.padded);
 
   again.key.frame = 2;
   ++again.setup.dataset;

@@ -1,4 +1,4 @@
-// SlabData: the voxels of one slab with its halo, its layers, and what renderers derived from them. One thread at a time uses it.
+// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it.
 #pragma once
 
 #include <concepts>
@@ -18,31 +18,31 @@
 
 namespace slabstream {
 
-// Data that one renderer keeps of a slab between frames. Each renderer has its own class.
-class SlabCache {
+// Data that one renderer keeps of a padded box between frames. Each renderer has its own class.
+class BoxCache {
  public:
-  virtual ~SlabCache() = default;
+  virtual ~BoxCache() = default;
   virtual std::size_t bytes() const = 0;  // memory
 };
 
-// Of the slab's box. nullopt, null: the dataset has no such layer.
-struct SlabLayers {
+// nullopt, null: the dataset has no such layer.
+struct BoxLayers {
   std::optional<BrickedVoxels> labels, overlay;
   std::shared_ptr<const Mesh> cells;  // those that touch the box, in the order of the whole grid; perhaps others
 };
 
-class SlabData {
+class BoxData {
  public:
-  explicit SlabData(VoxelBlock voxels, SlabLayers layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
-  explicit SlabData(BrickedVoxels voxels, SlabLayers layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
-  SlabData(const SlabData&) = delete;
-  SlabData& operator=(const SlabData&) = delete;
+  explicit BoxData(VoxelBlock voxels, BoxLayers layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
+  explicit BoxData(BrickedVoxels voxels, BoxLayers layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
+  BoxData(const BoxData&) = delete;
+  BoxData& operator=(const BoxData&) = delete;
 
   // All voxels as one block. If there are only bricks, the first call turns them into a block; after that any thread may call.
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
 
-  const SlabLayers& layers() const { return layers_; }
+  const BoxLayers& layers() const { return layers_; }
   // Of volume and layers, the type whose samples take most.
   ScalarType widest_type() const;
 
@@ -53,9 +53,9 @@ class SlabData {
   const ClassificationTable& Classification(const FrameSetup& setup);
 
   // The renderer's cache. The first call creates it.
-  template <std::derived_from<SlabCache> Cache>
+  template <std::derived_from<BoxCache> Cache>
   Cache& CacheOf() {
-    std::unique_ptr<SlabCache>& cache = caches_[typeid(Cache)];
+    std::unique_ptr<BoxCache>& cache = caches_[typeid(Cache)];
     if (cache == nullptr) cache = std::make_unique<Cache>();
     return static_cast<Cache&>(*cache);
   }
@@ -68,11 +68,11 @@ class SlabData {
   mutable VoxelBlock block_;
   mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
 
-  SlabLayers layers_;
+  BoxLayers layers_;
   std::optional<BrickRanges> ranges_;
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;
-  std::map<std::type_index, std::unique_ptr<SlabCache>> caches_;
+  std::map<std::type_index, std::unique_ptr<BoxCache>> caches_;
 };
 
 }  // namespace slabstream

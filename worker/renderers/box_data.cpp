@@ -1,10 +1,10 @@
-#include "worker/renderers/slab_data.h"
+#include "worker/renderers/box_data.h"
 
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 
-const VoxelBlock& SlabData::voxels() const {
+const VoxelBlock& BoxData::voxels() const {
   if (bricks_) {
     block_ = MakeVoxelBlock(bricks_->grid().box, bricks_->type());
     bricks().Read(block_.box, 0, block_.bytes);
@@ -13,7 +13,7 @@ const VoxelBlock& SlabData::voxels() const {
   return block_;
 }
 
-ScalarType SlabData::widest_type() const {
+ScalarType BoxData::widest_type() const {
   ScalarType widest = bricks().type();
   for (const auto* layer : {&layers_.labels, &layers_.overlay}) {
     if (*layer && BytesPerSample((*layer)->type()) > BytesPerSample(widest)) widest = (*layer)->type();
@@ -21,13 +21,13 @@ ScalarType SlabData::widest_type() const {
   return widest;
 }
 
-const BrickRanges& SlabData::ranges() {
+const BrickRanges& BoxData::ranges() {
   if (!ranges_) ranges_.emplace(bricks());
   return *ranges_;
 }
 
-const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
-  // A slab's description never changes: it is its dataset's.
+const ClassificationTable& BoxData::Classification(const FrameSetup& setup) {
+  // A padded box's description never changes: it is its dataset's.
   auto key = std::tuple(setup.renderer, setup.transfer, setup.range);
   if (classified_ != key) {
     table_ = setup.renderer->Table(setup.transfer, setup.description, setup.range);
@@ -36,7 +36,7 @@ const ClassificationTable& SlabData::Classification(const FrameSetup& setup) {
   return table_;
 }
 
-std::size_t SlabData::bytes() const {
+std::size_t BoxData::bytes() const {
   std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
   for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
   if (layers_.cells != nullptr) total += layers_.cells->bytes();

@@ -1,12 +1,12 @@
-// OccupiedCells: the occupied voxels of a slab in the order in which a traversal axis visits them: slice by slice, beam by beam, along each
-// beam.
+// OccupiedVoxels: the occupied voxels of a padded box in the order in which a traversal axis visits them: slice by slice, beam by beam,
+// along each beam.
 //
 // In-slice axes: u, along beams, is the lower of the two axes that are not the traversal axis, v the higher one. A cell is kCellVoxels = 32
 // voxels of a beam from a global multiple of 32 on, stored as a 32-bit mask of the occupied ones. So a beam costs a bit per voxel and four
 // bytes per occupied voxel, for dense and sparse data alike. A voxel's record is found by counting bits from the beam's first cell on.
 //
-// Traversals along z and along y visit the same beams, those along x, in different orders. So CellBeams are kept for two directions only:
-// along x, found in the voxels (FindCellBeams), and along y, for traversal along x, made from those (TurnCellBeams).
+// Traversals along z and along y visit the same beams, those along x, in different orders. So VoxelBeams are kept for two directions only:
+// along x, found in the voxels (FindVoxelBeams), and along y, for traversal along x, made from those (TurnVoxelBeams).
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,8 @@ namespace slabstream {
 
 inline constexpr std::int32_t kCellVoxels = 32, kCellOctets = kCellVoxels / kOctet;
 
-// All beams of a slab along `u`. Tasks fill the arrays in parallel.
-struct CellBeams {
+// All beams of a padded box along `u`. Tasks fill the arrays in parallel.
+struct VoxelBeams {
   Axis u = Axis::kX, inner = Axis::kY;          // beams are numbered [the third axis][inner]
   Box box;                                      // holds all occupied voxels, and little else; empty if there are none
   std::int32_t first_cell = 0, cell_count = 0;  // along u: cell i begins at voxel 32 * (first_cell + i)
@@ -42,14 +42,14 @@ struct CellBeams {
 // A voxel is occupied if `selection` holds its bin. Normals are those of the data's gradient by smoothed central differences
 // (docs/rendering.md) over physical spacing. They are one-sided at the border of the given voxels, which is the volume's border or lies
 // inside the halo where nothing is read. Parallel; the result is the same for any number of threads.
-CellBeams FindCellBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
-                        const BinSelection& selection, const Vec3& spacing);
+VoxelBeams FindVoxelBeams(const VoxelBricks& voxels, const BrickRanges& bricks, const ClassificationTable& table,
+                          const BinSelection& selection, const Vec3& spacing);
 
 // The same voxels, from beams along x, in beams along y, [x][z].
-CellBeams TurnCellBeams(const CellBeams& along_x);
+VoxelBeams TurnVoxelBeams(const VoxelBeams& along_x);
 
 // The cells of one traversal axis; refers to beams, which must outlive it.
-struct OccupiedCells {
+struct OccupiedVoxels {
   SliceAxes axes{};
   Box box;       // the box of the beams, limited to the wanted slices
   Box occupied;  // bounding box of the voxels found in it; empty if there are none
@@ -69,6 +69,6 @@ struct OccupiedCells {
 };
 
 // For the slices of `wanted`. `beams` lie along the u of `traversal`.
-OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted);
+OccupiedVoxels VoxelsOf(const VoxelBeams& beams, Axis traversal, const Box& wanted);
 
 }  // namespace slabstream

@@ -1,4 +1,4 @@
-#include "worker/renderers/splat/occupied_cells.h"
+#include "worker/renderers/splat/occupied_voxels.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_reduce.h>
@@ -35,7 +35,7 @@ std::uint32_t BitsWithin(std::int32_t origin, std::int32_t begin, std::int32_t e
   return std::uint32_t((std::uint64_t{1} << last) - (std::uint64_t{1} << first));
 }
 
-Found FindInSlice(const OccupiedCells& cells, const Box& wanted, std::int32_t slice) {
+Found FindInSlice(const OccupiedVoxels& cells, const Box& wanted, std::int32_t slice) {
   const auto [c, u, v] = cells.axes;
   Found found;
   for (std::int32_t row = cells.box.begin[v]; row < cells.box.end[v]; ++row) {
@@ -60,12 +60,12 @@ Found FindInSlice(const OccupiedCells& cells, const Box& wanted, std::int32_t sl
 
 }  // namespace
 
-std::size_t CellBeams::bytes() const {
+std::size_t VoxelBeams::bytes() const {
   return cells() * sizeof(masks[0]) + (beam_count + 1) * sizeof(first_record[0]) + record_count() * sizeof(VoxelRecord);
 }
 
-OccupiedCells CellsOf(const CellBeams& beams, Axis traversal, const Box& wanted) {
-  OccupiedCells cells;
+OccupiedVoxels VoxelsOf(const VoxelBeams& beams, Axis traversal, const Box& wanted) {
+  OccupiedVoxels cells;
   cells.axes = AxesOf(traversal);
   const auto [c, u, v] = cells.axes;
   CHECK(beams.u == u);

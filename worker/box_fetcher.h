@@ -1,0 +1,140 @@
+// BoxFetcher: the padded boxes of a worker, complete or on their way. It decides which chunks to ask for, within the byte credit, and which
+// padded boxes to drop.
+//
+//   1. Acquire pins a padded box that covers the box; it opens one if none is cached or on its way. Voxels that complete padded boxes hold
+//   are copied
+//      from them: these stay until the new padded box has been rendered from (Rendered) or is dropped. The rest is fetched, box by box.
+//   2. RequestChunks, in the order in which padded boxes will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive
+//   within
+//      chunk_timeout, or arrives damaged, is asked for again, chunk_attempts times; then the padded box is given up (TakeFailures).
+//   3. complete(padded box): it can be rendered from. Release when that is done; the padded box stays cached.
+// Clients that wait for voxels at the same time have equal parts of the credit.
+// Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then the least recently used above
+// cache_bytes or the room (SetRoom). Padded boxes that are waited for begin to take memory one after the other, as far as there is room;
+// the one that is needed next always does, unless others are needed at the same time (RequestChunks).
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+class BoxFetcher {
+ public:
+  using Generation = std::uint64_t;  // BoxKey::generation: names a padded box
+
+  struct Failure {
+    Generation padded = 0;
+    Status status;
+  };
+  // What was received for a padded box since the last report.
+  struct FetchReport {
+    std::uint64_t voxel_bytes = 0;
+    Time begin, end;  // first request, last chunk stored; meaningful if voxel_bytes > 0
+  };
+
+  explicit BoxFetcher(const WorkerConfig& config) : config_(config) {}
+
+  void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all padded boxes, those in use too; without a call there is no limit
+
+  Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, WorkerActions& actions);
+  void Release(Generation padded);  // once for each Acquire
+  // Of acquired padded boxes.
+  bool complete(Generation padded) const { return boxes_.at(padded).is_complete(); }  // all that must be fetched is stored
+  void Rendered(Generation padded);                                                   // the padded box now holds all its voxels itself
+  BoxKey key(Generation padded) const { return boxes_.at(padded).key; }
+  FetchReport TakeReport(Generation padded);
+  // The padded box's memory, with what was derived from its voxels and cells; it may fall. Counts as at least the samples and cells.
+  void SetBytes(Generation padded, std::uint64_t bytes);
+
+  // Of acquired padded boxes: whether rendering from one may touch what rendering from the other one touches.
+  bool Share(Generation a, Generation b) const;
+
+  // Requests missing chunks of these padded boxes, which each client needs in this order, within the credit (one chunk is always allowed)
+  // and the room. `next_at_any_rate`: the first of all begins to take memory even if there is no room.
+  void RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker, Time now,
+                     WorkerActions& actions);
+  void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
+  void OnRefused(const ChunkRefused& refused);
+  void OnStored(const ChunkStored& stored, Time now);
+  void ExpireRequests(Time now);
+  Time NextExpiry() const;  // Time::max() if nothing is requested
+
+  // Padded boxes given up since the last call. They are never complete; whoever acquired them must release them.
+  std::vector<Failure> TakeFailures() { return std::exchange(failures_, {}); }
+
+  void ForgetRequests();  // the coordinator is gone: requested chunks will not come
+  void Trim(WorkerActions& actions);
+
+  std::uint64_t cached_bytes() const { return cached_bytes_; }
+  std::uint64_t fetched_bytes() const { return fetched_bytes_; }
+  std::size_t size() const { return boxes_.size(); }
+  std::size_t chunk_requests() const { return in_flight_.size(); }
+
+ private:
+  struct ChunkPlace {  // a chunk of a box inside the padded box
+    Box box;
+    std::uint32_t chunk = 0;
+    friend bool operator==(const ChunkPlace&, const ChunkPlace&) = default;
+    friend auto operator<=>(const ChunkPlace&, const ChunkPlace&) = default;
+  };
+  struct HeldBox {
+    BoxKey key;
+    int pins = 0;
+    bool retired = false;  // not to be acquired again; dropped when unpinned
+    std::uint64_t bytes = 0;
+    std::uint64_t last_use = 0;
+    std::vector<Generation> sources;  // pinned
+    std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
+    std::uint64_t cell_bytes = 0;     // of the padded box's cells; 0: there are none, or no chunk of them has come yet
+    std::size_t stored = 0, chunk_count = 0;
+    std::map<ChunkPlace, int> failures;
+    FetchReport report;
+    bool requested = false;  // since the last report
+    bool begun = false;      // some of it was requested or copied: it takes memory
+
+    bool is_complete() const { return stored == chunk_count; }
+    std::uint64_t RawBytes() const {  // of samples and cells
+      return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel() + cell_bytes;
+    }
+    std::uint32_t BytesOf(const ChunkPlace& chunk) const;  // the most, if they are not known yet
+  };
+  struct InFlight {
+    std::uint32_t bytes = 0;
+    Time expiry;
+    bool storing = false;
+  };
+  using ChunkName = std::pair<Generation, ChunkPlace>;
+
+  HeldBox* Find(Generation padded);  // null: dropped
+  HeldBox* FindRequested(DatasetId dataset, const ChunkPlace& chunk);
+  OpenBox PlanCopies(HeldBox& padded);
+  std::uint64_t BegunBytes() const;
+  std::uint64_t most_cached() const { return std::min(config_.cache_bytes, room_); }
+  void Unpin(std::span<const Generation> sources);
+  void SetCellBytes(HeldBox& padded, std::uint64_t bytes);
+  void Retry(Generation padded, const ChunkPlace& chunk, const Status& why);
+  void GiveUp(HeldBox& padded, Status status);
+  void RetireCovered(HeldBox& complete);
+  void Drop(Generation padded, WorkerActions& actions);
+
+  const WorkerConfig config_;
+  std::map<Generation, HeldBox> boxes_;
+  std::map<ChunkName, InFlight> in_flight_;  // outlives its padded box: the credit is used until the chunk is stored or expires
+  std::uint64_t in_flight_bytes_ = 0;
+  std::uint64_t room_ = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t cached_bytes_ = 0;  // of boxes_
+  Generation last_generation_ = 0;
+  std::uint64_t use_counter_ = 0;
+  std::uint64_t fetched_bytes_ = 0;
+  std::vector<Failure> failures_;
+};
+
+}  // namespace slabstream
