@@ -75,14 +75,13 @@ class Truth {
   FramePlan Plan(const Policy& policy, const WorkField* cost) const {
     FrameRequest request = subject_.request;
     request.policy = policy;
-    const ResolvedPolicy resolved = ResolvePolicy(request, subject_.summary->description.geometry).value();
+    const ResolvedRequest resolved = ResolveRequest(request, 1, subject_.summary).value();
     const LayoutRequest layout{.summary = subject_.summary.get(),
-                               .transfer = &subject_.setup.transfer,
-                               .policy = &resolved,
-                               .renderer = subject_.setup.renderer,
+                               .volume = &resolved.volume,
+                               .policy = &*resolved.policy,
                                .slots = std::uint32_t(roster_.slots.size()),
                                .known = {.occupied = subject_.occupied.get(), .cost = cost}};
-    return PlanFrame(request, 1, *subject_.summary, roster_, std::make_shared<const Layout>(MakeLayout(layout))).value();
+    return PlanFrame(subject_.setup, *resolved.policy, roster_, std::make_shared<const Layout>(MakeLayout(layout))).value();
   }
   const FrameCosts& Measure(const FramePlan& plan) {
     const std::span<const Box> boxes = plan.layout->partition.boxes();
@@ -110,15 +109,15 @@ void Simulate(const Options& options, const Subject& subject, int workers) {
   const MachineModel machine = ServiceMachine(hosts, {.link = options.link, .memory_scope = 1, .cores = std::int32_t(workers)});
   Truth truth(subject, machine, workers, options.repeats);
 
-  FrameRequest request = subject.request;
-  PolicyQuestion question{.frame = &request,
-                          .summary = subject.summary.get(),
+  const ResolvedRequest resolved = ResolveRequest(subject.request, 1, subject.summary).value();
+  PolicyQuestion question{.resolved = &resolved,
+                          .setup = &subject.setup,
                           .known = {.occupied = subject.occupied.get()},
                           .slots = std::uint32_t(workers),
                           .machine = &machine};
   const auto choose = [&](const Policy& policy) {
-    request.policy = policy;
-    return ChoosePolicy(question).value();
+    question.open = &policy;
+    return ChoosePolicy(question);
   };
   const auto print = [workers](const char* what, const PolicyChoice& choice, const SimulatedFrame& frame) {
     const double render = frame.imbalance * frame.stage_seconds[std::size_t(Stage::kRender)] / workers;

@@ -38,8 +38,8 @@ struct Measured {
   double sum = 0;                         // seconds of all boxes
 };
 
-Measured Measure(const Subject& subject, const FrameRequest& request, std::shared_ptr<const Layout> layout, int workers, int repeats) {
-  Measured measured{.plan = PlanFrame(request, 1, *subject.summary, RosterOf(std::uint32_t(workers)), std::move(layout)).value()};
+Measured Measure(const Subject& subject, FramePlan plan, int workers, int repeats) {
+  Measured measured{.plan = std::move(plan)};
   const std::vector<Placement> placements = PlacementsOf(measured.plan);
   std::vector<double> seconds(static_cast<std::size_t>(workers));
   for (const BoxCost& cost : MeasureBoxCosts(*subject.volume, measured.plan, repeats)) {
@@ -103,7 +103,7 @@ std::vector<View> ViewsOf(const Subject& subject, const Options& options) {
     View& view = views.emplace_back(View{.request = subject.request});
     view.request.view.azimuth_degrees += 360.0 * i / options.views;
     view.request.policy = {.groups = 1};
-    view.whole = Measure(subject, view.request, nullptr, 1, options.repeats).sum;
+    view.whole = Measure(subject, PlanFrame(view.request, 1, *subject.summary, RosterOf(1)).value(), 1, options.repeats).sum;
   }
   return views;
 }
@@ -115,17 +115,23 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
   std::size_t boxes = 0;
   for (View view : views) {
     view.request.policy = policy;
-    MeasuredLayouts layouts(subject.summary, subject.occupied, ClassifiedVolume(1, setup.transfer, setup.renderer), options.workers);
-    std::shared_ptr<const Layout> layout = layouts.Next(view.request);
-    Measured measured = Measure(subject, view.request, layout, options.workers, options.repeats);
+    const ResolvedRequest resolved = ResolveRequest(view.request, 1, subject.summary).value();
+    const FrameSetup of_view = MakeFrameSetup(resolved).value();
+    const auto measure = [&](std::shared_ptr<const Layout> layout) {
+      FramePlan plan = PlanFrame(of_view, *resolved.policy, RosterOf(std::uint32_t(options.workers)), std::move(layout)).value();
+      return Measure(subject, std::move(plan), options.workers, options.repeats);
+    };
+    MeasuredLayouts layouts(options.workers);
+    std::shared_ptr<const Layout> layout = layouts.Next(resolved, subject.occupied);
+    Measured measured = measure(layout);
     fixed.Add(measured, view.whole, PredictionError(*cost, measured), 0);
     boxes = measured.nanoseconds.size();
     double moved = 0;
     for (int frame = 0; frame < options.frames; ++frame) {
       layouts.Learn(measured.plan, measured.nanoseconds);
-      const std::shared_ptr<const Layout> next = layouts.Next(view.request);
+      const std::shared_ptr<const Layout> next = layouts.Next(resolved, subject.occupied);
       moved += double(MovedVoxels(*layout, *next));
-      measured = Measure(subject, view.request, next, options.workers, options.repeats);
+      measured = measure(next);
       if (options.verbose) fmt::print(" {:.3f}{}", measured.imbalance, next != layout ? "*" : "");
       layout = next;
     }

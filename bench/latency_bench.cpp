@@ -125,7 +125,7 @@ int main(int argc, char** argv) {
   AddInteger(app, "--frames", options.frames, 1, 100000, "Measured frames");
   AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
   AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
-  AddNumber(app, "--zoom", options.zoom, {kMinZoom, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
+  AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
   AddRenderer(app, options.renderer);
   return RunProgram(app, argc, argv, [&options] { return Run(options); });
 }

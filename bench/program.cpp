@@ -44,9 +44,9 @@ void AddSubjectOptions(CLI::App& app, SubjectOptions& options) {
       ->required();
   AddRenderer(app, options.renderer);
   AddInteger(app, "--size", options.size, 1, kMaxImageSide, "Pixels a side");
-  AddNumber(app, "--azimuth", options.azimuth, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye turns about +z");
-  AddNumber(app, "--elevation", options.elevation, {-kMaxAngleDegrees, kMaxAngleDegrees}, "Degrees that the eye is lifted towards +z");
-  AddNumber(app, "--zoom", options.zoom, {kMinZoom, kMaxZoom}, "Magnification");
+  AddNumber(app, "--azimuth", options.azimuth, {-360, 360}, "Degrees that the eye turns about +z");
+  AddNumber(app, "--elevation", options.elevation, {-360, 360}, "Degrees that the eye is lifted towards +z");
+  AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification");
 }
 
 Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& text) {
@@ -57,7 +57,9 @@ Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& te
   Subject subject{.name = parsed->name, .volume = *volume, .summary = std::make_shared<const VolumeSummary>(SummaryOf(**volume))};
   const ViewParameters view{.azimuth_degrees = options.azimuth, .elevation_degrees = options.elevation, .zoom = options.zoom};
   subject.request = BenchRequest(*parsed, view, {options.size, options.size});
-  Result<FrameSetup> setup = MakeFrameSetup(subject.request, 1, *subject.summary);
+  const Result<ResolvedRequest> resolved = ResolveRequest(subject.request, 1, subject.summary);
+  if (!resolved.ok()) return resolved.status();
+  Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   subject.setup = *std::move(setup);
   subject.occupied =

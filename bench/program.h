@@ -63,7 +63,7 @@ struct SubjectOptions {
 void AddSubjectOptions(CLI::App& app, SubjectOptions& options);
 
 // `text`: as ParseBenchCase takes it, or "sphere1:N[:PRESET]" or "sphere2:N[:PRESET]", one of the paper's classes. Errors also of
-// LoadBenchVolume and MakeFrameSetup.
+// LoadBenchVolume, ResolveRequest and MakeFrameSetup.
 Result<Subject> LoadSubject(const SubjectOptions& options, const std::string& text);
 
 }  // namespace slabstream

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstring>
+#include <memory>
 
 #include "common/decomposition/decomposition.h"
 #include "common/planning/frame_plan.h"
@@ -28,9 +29,10 @@ constexpr int kAzimuths = 12;
 void Render(benchmark::State& state, const Volume& volume, const RendererKind& kind, const std::vector<ViewParameters>& views, int boxes,
             int threads) {
   const BenchCase look = StandardSphere(SphereClass::kHollow, kObject, &kind);
-  const VolumeSummary summary = Summarize(volume);
+  const auto summary = std::make_shared<const VolumeSummary>(Summarize(volume));
   std::vector<FrameSetup> setups;
-  for (const ViewParameters& view : views) setups.push_back(MakeFrameSetup(BenchRequest(look, view, {512, 512}), 1, summary).value());
+  for (const ViewParameters& view : views)
+    setups.push_back(MakeFrameSetup(ResolveRequest(BenchRequest(look, view, {512, 512}), 1, summary).value()).value());
 
   const WorkField voxels = WorkField::Uniform(volume.description.geometry.size);
   const Partition partition = MakeSlabs({.work = &voxels, .boxes = boxes});

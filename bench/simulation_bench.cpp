@@ -2,6 +2,9 @@
 // (laboratory/measure/validate.h).
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "bench/program.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/validate.h"
@@ -39,9 +42,10 @@ void Validate(const BenchCase& c, const std::shared_ptr<const Volume>& volume, c
                          high * 1e3, p.render * 1e3, p.picture * 1e3, (p.latency - p.render - p.picture) * 1e3);
     };
     const ValidatedView mean = row.Mean();
+    const double worst = std::ranges::max(row.views, {}, [](const ValidatedView& view) { return std::abs(view.error()); }).error();
     fmt::print("{} {} workers: measured {}, simulated {}, off by {:+.1f} %, at worst {:+.1f} %; wake-ups {}, {}{}\n", row.name, row.workers,
                parts(mean.measured, mean.measured_low, mean.measured_high), parts(mean.simulated, mean.simulated_low, mean.simulated_high),
-               row.error() * 100, row.worst_error() * 100, Microseconds(row.wake_ups.awake), Microseconds(row.wake_ups.asleep),
+               row.error() * 100, worst * 100, Microseconds(row.wake_ups.awake), Microseconds(row.wake_ups.asleep),
                workers == 2 ? ", slowdown " + Percent(row.slowdown) : "");
     (void)std::fflush(stdout);
   }

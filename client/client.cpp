@@ -11,6 +11,7 @@
 #include "common/base/any_of.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
+#include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
 #include "common/wire/validate_request.h"
@@ -62,14 +63,16 @@ struct OpenQuestion {
 
 struct Event {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> what;
+  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply,
+               DataReply>
+      what;
 };
 
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(Event event) {
   const auto what =
       Overloaded{[](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
-                 [](AnyOf<SummaryReply, SampleReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
+                 [](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
                    return QuestionReply(std::move(reply));
                  },
                  [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
@@ -119,9 +122,14 @@ struct Client::Impl {
   bool ExpireQuestions(Time now);                          // true: some have ended
   void FailAll(const std::string& reason);
 
+  // The reason, once the service counts as gone.
+  std::optional<std::string> Loss(Time now) const;
+
   std::string endpoint;
   Socket socket;
   ClientTiming timing;
+  const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
+  bool unreachable = false;  // the last ping could not be queued
   Wakeup wakeup;
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
@@ -145,10 +153,16 @@ void Client::Impl::SendPing(Time now) {
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
   }
-  (void)Send(ping);  // a ping that cannot be queued counts as unanswered
+  unreachable = !Send(ping).ok();  // it counts as unanswered
   pinged[ping.nonce] = std::move(ping.open);
   if (!unanswered_since) unanswered_since = now;
   next_ping = now + timing.ping;
+}
+
+std::optional<std::string> Client::Impl::Loss(Time now) const {
+  if (same_process) return unreachable ? std::optional<std::string>("has ended") : std::nullopt;
+  if (!unanswered_since || now - *unanswered_since < timing.silence) return std::nullopt;
+  return "has not answered for " + Milliseconds(now - *unanswered_since);
 }
 
 bool Client::Impl::Pump(Time limit) {
@@ -157,13 +171,13 @@ bool Client::Impl::Pump(Time limit) {
   Time now = MonotonicNow();
   if (ExpireQuestions(now)) ready = true;
   if (!open.empty() || !questions.empty()) {
-    if (unanswered_since && now - *unanswered_since >= timing.silence) {
-      FailAll("the service at " + endpoint + " has not answered for " + Milliseconds(now - *unanswered_since));
+    if (now >= next_ping) SendPing(now);
+    if (const std::optional<std::string> loss = Loss(now)) {
+      FailAll("the service at " + endpoint + " " + *loss);
       return false;
     }
-    if (now >= next_ping) SendPing(now);
     limit = std::min(limit, next_ping);
-    if (unanswered_since) limit = std::min(limit, *unanswered_since + timing.silence);
+    if (unanswered_since && !same_process) limit = std::min(limit, *unanswered_since + timing.silence);
     for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
   }
   if (ready) return false;  // this may be what the caller waits for
@@ -194,18 +208,18 @@ bool Client::Impl::Receive() {
 }
 
 void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
-  const auto handle =
-      Overloaded{[&](const FrameProgress& progress) {
-                   if (open.contains(progress.request)) events.push_back({progress.request, progress});
-                 },
-                 [&](FrameReply& reply) { Handle(reply, payload); },
-                 [&](const FrameFailed& failed) { End(failed.request, failed.status); },
-                 [&](const ClientPong& pong) { Handle(pong); },
-                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
-                 [&](AnyOf<SummaryReply, SampleReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
-                   End(reply.nonce, std::move(reply));
-                 },
-                 [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
+  const auto handle = Overloaded{
+      [&](const FrameProgress& progress) {
+        if (open.contains(progress.request)) events.push_back({progress.request, progress});
+      },
+      [&](FrameReply& reply) { Handle(reply, payload); },
+      [&](const FrameFailed& failed) { End(failed.request, failed.status); },
+      [&](const ClientPong& pong) { Handle(pong); },
+      [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+      [&](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
+        End(reply.nonce, std::move(reply));
+      },
+      [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
 }
 
@@ -391,6 +405,12 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
     return Status::DataLoss("the service answered " + std::to_string(reply->samples.size()) + " of " + std::to_string(count) + " points");
   }
   return std::move(reply->samples);
+}
+
+Result<BoxStatistics> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline) {
+  Result<StatisticsReply> reply = impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box}, deadline));
+  if (!reply.ok()) return reply.status();
+  return reply->statistics;
 }
 
 Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Await<StatusReply>(impl_->Ask(StatusQuery{}, timeout)); }

@@ -48,8 +48,10 @@ struct ServiceAddress {
 };
 
 struct ClientTiming {
-  Duration ping = std::chrono::seconds(1);     // between pings while requests are open
-  Duration silence = std::chrono::seconds(5);  // without an answer to a ping, the service counts as gone
+  Duration ping = std::chrono::seconds(1);  // between pings while requests are open
+  // If a ping has had no answer for this long, the service counts as gone. A service in the same process (inproc) cannot be lost, only be
+  // slow: it counts as gone when it has ended.
+  Duration silence = std::chrono::seconds(5);
 };
 
 inline constexpr Duration kAnswerTime = std::chrono::minutes(2);  // for an answer to a question: volumes may have to be loaded first
@@ -81,6 +83,7 @@ class Client {
   // The answers to questions; these submit and wait. InvalidArgument, NotFound, ...: as of frames.
   Result<SummaryReply> Summarize(const std::string& dataset, const TransferChoice& transfer = {}, Duration deadline = kAnswerTime);
   Result<std::vector<VolumeSample>> SampleAt(const std::string& dataset, std::vector<Vec3> points, Duration deadline = kAnswerTime);
+  Result<BoxStatistics> StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline = kAnswerTime);
 
   // A notified wakeup() ends this one early: Unavailable.
   Result<StatusReply> QueryStatus(Duration timeout = std::chrono::seconds(5));

@@ -30,10 +30,14 @@ bool MostBricksAreEqual(const VolumeSummary& summary) {
   return 2 * std::size_t(equal) >= summary.bricks.size();
 }
 
-FoldersSeen Check(const CheckWatchedFolders& action) {
+FoldersSeen Check(const CheckWatchedFolders& action, FolderMemory& memory) {
   FoldersSeen seen;
   for (const std::string& folder : action.folders) {
-    seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return ListFolder(folder); }));
+    if (!action.asked_for && memory.IsUnchanged(folder)) {
+      seen.unchanged.insert(folder);
+    } else {
+      seen.folders.emplace(folder, Guarded(folder.c_str(), [&] { return memory.Remember(folder, [&] { return ListFolder(folder); }); }));
+    }
   }
   return seen;
 }
@@ -66,6 +70,12 @@ Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, c
                                                      : count(samples.view(), drawn);
   AddLayerBricks(LayerBricks(*action.summary, renderer, action.volume.looks()), *action.summary, grid);
   return std::make_shared<const OccupancyGrid>(std::move(grid));
+}
+
+// Makes the event that ends an action: what names the action, then the result or the error.
+template <class Event, class... Names>
+auto EndOf(Names... names) {
+  return [names...](auto result) { return Event{names..., std::move(result)}; };
 }
 
 }  // namespace
@@ -103,8 +113,13 @@ BackgroundActions::AtOnce BackgroundActions::Post(auto&& tasks, const char* what
   return failed(begun);
 }
 
-Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action) {
-  const Result<LoadedSource> loaded = LoadSource(action.source);
+BackgroundActions::AtOnce BackgroundActions::PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end) {
+  return Post(
+      tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
+}
+
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const std::function<void(int percent)>& tell) {
+  const Result<LoadedSource> loaded = LoadSource(action.source, tell);
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
   const Layers& layers = loaded->layers;
@@ -127,10 +142,11 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
   return Post(
-      loads_, barrier.c_str(), [action] { return Load(action); },
-      [name = action.name, load = action.load](const Status& why) {
-        return DatasetFailed{name, load, why};
-      });
+      loads_, barrier.c_str(),
+      [action, inbox = inbox_] {
+        return Load(action, [&](int percent) { inbox->Post(News{DatasetReading{action.name, action.load, percent}}); });
+      },
+      EndOf<DatasetFailed>(action.name, action.load));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
@@ -139,19 +155,14 @@ BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CheckDatasetFiles& action) {
-  return Post(
-      checks_, "checking the files of a dataset",
-      [action] {
-        return News{DatasetSeen{action.name, action.load, HaveChanged(*action.stamp)}};
-      },
-      [name = action.name, load = action.load](const Status& why) {
-        return DatasetSeen{name, load, why};
-      });
+  return PostResult(
+      checks_, "checking the files of a dataset", [stamp = action.stamp] { return HaveChanged(*stamp); },
+      EndOf<DatasetSeen>(action.name, action.load));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action) {
   return Post(
-      checks_, "searching the watched folders", [action] { return News{Check(action)}; },
+      checks_, "searching the watched folders", [action, memory = folders_] { return News{Check(action, *memory)}; },
       [](const Status& why) {
         LogWarning(why.message());
         return FoldersSeen{};
@@ -159,25 +170,14 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CheckWatchedFolders& action
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
-  return Post(
-      checks_, "a check of files",
-      [action] {
-        return News{DatasetsFound{action.order, Find(action.arguments)}};
-      },
-      [order = action.order](const Status& why) {
-        return DatasetsFound{order, why};
-      });
+  return PostResult(
+      checks_, "a file check", [action] { return Find(action.arguments); }, EndOf<DatasetsFound>(action.order));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
-  return Post(
-      answers_, "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset)] {
-        return News{QuestionAnswered{action.id, AnswerTo(action, samples)}};
-      },
-      [id = action.id](const Status& why) {
-        return QuestionAnswered{id, why};
-      });
+  return PostResult(
+      answers_, "an answer to a question", [action, samples = voxels_.Find(action.dataset)] { return AnswerTo(action, samples); },
+      EndOf<QuestionAnswered>(action.id));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {
@@ -189,9 +189,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {
         const Result<std::shared_ptr<UploadBuffer>> made = UploadBuffer::Make(order);
         return News{.event = UploadBegun{upload, made.status()}, .upload = made.ok() ? *made : nullptr};
       },
-      [upload](const Status& why) {
-        return UploadBegun{upload, why};
-      });
+      EndOf<UploadBegun>(upload));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
@@ -201,14 +199,8 @@ BackgroundActions::AtOnce BackgroundActions::Perform(StoreUpload& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FinishUpload& action) {
   const auto whole = uploads_.extract(action.upload);
-  return Post(
-      loads_, "finishing a volume",
-      [upload = action.upload, buffer = whole.mapped()] {
-        return News{UploadFinished{upload, buffer->Finish()}};
-      },
-      [upload = action.upload](const Status& why) {
-        return UploadFinished{upload, why};
-      });
+  return PostResult(
+      loads_, "finishing a volume", [buffer = whole.mapped()] { return buffer->Finish(); }, EndOf<UploadFinished>(action.upload));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {
@@ -217,14 +209,10 @@ BackgroundActions::AtOnce BackgroundActions::Perform(DropUpload& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(CountDataset& action) {
-  return Post(
-      counts_.Of(action.volume.dataset()), "counting of occupied voxels",
-      [count = count_occupied_, samples = voxels_.Find(action.volume.dataset()), action] {
-        return News{OccupiedCounted{action.count, Count(count, samples, action)}};
-      },
-      [id = action.count](const Status& why) {
-        return OccupiedCounted{id, why};
-      });
+  const auto find = [count = count_occupied_, samples = voxels_.Find(action.volume.dataset()), action] {
+    return Count(count, samples, action);
+  };
+  return PostResult(counts_.Of(action.volume.dataset()), "counting of occupied voxels", find, EndOf<OccupiedCounted>(action.count));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {

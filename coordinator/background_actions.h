@@ -13,7 +13,6 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
-#include <variant>
 #include <vector>
 
 #include "common/base/background_tasks.h"
@@ -21,6 +20,7 @@
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/dataset_machine.h"
+#include "coordinator/folder_memory.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
 #include "coordinator/upload_buffer.h"
@@ -76,15 +76,18 @@ class BackgroundActions {
     VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
-  static Result<News> Load(const LoadDataset& action);
+  static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(auto&& tasks, const char* what, auto make, auto failed);
+  // Where the event holds a result: that of `find`, or the error.
+  AtOnce PostResult(auto&& tasks, const char* what, auto find, auto end);
 
   const std::shared_ptr<Mailbox<News>> inbox_ = std::make_shared<Mailbox<News>>();  // tasks that outlive this share it
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;
   VoxelServer& voxels_;
+  const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
   std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen

@@ -12,8 +12,10 @@
 
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
+#include "common/wire/limits.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
+#include "data/volume_io/read_progress.h"
 #include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -128,6 +130,19 @@ Status AddFolder(FoundData& found, const std::string& path) {
   return Status::Ok();
 }
 
+// Those of folders for which the catalogue has no room.
+void LeaveOutMost(FoundData& found) {
+  std::size_t left_out = 0;
+  for (auto next = found.datasets.end(); next != found.datasets.begin() && found.datasets.size() > kMaxListed;) {
+    --next;
+    if (next->second.folder.empty()) continue;
+    next = found.datasets.erase(next);
+    ++left_out;
+  }
+  if (left_out == 0) return;
+  found.complaints.push_back(fmt::format("{} volumes of folders are left out: the catalogue has at most {}", left_out, kMaxListed));
+}
+
 // The files of a source, by its headers.
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   const Result<VolumeSource> source = ParseVolumeSource(data.path);
@@ -140,9 +155,11 @@ Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   return files;
 }
 
-Result<LayeredVolume> ReadSource(const DataSource& data) {
-  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<void(int)>& tell) {
+  Result<VolumeSource> source = ParseVolumeSource(data.path);
   if (!source.ok()) return source.status();
+  ReadProgress progress(tell);
+  source->options.progress = &progress;
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
@@ -236,7 +253,13 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
       note(argument, AddNamed(found, *parsed));
     }
   }
+  if (found.datasets.size() > kMaxListed) {
+    found.errors.push_back(Status::InvalidArgument(
+        fmt::format("{}{} volumes are named, the catalogue has at most {}", prefix, found.datasets.size(), kMaxListed)));
+    return found;
+  }
   for (const auto& [argument, folder] : folders) note(argument, AddFolder(found, folder.path));
+  LeaveOutMost(found);
   return found;
 }
 
@@ -265,7 +288,7 @@ void CheckFiles(FoundData& found) {
   }
 }
 
-Result<LoadedSource> LoadSource(const DataSource& source) {
+Result<LoadedSource> LoadSource(const DataSource& source, const std::function<void(int percent)>& tell) {
   if (source.load) {
     Result<LayeredVolume> loaded = source.load();
     if (!loaded.ok()) return loaded.status();
@@ -278,7 +301,7 @@ Result<LoadedSource> LoadSource(const DataSource& source) {
     const Result<FileStamp> stamp = StampFiles(*std::move(files));
     if (!stamp.ok()) return stamp.status();
     AwaitRest(*stamp);
-    Result<LayeredVolume> read = ReadSource(source);
+    Result<LayeredVolume> read = ReadSource(source, tell);
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed) continue;
     if (!read.ok()) return read.status();

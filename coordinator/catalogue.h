@@ -14,6 +14,7 @@
 // Everything here may take as long as the file system does. Any thread.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -66,7 +67,9 @@ struct LoadedSource {
   std::shared_ptr<const FileStamp> stamp;  // of its files as they were read; null: they never change
 };
 // Reads the voxels, those of layers too. Files that change meanwhile are read a second time, so the voxels are never those of two files.
-// Errors: of ReadVolume and ReadLayers; Unavailable: they change again.
-Result<LoadedSource> LoadSource(const DataSource& source);
+// `tell` hears, on this thread, each whole percent of the volume's samples that has been read. Errors: of ReadVolume and ReadLayers;
+// Unavailable: they change again.
+Result<LoadedSource> LoadSource(
+    const DataSource& source, const std::function<void(int percent)>& tell = [](int) {});
 
 }  // namespace slabstream

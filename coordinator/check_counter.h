@@ -1,5 +1,5 @@
 // CheckCounter: numbers the checks of something that may change at any time, such as files. A check tells how things were after it began.
-// So whoever asks needs one that begins after the question; those who ask while one is under way share the next one.
+// So whoever wants to know needs a check that begins later; all who ask while a check is under way share the next one.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@ using CheckId = std::uint64_t;  // from 1; 0: none
 
 class CheckCounter {
  public:
-  CheckId Want() { return wanted_ = begun_ + 1; }  // the check that answers a question of now
+  CheckId Want() { return wanted_ = begun_ + 1; }  // the check for somebody who asks now
   bool MustBegin() const { return begun_ == ended_ && wanted_ > begun_; }
   void Begin() { ++begun_; }
   void End() { ended_ = begun_; }           // the one under way, if any, or its answer is no longer wanted

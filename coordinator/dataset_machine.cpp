@@ -49,6 +49,7 @@ void DatasetMachine::State::On(const EndDatasets& event) {
 CheckId DatasetMachine::State::Seek(const std::string& name) {
   if (!datasets.IsListed(name)) {
     datasets.Await(name, folder_checks.Want());
+    folders_asked_for = true;
     CheckFolders();
     return 0;
   }
@@ -75,7 +76,7 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   if (entry.state == DatasetState::kReady) {
     news.uses[id] = DatasetReady{entry.id, entry.summary, entry.checks.IsOver(use.check)};
   } else {
-    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading};
+    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
   }
 }
 
@@ -123,6 +124,12 @@ void DatasetMachine::State::LoadData(const std::string& name) {
   const LoadId load = datasets.BeginLoad(name, now);
   actions.emplace_back(LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source});
   TellUses(name);
+}
+
+void DatasetMachine::State::On(const DatasetReading& event) {
+  if (!datasets.IsLoading(event.name, event.load)) return;
+  datasets.Find(event.name)->percent = event.percent;
+  TellUses(event.name);
 }
 
 void DatasetMachine::State::On(const DatasetLoaded& event) {
@@ -206,7 +213,11 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
   DatasetTable::Entry* const entry = datasets.FindLoad(event.name, event.load);
   if (entry == nullptr) return;
   entry->checks.End();
-  if (!event.changed.ok()) {
+  if (event.changed.status().code() == StatusCode::kResourceExhausted) {
+    // Says nothing about the files: what is loaded stays, and whoever asks again may have more luck.
+    Lose(event.name, event.changed.status(), nullptr);
+    CheckFilesOf(event.name);
+  } else if (!event.changed.ok()) {
     FailData(event.name, event.changed.status());
   } else if (*event.changed) {
     Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));
@@ -226,7 +237,7 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
 void DatasetMachine::State::CheckFolders() {
   if (!folder_checks.MustBegin()) return;
   folder_checks.Begin();
-  actions.emplace_back(CheckWatchedFolders{datasets.folders});
+  actions.emplace_back(CheckWatchedFolders{datasets.folders, std::exchange(folders_asked_for, false)});
 }
 
 // At the folders, if there are any, and the files of what is loaded.

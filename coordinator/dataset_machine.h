@@ -57,7 +57,7 @@ struct ClientAsked {
   ClientToDatasets message;
   Bytes payload = {};
 };
-// A request, question or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
+// A request, question, order or part of an upload that could not be decoded, with the answer for its client (RefusalOf).
 struct BadRequest {
   PeerToken from = 0;
   CoordinatorToClient answer;
@@ -70,6 +70,11 @@ struct DatasetLoaded {
   std::shared_ptr<const VolumeSummary> summary;
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
+};
+struct DatasetReading {  // not the end yet
+  std::string name;
+  LoadId load = 0;
+  int percent = 0;  // of its samples that have been read, [1, 100]
 };
 struct DatasetFailed {
   std::string name;
@@ -85,6 +90,7 @@ struct DatasetSeen {
 // The end of a CheckWatchedFolders.
 struct FoldersSeen {
   std::map<std::string, Result<FoundData>> folders;
+  std::set<std::string> unchanged = {};  // since the last one
 };
 // The end of a FindDatasets.
 struct DatasetsFound {
@@ -107,8 +113,8 @@ struct UploadFinished {
   Result<DataSource> source;
 };
 struct DatasetTick {};
-using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetFailed, DatasetSeen, FoldersSeen,
-                                  DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
+using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetReading, DatasetFailed, DatasetSeen,
+                                  FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
 
 // ---- actions
 // -> DatasetLoaded or DatasetFailed
@@ -127,9 +133,11 @@ struct CheckDatasetFiles {
   LoadId load = 0;
   std::shared_ptr<const FileStamp> stamp;
 };
-// -> FoldersSeen: what lies in each of these folders.
+// -> FoldersSeen: what is in each of these folders. If nobody has asked for the check (it is only time for another one), folders that have
+// not changed are not searched (FolderMemory). One at a time.
 struct CheckWatchedFolders {
   std::set<std::string> folders;
+  bool asked_for = false;
 };
 // -> DatasetsFound: what these arguments of an order mean, and whether it can be read.
 struct FindDatasets {
@@ -167,7 +175,7 @@ using DatasetAction = std::variant<DatasetNews, ToClient, LoadDataset, UnloadDat
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0.
 struct DatasetSizes {
   std::size_t uses = 0;
-  std::size_t orders = 0, awaited = 0;  // that wait for a check of files; names that do
+  std::size_t orders = 0, awaited = 0;  // that wait for a file check; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
   std::size_t questions = 0, uploads = 0;
 };

@@ -10,20 +10,23 @@ namespace slabstream {
 
 void DatasetMachine::State::On(const FoldersSeen& event) {
   folder_checks.End();
-  std::set<std::string> heard;
   for (const auto& [folder, found] : event.folders) {
     if (!datasets.folders.contains(folder)) continue;  // not any more
+    std::set<std::string> heard;
     if (found.ok()) {
       heard.insert(found->complaints.begin(), found->complaints.end());
-      MergeFolder(folder, found->datasets, "its file is not in " + folder + " any more");
+      const std::size_t left_out = MergeFolder(folder, found->datasets, "its file is not in " + folder + " any more");
+      if (left_out > 0) {
+        heard.insert(fmt::format("{}: {} volumes are left out: the catalogue has at most {}", folder, left_out, config.max_datasets));
+      }
     } else {
       heard.insert(found.status().message());  // what was found before stays
     }
+    for (const std::string& line : heard) {
+      if (!complaints[folder].contains(line)) Tell(NoteAbout::kDatasets, LogLevel::kWarning, "{}", line);
+    }
+    complaints[folder] = std::move(heard);
   }
-  for (const std::string& line : heard) {
-    if (!complaints.contains(line)) Tell(NoteAbout::kDatasets, LogLevel::kWarning, "{}", line);
-  }
-  complaints = std::move(heard);
 
   std::vector<std::string> missing;
   datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
@@ -38,24 +41,31 @@ void DatasetMachine::State::On(const FoldersSeen& event) {
   AnswerLists();
 }
 
-// `gone`: why what is not found is no dataset any more.
-void DatasetMachine::State::MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone) {
+// `gone`: why what is not found is no dataset any more. How many found ones the catalogue has no room for.
+std::size_t DatasetMachine::State::MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone) {
   std::vector<std::string> missing;
   datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
     if (entry.source.folder == folder && !found.contains(name)) missing.push_back(name);
   });
   for (const std::string& name : missing) RemoveData(name, gone);
   std::erase_if(hidden, [&](const auto& name) { return name.second == folder && !found.contains(name.first); });
+  std::size_t left_out = 0, room = config.max_datasets - std::min(config.max_datasets, datasets.size());
   for (const auto& [name, source] : found) {
     if (hidden.contains(name)) continue;
     if (!datasets.IsListed(name)) {
-      if (datasets.size() < config.max_datasets) AddData(name, source);
+      if (room == 0) {
+        ++left_out;
+        continue;
+      }
+      AddData(name, source);
+      --room;
     } else if (DatasetTable::Entry* const entry = datasets.Find(name);
                entry->source.folder == folder && entry->source.path != source.path) {
       entry->source = source;
       RenewData(name);
     }
   }
+  return left_out;
 }
 
 // ---------------------------------------------------------------- the catalogue
@@ -77,6 +87,7 @@ void DatasetMachine::State::RemoveData(const std::string& name, const std::strin
 
 void DatasetMachine::State::StopWatching(const std::string& folder) {
   datasets.folders.erase(folder);
+  complaints.erase(folder);
   MergeFolder(folder, {}, "an admin has removed " + folder);
 }
 
@@ -94,6 +105,7 @@ void DatasetMachine::State::OnMessage(PeerToken client, const DataOrder& message
     case DataAction::kReload: return AnswerOrder(client, message, Reload(message.items));
     case DataAction::kList: break;
   }
+  folders_asked_for = true;
   CheckEverything();
   if (!datasets.folders.empty()) order.folders = folder_checks.Last();
   datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
@@ -173,6 +185,7 @@ Status DatasetMachine::State::Remove(const std::vector<std::string>& items) {
     if (!entry->source.folder.empty()) hidden[name] = entry->source.folder;
     RemoveData(name, "an admin has removed it");
   }
+  folders_asked_for = true;  // there may be room now for what was left out, or a name that was taken
   return Status::Ok();
 }
 

@@ -12,7 +12,6 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -35,7 +34,7 @@ struct DatasetMachine::State {
     CheckId check = 0;              // at its files, which must be over before a frame begins; 0: none
     std::optional<DatasetId> kept;  // its frame has begun with these voxels
   };
-  // An order that waits for a check of files. kList: for that at the folders and those at datasets.
+  // An order that waits for a file check. kList: for the one of the folders and those of the datasets.
   struct OpenOrder {
     PeerToken client = 0;
     DataOrder order;
@@ -66,8 +65,9 @@ struct DatasetMachine::State {
   std::map<UploadId, OpenUpload> uploads;  // at most one of each client
   UploadId last_upload = 0;
   CheckCounter folder_checks;
-  Time next_round;                            // when the folders are looked through, if there are any
-  std::set<std::string> complaints;           // about what lies in the folders
+  Time next_round;                                          // when the folders are looked through, if there are any
+  std::map<std::string, std::set<std::string>> complaints;  // about what lies in each folder
+  bool folders_asked_for = false;                           // by a client, since the last check began
   std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
   RefusedRequests refused;                    // questions and uploads, and what could not be decoded
 
@@ -89,6 +89,7 @@ struct DatasetMachine::State {
   void On(const ClientAsked& event);
   void On(const BadRequest& event);
   void On(const DatasetLoaded& event);
+  void On(const DatasetReading& event);
   void On(const DatasetFailed& event);
   void On(const DatasetSeen& event);
   void On(const FoldersSeen& event);
@@ -102,6 +103,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const DataOrder& message, const Bytes&);
   void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
@@ -134,7 +136,7 @@ struct DatasetMachine::State {
   void AddData(const std::string& name, const DataSource& source);
   void RemoveData(const std::string& name, const std::string& why);
   void StopWatching(const std::string& folder);
-  void MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
+  std::size_t MergeFolder(const std::string& folder, const Catalogue& found, const std::string& gone);
   Status Remove(const std::vector<std::string>& items);
   Status Reload(const std::vector<std::string>& items);
   Status AddFound(const FoundData& found);

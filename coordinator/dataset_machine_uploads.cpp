@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <utility>
 
 #include "common/frame/dataset_name.h"
 #include "common/volume/memory_budget.h"

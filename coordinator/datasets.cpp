@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "common/base/natural_order.h"
 #include "common/frame/dataset_name.h"
 
 namespace slabstream {
@@ -44,8 +45,10 @@ DatasetTable::Entry* DatasetTable::FindLoad(const std::string& name, LoadId load
 Status DatasetTable::NoSuchDataset(const std::string& name) const {
   std::vector<std::string> names;
   for (const auto& [known, entry] : entries_) {
-    if (entry.awaited == 0 && names.size() < kNamesInMessage) names.push_back(known);
+    if (entry.awaited == 0) names.push_back(known);
   }
+  std::ranges::sort(names, {}, InNaturalOrder);
+  if (names.size() > kNamesInMessage) names.resize(kNamesInMessage);
   if (names.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
   const std::string more = size() > names.size() ? fmt::format(" and {} more", size() - names.size()) : "";
   return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names, ", "), more));
@@ -87,6 +90,7 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   entry.state = DatasetState::kLoading;
   entry.since = now;
   entry.error.clear();
+  entry.percent = 0;
   return entry.load = ++last_load_;
 }
 
@@ -186,6 +190,7 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
     }
     report.push_back(std::move(status));
   }
+  std::ranges::sort(report, {}, [](const DatasetStatus& status) { return InNaturalOrder(status.name); });
   return report;
 }
 

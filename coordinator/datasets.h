@@ -33,6 +33,7 @@ class DatasetTable {
     DatasetState state = DatasetState::kUnloaded;
     Time since;                                    // in this state
     LoadId load = 0;                               // the last one begun; 0: none
+    int percent = 0;                               // kLoading only: of its samples that have been read, as far as is known
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change

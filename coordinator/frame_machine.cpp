@@ -27,7 +27,7 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
     occupancy.Counted(event.count, *event.grid);
   } else if (const std::optional<ClassifiedVolume> failed = occupancy.Failed(event.count)) {
     const auto waits = [&](const OpenRequest& request) {
-      return request.needs_occupancy && request.dataset() != nullptr && request.dataset()->volume.Whole() == *failed;
+      return request.needs_occupancy && request.dataset() != nullptr && request.dataset()->volume().Whole() == *failed;
     };
     for (const OpenRequest& request : queue.Extract(waits)) FailRequest(request, event.grid.status());
   }
@@ -36,8 +36,8 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
 // A request that has ended is not in the queue any more.
 void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
-  const Result<int> fit =
-      event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.summary) : Result<int>(event.frame.status());
+  const Result<int> fit = event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.resolved->summary)
+                                           : Result<int>(event.frame.status());
   const auto asked = [&](const OpenRequest& request) {
     const auto* const ask = request.plan<PlanAsked>();
     return ask != nullptr && ask->plan == event.plan ? ask : nullptr;
@@ -48,7 +48,7 @@ void FrameMachine::State::On(const Planned& event) {
     });
   }
   const StatusCode code = fit.status().code();
-  const bool bad = code == StatusCode::kInvalidArgument || code == StatusCode::kNotFound;
+  const bool bad = code == StatusCode::kInvalidArgument;
   const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
   const RefusedAs as = bad ? &RefusedRequests::bad_request : too_large ? &RefusedRequests::too_large : nullptr;
   const auto is_it = [&](const OpenRequest& request) { return asked(request) != nullptr && asked(request)->version == roster.version(); };
@@ -68,10 +68,10 @@ void FrameMachine::State::CountAhead() {
   const auto count = [&](const OpenRequest& request) {
     const auto* const dataset = request.dataset();
     if (dataset == nullptr || !request.uses_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
-    const ClassifiedVolume volume = dataset->volume.Whole();
+    const ClassifiedVolume volume = dataset->volume().Whole();
     if (std::ranges::find(ahead, volume) != ahead.end()) return true;
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
-      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->summary});
+      actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->resolved->summary});
     }
     ahead.push_back(volume);
     return ahead.size() < kCountAhead;
@@ -89,7 +89,7 @@ void FrameMachine::State::PlanAhead() {
     auto* const dataset = request.dataset();
     if (dataset == nullptr) return false;
     if (std::visit(is_present, dataset->plan)) return true;
-    const auto occupied = request.uses_occupancy ? occupancy.Find(dataset->volume.Whole()) : nullptr;
+    const auto occupied = request.uses_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
     if (request.needs_occupancy && occupied == nullptr) return false;
     dataset->plan = PlanAsked{++last_plan, roster.version()};
     planning.insert(last_plan);
@@ -105,13 +105,10 @@ void FrameMachine::State::PlanAhead() {
 }
 
 PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
-  const FrameRequest& frame = request.submit.frame;
-  Team team = TeamOf(roster.slots(), std::uint32_t(frame.policy.teams), last_plan);
+  Team team = TeamOf(roster.slots(), std::uint32_t(request.submit.frame.policy.teams), last_plan);
   PlanRequest ask{.plan = last_plan,
                   .client = request.client,
-                  .frame = frame,
-                  .volume = request.dataset()->volume,
-                  .summary = request.dataset()->summary,
+                  .resolved = request.dataset()->resolved,
                   .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
                   .turn = team.turn};
@@ -154,7 +151,7 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
        request.submit.frame.size.height, std::chrono::duration<double, std::milli>(now - request.arrived).count(), workers.size(),
        frame.attempt(), result);
   queue.Settle(frame.request(), frame.WorkerTime());
-  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   frames.Remove(id);
   for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
 }
@@ -208,7 +205,7 @@ std::string_view FrameMachine::State::WhatLacks(const OpenRequest& request) cons
   if (!dataset->seen) return "its dataset's files were still being looked at";
   if (clients.IsBehind(request.client)) return "this client did not read its earlier pictures";
   if (roster.empty()) return "there was no worker";
-  if (request.needs_occupancy && occupancy.Counting(dataset->volume.Whole()))
+  if (request.needs_occupancy && occupancy.Counting(dataset->volume().Whole()))
     return "the occupied voxels of its dataset were still being counted";
   const bool under_way = request.plan<PlanAsked>() != nullptr || (request.plan<PlanMade>() != nullptr && ReadyPlan(request) == nullptr);
   return under_way ? "it was still being planned" : "it was still queued";
@@ -236,14 +233,28 @@ void FrameMachine::State::Advance() {
   DismissWorkers();
 }
 
+// A frame on trial waits until what the others have under way is over.
+bool FrameMachine::State::AwaitsTrial(const RunningFrame& frame) {
+  return frames.OnTrial() == &frame && frame.between_attempts() && frames.OthersWait(frame);
+}
+
+// Workers that hold what they have accumulated of other frames.
+std::set<WorkerId> FrameMachine::State::HoldersOf(const RunningFrame& frame) const {
+  std::set<WorkerId> holders;
+  for (const RunningFrame& other : frames) {
+    if (&other != &frame && other.groups_done() > 0) holders.insert(other.display());
+  }
+  return holders;
+}
+
 void FrameMachine::State::BeginAttempts() {
   for (auto it = frames.begin(); it != frames.end();) {
     RunningFrame& frame = *it++;  // FailFrame removes it
-    if (!frame.AttemptDue(now)) continue;
-    Status status = frame.BeginAttempt(roster.Refill(frame.roster()), now);
+    if (!frame.AttemptDue(now) || AwaitsTrial(frame)) continue;
+    Status status = frame.BeginAttempt(roster.Refill(frame.roster()), HoldersOf(frame), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
-      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.summary);
+      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.resolved->summary);
       if (fit.ok()) frame.SetFit(*fit);
       status = fit.status();
     }
@@ -273,7 +284,7 @@ bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
-  actions.emplace_back(ToDatasets(KeepDataset{next->use, next->dataset()->volume.dataset()}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->volume().dataset()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;
@@ -296,7 +307,7 @@ void FrameMachine::State::StopAll(const CoordinatorToWorker& goodbye, const std:
   const auto everything = [](const OpenRequest&) { return true; };
   for (const OpenRequest& request : queue.Extract(everything)) FailRequest(request, Status::Unavailable(reason));
   for (const RunningFrame& frame : frames) AnswerFailure(frame.request(), Status::Unavailable(reason));
-  actions.emplace_back(ToDatasets(EndDatasets{reason}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, EndDatasets{reason});
   for (const Member& member : roster.members()) SendWorker(member.id, goodbye);
   actions.emplace_back(StopService{});
   stopped = true;
@@ -319,8 +330,8 @@ Time FrameMachine::State::NextWake() {
   queue.ForEach(consider);
   for (const RunningFrame& frame : frames) {
     consider(frame.request());
-    const bool waits_for_workers = roster.staying() == 0 && frame.between_attempts();
-    if (!waits_for_workers) next = std::min(next, frame.NextWake());
+    const bool waits_for_others = (roster.staying() == 0 && frame.between_attempts()) || AwaitsTrial(frame);
+    if (!waits_for_others) next = std::min(next, frame.NextWake());
   }
   if (!roster.empty()) return std::min(next, next_ping);
   // Often enough that a coordinator that was held up notices how long.

@@ -18,8 +18,9 @@
 //   workers    Register gives an id and a slot (a vacant one first). Silence, an unreachable peer or Leave takes the worker out. Every
 //              frame that it had a part in is re-planned over the others (attempt + 1) from its first unfinished group, or from the
 //              first group if the display worker is lost. Slots that stay vacant for vacancy_grace are given up; the next frame is then
-//              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame. A frame that
-//              twice loses the worker of the same box fails: what it asks for may be what ends them.
+//              partitioned anew. A worker that cannot do its part of a frame (WorkerTrouble) is left out of that frame. If a frame
+//              loses the worker of the same box twice, the box is tried alone, and others wait; the third time, the frame fails
+//              (Suspects).
 //              Workers of an earlier coordinator say which slots they had: they get them again, and plans wait for them a while.
 //   leaving    A worker that says that it is leaving loses its slot at once and gets no new frame. It finishes the groups that it has; the
 //              rest of a frame is handed over to the workers that stay, if there are any. Without a part in any frame it gets Stop. What

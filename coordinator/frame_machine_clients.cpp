@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/planning/resolve_look.h"
 #include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
@@ -20,7 +19,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   request.needs_occupancy = request.uses_occupancy && !LeavesChoice(policy);
   request.use = ++last_use;
   queue.Push(std::move(request));
-  actions.emplace_back(ToDatasets(SeekDataset{last_use, message.frame.dataset}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, message.frame.dataset});
 }
 
 void FrameMachine::State::On(const DatasetNews& event) {
@@ -32,14 +31,14 @@ void FrameMachine::State::On(const DatasetNews& event) {
     if (const auto* awaited = std::get_if<DatasetAwaited>(&news->second)) {
       const bool first = std::holds_alternative<OpenRequest::Submitted>(request.state);
       request.state = OpenRequest::AwaitsDataset{};  // DropPlans drops a plan that it had
-      if (first) SendQueued(request, awaited->loading);
+      if (first || awaited->percent > 0) SendQueued(request, awaited);
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
-               request.dataset() != nullptr && request.dataset()->volume.dataset() == ready.dataset) {
+               request.dataset() != nullptr && request.dataset()->volume().dataset() == ready.dataset) {
       request.dataset()->seen = ready.seen;
-    } else if (const Status suits = Classify(request, ready); suits.ok()) {
-      SendQueued(request, false);
+    } else if (const Status suits = Resolve(request, ready); suits.ok()) {
+      SendQueued(request, nullptr);
     } else {
       lost[request.use] = {suits, &RefusedRequests::bad_request};
     }
@@ -49,15 +48,11 @@ void FrameMachine::State::On(const DatasetNews& event) {
   }
 }
 
-// NotFound: no such preset; InvalidArgument: clipping or layers do not suit the dataset.
-Status FrameMachine::State::Classify(OpenRequest& request, const DatasetReady& ready) const {
-  const FrameRequest& frame = request.submit.frame;
-  Result<VolumeLook> look = ResolveLook(frame, *ready.summary);
-  if (!look.ok()) return look.status();
-  request.state = OpenRequest::HasDataset{
-      .volume = {ready.dataset, std::move(look->transfer), FindRenderer(frame.renderer), std::move(look->clip), std::move(look->layers)},
-      .summary = ready.summary,
-      .seen = ready.seen};
+// Errors as of ResolveRequest.
+Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
+  Result<ResolvedRequest> resolved = ResolveRequest(request.submit.frame, ready.dataset, ready.summary);
+  if (!resolved.ok()) return resolved.status();
+  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
   return Status::Ok();
 }
 
@@ -134,7 +129,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
     for (const std::string_view ability : kind->AbilityNames()) renderer.abilities.emplace_back(ability);
     for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
   }
-  actions.emplace_back(ToDatasets(FinishStatus{client, std::move(reply)}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, FinishStatus{client, std::move(reply)});
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& message) {
@@ -142,11 +137,13 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& mess
   StopAll(Stop{.epoch = config.epoch}, "the service was shut down");
 }
 
-void FrameMachine::State::SendQueued(const OpenRequest& request, bool loading) {
+void FrameMachine::State::SendQueued(const OpenRequest& request, const DatasetAwaited* awaited) {
+  const bool loading = awaited != nullptr && awaited->loading;
   SendClient(request.client, FrameProgress{.request = request.submit.request,
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
-                                           .workers = std::uint32_t(roster.staying())});
+                                           .workers = std::uint32_t(roster.staying()),
+                                           .read_percent = loading ? std::uint32_t(awaited->percent) : 0});
 }
 
 void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {
@@ -170,17 +167,17 @@ void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status
 
 // Of a request whose frame has not begun.
 void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status, RefusedAs as) {
-  actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   AnswerFailure(request, status, as);
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: {}", request.submit.request, request.client,
        as == nullptr ? "ends without a frame: dataset " + request.submit.frame.dataset : "is refused", status.message());
 }
 
 void FrameMachine::State::FreeClient(PeerToken client) {
-  actions.emplace_back(ToDatasets(ForgetClient{client}));
+  actions.emplace_back(std::in_place_type<ToDatasets>, ForgetClient{client});
   if (!clients.Forget(client)) return;
   actions.emplace_back(ClientLeft{client});
-  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(ToDatasets(LeaveDataset{request.use}));
+  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());

@@ -105,8 +105,8 @@ struct FrameMachine::State {
   // ---- requests
   bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
   Status WithinQuota(PeerToken client) const;
-  Status Classify(OpenRequest& request, const DatasetReady& ready) const;
-  void SendQueued(const OpenRequest& request, bool loading);
+  Status Resolve(OpenRequest& request, const DatasetReady& ready) const;
+  void SendQueued(const OpenRequest& request, const DatasetAwaited* awaited);  // null: its dataset is there
   void EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload);
   // `as`: it is refused; else it has failed.
   void FailRequest(const OpenRequest& request, const Status& status, RefusedAs as = nullptr);
@@ -118,6 +118,8 @@ struct FrameMachine::State {
   void Expire();
   void Advance();
   void BeginAttempts();
+  bool AwaitsTrial(const RunningFrame& frame);
+  std::set<WorkerId> HoldersOf(const RunningFrame& frame) const;
   void DismissWorkers();
   Time EndOfWait(const OpenRequest& request) const;
   Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;

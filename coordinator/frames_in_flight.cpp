@@ -66,7 +66,17 @@ std::size_t FramesInFlight::Room(std::size_t workers) const {
   return frames - std::min(frames, frames_.size());
 }
 
-bool FramesInFlight::MayStart(PeerToken client, const PlanMade& plan, std::size_t workers) const {
+RunningFrame* FramesInFlight::OnTrial() {
+  const auto frame = std::ranges::find_if(frames_, &RunningFrame::has_suspects);
+  return frame == frames_.end() ? nullptr : &*frame;
+}
+
+bool FramesInFlight::OthersWait(const RunningFrame& frame) const {
+  return std::ranges::any_of(frames_, [&](const RunningFrame& other) { return &other != &frame && other.waiting(); });
+}
+
+bool FramesInFlight::MayStart(PeerToken client, const PlanMade& plan, std::size_t workers) {
+  if (OnTrial() != nullptr) return false;
   const FrameWindow window = Window(workers);
   if (frames_.size() < std::size_t(window.frames) && unfinished_groups() < std::uint32_t(window.groups)) return true;
   if (RunsFor(client)) return false;
@@ -81,6 +91,7 @@ bool FramesInFlight::MayStart(PeerToken client, const PlanMade& plan, std::size_
 }
 
 RunningFrame* FramesInFlight::NextToHandOut(std::size_t workers) {
+  if (RunningFrame* const tried = OnTrial()) return tried->CanHandOut() ? tried : nullptr;
   const FrameWindow window = Window(workers);
   const bool full = unfinished_groups() >= std::uint32_t(window.groups);
   const auto waits = [this](PeerToken client) {

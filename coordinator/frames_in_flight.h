@@ -22,10 +22,14 @@ class FramesInFlight {
 
   // The oldest frame that may hand out a group to `workers` workers; null: none may.
   RunningFrame* NextToHandOut(std::size_t workers);
+  // The oldest frame that has suspects: until it has none, nothing else is handed out or started. Null: there is none.
+  RunningFrame* OnTrial();
+  // Whether any frame but this one waits for workers.
+  bool OthersWait(const RunningFrame& frame) const;
   // How many more frames `workers` workers may have under way, whoever asks for them.
   std::size_t Room(std::size_t workers) const;
   // Whether they may be given another frame, of this client and plan.
-  bool MayStart(PeerToken client, const PlanMade& plan, std::size_t workers) const;
+  bool MayStart(PeerToken client, const PlanMade& plan, std::size_t workers);
   // Whether the workers' memory has room for a frame of this plan beside those that run.
   bool HasRoomFor(const PlanMade& plan) const;
   bool RunsFor(PeerToken client) const;

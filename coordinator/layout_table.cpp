@@ -89,11 +89,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   }
   if (present != nullptr && !cost) return present;  // what was known was dropped meanwhile
   const LayoutRequest make{.summary = request.summary,
-                           .transfer = &request.volume->transfer(),
+                           .volume = request.volume,
                            .policy = &policy,
-                           .renderer = request.volume->renderer(),
-                           .clip = &request.volume->clip(),
-                           .looks = &request.volume->looks(),
                            .slots = request.slots,
                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                            .stop = request.stop};

@@ -70,6 +70,7 @@ using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetCl
 // ---- from DatasetMachine to FrameMachine
 struct DatasetAwaited {
   bool loading = false;  // else it is not known yet whether there is such a dataset
+  int percent = 0;       // of its samples that have been read, as far as is known
 };
 struct DatasetReady {
   DatasetId dataset = 0;

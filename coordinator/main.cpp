@@ -27,7 +27,7 @@ Status Serve(CoordinatorOptions options) {
   // Whoever started this process reads the ports that were chosen from this line.
   (void)std::printf("slabstream-coordinator ready client=%s workers=%s\n", (*service)->client_endpoint().c_str(),
                     (*service)->worker_endpoint().c_str());
-  (void)std::fflush(stdout);
+  if (Status told = FlushOutput(); !told.ok()) return told;
   WaitUntilStopped(**service);
   return Status::Ok();
 }

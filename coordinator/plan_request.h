@@ -7,7 +7,6 @@
 #include <stop_token>
 #include <vector>
 
-#include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/hosted_worker.h"
 #include "common/stats/prediction.h"
@@ -22,11 +21,10 @@ using PlanId = std::uint64_t;  // never given twice; 0: none
 struct PlanRequest {
   PlanId plan = 0;
   PeerToken client = 0;
-  FrameRequest frame;  // valid, with known names (CheckNames); names of the policy may be left open
-  ClassifiedVolume volume;
-  std::shared_ptr<const VolumeSummary> summary;   // of it
-  std::shared_ptr<const OccupancyGrid> occupied;  // of it; null: the policy does not need it (NeedsOccupancy), or begins without it
-  Roster roster;                                  // of the frame's team, with a worker in it
+  std::shared_ptr<const ResolvedRequest> resolved;  // never null; every plan of a request has the same one
+  // Of its volume; null: the policy does not need it (NeedsOccupancy), or begins without it.
+  std::shared_ptr<const OccupancyGrid> occupied;
+  Roster roster;  // of the frame's team, with a worker in it
   Turn turn;
   std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
   std::stop_token stop = {};               // told to stop: nobody wants the plan any more

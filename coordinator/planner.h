@@ -21,7 +21,7 @@ class Planner {
   // `surroundings`: what open policies are chosen for.
   explicit Planner(const ServiceSurroundings& surroundings = {}) : surroundings_(surroundings) {}
 
-  // Errors as of PlanFrame; Cancelled: it was stopped; ResourceExhausted or Internal for exceptions.
+  // Errors as of MakeFrameSetup and PlanFrame; Cancelled: it was stopped; ResourceExhausted or Internal for exceptions.
   Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
 
   // The same if that takes less time than to wake another thread: the policy is not open, and its layout is made and stays. Nothing: ask
@@ -37,7 +37,8 @@ class Planner {
 
  private:
   Result<std::shared_ptr<const PlannedFrame>> TryPlan(const PlanRequest& request);
-  static Result<std::shared_ptr<const PlannedFrame>> WithLayout(PlannedFrame planned, std::shared_ptr<const Layout> layout);
+  static Result<std::shared_ptr<const PlannedFrame>> WithLayout(PlannedFrame planned, FrameSetup setup,
+                                                                std::shared_ptr<const Layout> layout);
 
   const ServiceSurroundings surroundings_;
   LayoutTable layouts_;

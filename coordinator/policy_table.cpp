@@ -29,16 +29,16 @@ double RenderSeconds(std::span<const RankReport> reports) {
 }  // namespace
 
 PolicyTable::Kind PolicyTable::KindOf(const PlanRequest& request) {
-  const FrameRequest& frame = request.frame;
+  const FrameRequest& frame = request.resolved->frame;
   return {.projection = frame.view.projection,
-          .traversal_axis = MakeCamera(frame.view, frame.size, request.summary->description.geometry).traversal_axis,
+          .traversal_axis = MakeCamera(frame.view, frame.size, request.resolved->summary->description.geometry).traversal_axis,
           .zoom_octave = std::ilogb(frame.view.zoom),
           .size = frame.size,
           .parameters = frame.parameters};
 }
 
 PolicyTable::Key PolicyTable::KeyOf(const PlanRequest& request) {
-  return {request.volume, SettledPolicy(request.frame, request.summary->description.geometry), std::uint32_t(request.roster.slots.size())};
+  return {request.resolved->volume, request.resolved->frame.policy, std::uint32_t(request.roster.slots.size())};
 }
 
 // What should be chosen for this frame, if anything. `choice`: of its kind of view; null: there is none.
@@ -48,7 +48,7 @@ std::optional<PolicyTable::Noted> PolicyTable::WhatLacks(const PlanRequest& requ
   if (!entry.chosen) {
     // It chooses by counted voxels, if these make a difference.
     noted.all = true;
-    return request.occupied != nullptr || !NeedsOccupancy(request.frame.policy) ? std::optional(noted) : std::nullopt;
+    return request.occupied != nullptr || !NeedsOccupancy(entry.key.asked) ? std::optional(noted) : std::nullopt;
   }
   if (!entry.by_cost && knows_cost) {
     noted.all = true;
@@ -68,17 +68,14 @@ std::optional<PolicyTable::Noted> PolicyTable::WhatLacks(const PlanRequest& requ
   return noted;
 }
 
-Result<ChosenPolicy> PolicyTable::Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts) {
-  const bool knows_cost = layouts.KnowsCost(request.volume);
+ChosenPolicy PolicyTable::Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts) {
+  const bool knows_cost = layouts.KnowsCost(request.resolved->volume);
   const std::lock_guard lock(mutex_);
   Key key = KeyOf(request);
   auto entry = std::ranges::find(entries_, key, &Entry::key);
   if (entry == entries_.end()) {
-    FrameRequest first = request.frame;
-    first.policy = FirstPolicy(key.asked, key.slots);
-    Result<ResolvedPolicy> policy = ResolvePolicy(first, request.summary->description.geometry);
-    if (!policy.ok()) return policy.status();
-    entries_.push_front({.key = std::move(key), .machine = machine, .holds = *std::move(policy)});
+    ResolvedPolicy first = ResolvePolicy(FirstPolicy(key.asked, key.slots), request.resolved->summary->description.geometry);
+    entries_.push_front({.key = std::move(key), .machine = machine, .holds = std::move(first)});
     KeepFirst(entries_, kMaxKept);
     entry = entries_.begin();
   }
@@ -119,17 +116,18 @@ void PolicyTable::Choose(PeerToken client, LayoutTable& layouts, const std::stop
   noted_.erase(first);
   auto entry = EntryOf(noted);
   if (entry == entries_.end()) return;
-  const bool anew = noted.all && layouts.KnowsCost(noted.request.volume) && !entry->by_cost;
+  const bool anew = noted.all && layouts.KnowsCost(noted.request.resolved->volume) && !entry->by_cost;
   const bool by_cost = entry->by_cost || anew;
   const double render_scale = anew ? 1 : entry->render_scale;  // costs are seconds now
   lock.unlock();
 
-  const std::optional<WorkField> cost = by_cost ? layouts.KnownCost(noted.request.volume) : std::nullopt;
-  FrameRequest frame = noted.request.frame;
-  frame.policy = noted.open;
-  const Result<PolicyChoice> choice = Guarded("choosing a policy", [&] {
-    return ChoosePolicy({.frame = &frame,
-                         .summary = noted.request.summary.get(),
+  const std::optional<WorkField> cost = by_cost ? layouts.KnownCost(noted.request.resolved->volume) : std::nullopt;
+  const Result<PolicyChoice> choice = Guarded("choosing a policy", [&]() -> Result<PolicyChoice> {
+    const Result<FrameSetup> setup = MakeFrameSetup(*noted.request.resolved);
+    if (!setup.ok()) return setup.status();
+    return ChoosePolicy({.open = &noted.open,
+                         .resolved = noted.request.resolved.get(),
+                         .setup = &*setup,
                          .known = {.occupied = noted.request.occupied.get(), .cost = cost ? &*cost : nullptr},
                          .slots = noted.key.slots,
                          .machine = &noted.machine,

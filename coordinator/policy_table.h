@@ -10,7 +10,6 @@
 #pragma once
 
 #include <list>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -18,7 +17,6 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
-#include "common/volume/occupancy_grid.h"
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
 #include "coordinator/tuning/choose_policy.h"
@@ -41,8 +39,7 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
 
   // The policy for the frame of `request`, which leaves a choice. `machine`: of its workers. `layouts`: the source of measured costs.
-  // Errors as of ResolvePolicy.
-  Result<ChosenPolicy> Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
+  ChosenPolicy Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
 
   // Whether Find has noted something to choose for a frame of this client.
   bool WantsChoice(PeerToken client);

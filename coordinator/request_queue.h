@@ -44,10 +44,10 @@ struct OpenRequest {
   struct Submitted {};  // it has sought its dataset
   struct AwaitsDataset {};
   struct HasDataset {
-    ClassifiedVolume volume;
-    std::shared_ptr<const VolumeSummary> summary;  // of it
-    bool seen = false;                             // DatasetReady::seen: its frame may begin
+    std::shared_ptr<const ResolvedRequest> resolved;  // never null
+    bool seen = false;                                // DatasetReady::seen: its frame may begin
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
+    const ClassifiedVolume& volume() const { return resolved->volume; }
   };
   std::variant<Submitted, AwaitsDataset, HasDataset> state = {};
 

@@ -80,7 +80,10 @@ std::vector<WorkerId> RunningFrame::Participants() const {
   return workers;
 }
 
-bool RunningFrame::CanHandOut() const { return under_way() != nullptr && !under_way()->handing_over && next_group_ < group_count(); }
+bool RunningFrame::CanHandOut() const {
+  if (has_suspects() && unfinished_groups() > 0) return false;  // one group at a time, so that nothing else is in the hands of their worker
+  return under_way() != nullptr && !under_way()->handing_over && next_group_ < group_count();
+}
 
 bool RunningFrame::IsNextOf(WorkerId worker) const {
   return (next_group_ == 0 && worker == plan_.display) || RendersFrom(next_group_, worker);
@@ -118,14 +121,14 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
   return out;
 }
 
-Status RunningFrame::BeginAttempt(const Roster& roster, Time now) {
+Status RunningFrame::BeginAttempt(const Roster& roster, const std::set<WorkerId>& busy, Time now) {
   Roster able = roster;
   for (WorkerId& worker : able.slots) {
     if (!CanRender(worker)) worker = 0;
   }
   // A display worker that is leaving stays one only for what it has accumulated.
   if (groups_done_ == 0 || display_in_doubt()) able.leaving.clear();
-  Result<FramePlan> plan = Replan(plan_, able);
+  Result<FramePlan> plan = Replan(plan_, able, {suspects_.boxes(), WorkerForTrial(able, busy)});
   if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
   const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt();
   plan_ = std::move(plan).value();
@@ -156,7 +159,7 @@ bool RunningFrame::Finish(std::uint32_t groups, Time now) {
   if (groups_done_ > furthest_done_) {
     furthest_done_ = groups_done_;
     stalls_ = 0;
-    deadly_boxes_.clear();
+    suspects_.Acquit();
   }
   last_progress_ = now;
   return true;
@@ -214,17 +217,26 @@ Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_word, Time
 
 // In one attempt each box is in the hands of one worker, so deaths at the same time are never the same way.
 Status RunningFrame::NoteDeath(WorkerId worker) {
-  const auto same_way = [&](const std::string& what) {
-    return Status::Unavailable(fmt::format("{} was lost with {} of the frame, as another worker before it: the frame may be what ends them",
-                                           WorkerName(worker), what));
-  };
-  if (worker == plan_.display && groups_done_ == group_count() && std::exchange(deadly_picture_, true)) return same_way("the picture");
+  std::vector<Suspects::Part> held;
+  if (worker == plan_.display && groups_done_ == group_count()) held.emplace_back();
   for (std::uint32_t group = groups_done_; group < next_group_; ++group) {
     for (const Placement& placement : plan_.groups[group].placements) {
-      if (placement.worker == worker && !deadly_boxes_.insert(placement.id).second) return same_way(fmt::format("box {}", placement.id));
+      if (placement.worker == worker) held.emplace_back(placement.id);
     }
   }
-  return Status::Ok();
+  const std::optional<std::string> guilty = suspects_.OnDeath(held);
+  if (!guilty) return Status::Ok();
+  return Status::Unavailable(fmt::format("{} was lost with {} of the frame, as two workers before it: the frame may be what kills them",
+                                         WorkerName(worker), *guilty));
+}
+
+WorkerId RunningFrame::WorkerForTrial(const Roster& roster, const std::set<WorkerId>& busy) const {
+  const auto value = [&](WorkerId worker) { return (worker == plan_.display ? 2 : 0) + (busy.contains(worker) ? 1 : 0); };
+  WorkerId least = 0;
+  for (const WorkerId worker : roster.slots) {
+    if (worker != 0 && (least == 0 || value(worker) < value(least))) least = worker;
+  }
+  return least;
 }
 
 // Messages on the old connection may be lost, so another attempt sends all of them again. A worker that has done its part answers at once.

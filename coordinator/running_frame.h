@@ -3,8 +3,8 @@
 //
 // An attempt hands out the groups [first group, group count) of one plan. Events that end it before the frame's end, and where the next one
 // begins:
-//   a worker with a part in it is lost                     the first unfinished group, now; but the second time that a worker dies with
-//                                                          the same box, or with the picture, in its hands, the frame fails
+//   a worker with a part in it is lost                     the first unfinished group, now. What two workers have died with is tried alone
+//                                                          then; the frame fails if the next one dies with it, too (Suspects)
 //   a worker with a part in it has another connection      the first unfinished group, now: messages may be lost
 //   no progress for stall_timeout                          the first unfinished group, now; counted
 //   a worker could not do its part                         the first unfinished group, after a pause that grows; counted
@@ -37,6 +37,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/request_queue.h"
+#include "coordinator/suspects.h"
 
 namespace slabstream {
 
@@ -87,8 +88,12 @@ class RunningFrame {
   bool AttemptDue(Time now) const;
   bool between_attempts() const { return std::holds_alternative<BetweenAttempts>(state_); }
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
-  // changes; the Status is the last such worker's reason, or Unavailable if there is none.
-  Status BeginAttempt(const Roster& roster, Time now);
+  // changes; the Status is the last such worker's reason, or Unavailable if there is none. Suspects are not tried on `busy` workers if
+  // there are others.
+  Status BeginAttempt(const Roster& roster, const std::set<WorkerId>& busy, Time now);
+  // While it has suspects, no other frame may have anything under way.
+  bool has_suspects() const { return suspects_.any(); }
+  bool waiting() const;  // for groups that are out, or for the finished picture
 
   // ---- what workers say
   bool OnGroupDone(const GroupDone& message, Time now);  // true: groups_done() rose
@@ -139,7 +144,7 @@ class RunningFrame {
   bool RendersFrom(std::uint32_t group, WorkerId worker) const;  // a box of that group or of a later one
   bool IsNextOf(WorkerId worker) const;                          // it has a part in what is not handed out yet
   Status NoteDeath(WorkerId worker);
-  bool waiting() const;  // for groups that are out, or for the finished picture
+  WorkerId WorkerForTrial(const Roster& roster, const std::set<WorkerId>& busy) const;
   Status CountStall(const Status& reason, BetweenAttempts next);
   WorkerId CulpritOf(const Suspicion& suspicion);
 
@@ -165,8 +170,7 @@ class RunningFrame {
   std::map<WorkerId, int> complaints_;  // proved suspicions that each worker had a part in
   std::set<WorkerId> unable_;           // workers that cannot do their part of this frame
   Status inability_;                    // reason of the last one of them
-  std::set<BoxId> deadly_boxes_;        // boxes in the hands of workers that died since a group was finished for the first time
-  bool deadly_picture_ = false;         // likewise: the picture
+  Suspects suspects_;
   int stalls_ = 0;
   Time last_progress_;
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame

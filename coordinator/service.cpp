@@ -136,6 +136,7 @@ void CoordinatorService::Impl::Run() {
     });
   }
   RemoveDeadSockets(images_sockets);
+  { const std::array<Socket, 2> closed = {std::move(clients), std::move(control)}; }  // a client in this process notices the end by it
   stopped = true;
   stopped.notify_all();
 }

@@ -11,7 +11,6 @@
 
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/transport/endpoint.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
 
@@ -20,6 +19,12 @@ namespace {
 
 std::string Text(const Box& box) {
   return fmt::format("[{}, {}) x [{}, {}) x [{}, {})", box.begin.x, box.end.x, box.begin.y, box.end.y, box.begin.z, box.end.z);
+}
+
+// What this process lacks, no worker lacks: another one would get the same answer, and the same one may get a better answer later.
+Status AsWorkersSee(const Status& failure) {
+  if (failure.code() != StatusCode::kResourceExhausted && failure.code() != StatusCode::kInternal) return failure;
+  return Status::Unavailable("the coordinator cannot send voxels: " + failure.message());
 }
 
 }  // namespace
@@ -153,7 +158,7 @@ void VoxelServer::Answer(const Incoming& incoming) {
   });
   if (served.ok()) return;
   complaints_.Warning(served.message());
-  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, served};
+  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, AsWorkersSee(served)};
   (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
 }
 

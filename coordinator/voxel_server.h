@@ -49,11 +49,11 @@ class VoxelServer {
       return of_layers + of_cells + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
     SampleTypes types() const {
-      SampleTypes types(volume != nullptr ? volume->block.type : bricks->type());
-      if (labels != nullptr) types.layers.labels = labels->type();
-      if (overlay != nullptr) types.layers.overlay = overlay->type();
-      types.layers.cells = cells != nullptr;
-      return types;
+      LayerTypes layers;
+      if (labels != nullptr) layers.labels = labels->type();
+      if (overlay != nullptr) layers.overlay = overlay->type();
+      layers.cells = cells != nullptr;
+      return {volume != nullptr ? volume->block.type : bricks->type(), layers};
     }
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };

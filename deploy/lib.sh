@@ -9,6 +9,14 @@ fail() {
   exit 1
 }
 
+# Configures build/ with these options. A new one compiles several files at a time, which takes half the time.
+configure() {
+  local unity=()
+  [[ -f "$repository/build/build.ninja" ]] || unity=(-DSLABSTREAM_UNITY=ON)
+  say "Configuring (preset release)"
+  (cd "$repository" && cmake --preset release "${unity[@]}" "$@")
+}
+
 # Names of the packages in deploy/packages that are not installed. Arguments: the first words of the lines that count.
 missing_packages() {
   local wanted installed
@@ -17,10 +25,10 @@ missing_packages() {
   comm -23 <(printf '%s\n' "$wanted") <(printf '%s\n' "$installed")
 }
 
-# Arguments: further first words of lines of deploy/packages beside the usual ones.
+# Arguments: the first words of the lines of deploy/packages that count.
 install_packages() {
   local missing as_root=()
-  missing="$(missing_packages run build test demo "$@")"
+  missing="$(missing_packages "$@")"
   if [[ -z "$missing" ]]; then
     say "Debian packages: all installed"
     return

@@ -31,7 +31,7 @@ bool IsLoopback(const std::string& host) {
 
 struct HostAndPort {
   std::string host;  // without brackets
-  std::string port;  // empty: none
+  std::optional<std::uint16_t> port;
 };
 
 // nullopt: neither a name nor an address with a port or without.
@@ -42,16 +42,14 @@ std::optional<HostAndPort> Divide(std::string_view text) {
     if (end == std::string_view::npos) return std::nullopt;
     parts.host = text.substr(1, end - 1);
     text.remove_prefix(end + 1);
-    if (text.empty()) return parts;
-    if (text[0] != ':') return std::nullopt;
-    parts.port = text.substr(1);
-    return parts;
+  } else {
+    parts.host = text.substr(0, text.find(':'));
+    text.remove_prefix(parts.host.size());
   }
-  const std::size_t colon = text.find(':');
-  parts.host = text.substr(0, colon);
-  if (colon != std::string_view::npos) parts.port = text.substr(colon + 1);
-  if (parts.host.empty() || parts.port.find(':') != std::string::npos) return std::nullopt;
-  return parts;
+  if (parts.host.empty()) return std::nullopt;
+  if (text.empty() || text == ":") return parts;
+  parts.port = text[0] == ':' ? ParseNumber<std::uint16_t>(text.substr(1)) : std::nullopt;
+  return parts.port ? std::optional(parts) : std::nullopt;
 }
 
 std::string_view AfterScheme(std::string_view origin) { return origin.substr(origin.find("//") + 2); }
@@ -62,18 +60,15 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
   const auto refuse = [&] {
     return Status::InvalidArgument(fmt::format("{} '{}' is not an address such as 127.0.0.1:8080 or [::1]:8080", option, text));
   };
-  const std::optional<HostAndPort> parts = Divide(text);
+  const bool any_port = text.ends_with(":*");
+  const std::optional<HostAndPort> parts = Divide(any_port ? text.substr(0, text.size() - 2) : text);
   if (!parts) return refuse();
   ListenAddress listen;
   listen.host = parts->host == "localhost" ? "127.0.0.1" : parts->host;
   in_addr v4{};
   in6_addr v6{};
   if (::inet_pton(AF_INET, listen.host.c_str(), &v4) != 1 && ::inet_pton(AF_INET6, listen.host.c_str(), &v6) != 1) return refuse();
-  if (!parts->port.empty() && parts->port != "*") {
-    const std::optional<std::uint16_t> port = ParseNumber<std::uint16_t>(parts->port);
-    if (!port) return refuse();
-    listen.port = *port;
-  }
+  listen.port = parts->port.value_or(0);
   listen.loopback = IsLoopback(listen.host);
   return listen;
 }

@@ -62,8 +62,10 @@ class Gateway::Impl : public HttpApplication {
           fmt::format("--listen {} is not loopback: it needs --tls-cert and --tls-key, or --behind-proxy", options_.listen.host));
     }
     if (Status status = CheckToken(options_.token); !status.ok()) return status;
+    HttpLimits limits = options_.limits;
+    if (!options_.proxy_origin.empty()) limits.connections_an_address = limits.connections;  // a proxy's are those of many
     Result<std::unique_ptr<HttpServer>> server =
-        HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, options_.limits, *this);
+        HttpServer::Start(io_, options_.listen.host, options_.listen.port, options_.tls, limits, *this);
     if (!server.ok()) return server.status();
     server_ = *std::move(server);
     port_ = server_->port();
@@ -212,6 +214,8 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/histogram"] = {.handle = bind(questions_, &QuestionRequests::Histogram)};
     routes["/api/v1/labels"] = {.handle = bind(questions_, &QuestionRequests::Labels)};
     routes["/api/v1/value"] = {.handle = bind(questions_, &QuestionRequests::Value)};
+    routes["/api/v1/profile"] = {.handle = bind(questions_, &QuestionRequests::Profile)};
+    routes["/api/v1/statistics"] = {.handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.takes_post = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.handle = bind(questions_, &QuestionRequests::Transfer)};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};

@@ -15,13 +15,13 @@
 #include <boost/beast/websocket.hpp>
 #include <boost/beast/websocket/ssl.hpp>
 #include <deque>
-#include <list>
+#include <map>
+#include <memory>
 #include <set>
 #include <utility>
 #include <variant>
 
 #include "common/base/limited_log.h"
-#include "common/base/printable.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {
@@ -36,30 +36,37 @@ using Error = beast::error_code;
 using PlainStream = beast::tcp_stream;
 using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 
-// Whatever is open and must be closed when the server stops.
-class Closable {
- public:
-  virtual ~Closable() = default;
-  virtual void CloseNow() = 0;
-};
+class Connection;
 
 // What connections share.
 struct Shared {
   const HttpLimits limits;
   HttpApplication& application;
-  std::set<Closable*> open;
+  std::set<Connection*> open;
   LimitedLog log;
 };
 
-class Registered : public Closable {
+// Whatever is open and must be closed when the server stops.
+class Connection {
  public:
-  explicit Registered(std::shared_ptr<Shared> shared) : shared_(std::move(shared)) { shared_->open.insert(this); }
-  ~Registered() override { shared_->open.erase(this); }
-  Registered(const Registered&) = delete;
-  Registered& operator=(const Registered&) = delete;
+  Connection(std::shared_ptr<Shared> shared, asio::ip::address address) : shared_(std::move(shared)), address_(std::move(address)) {
+    shared_->open.insert(this);
+  }
+  virtual ~Connection() { shared_->open.erase(this); }
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+
+  virtual void CloseNow() = 0;
+  const asio::ip::address& address() const { return address_; }  // of the other end
+  // Since when it has been waiting for a request to arrive, or for a response to leave. Time::max(): it is not.
+  Time waits_since() const { return waits_since_; }
 
  protected:
   std::shared_ptr<Shared> shared_;
+  Time waits_since_ = Time::max();
+
+ private:
+  const asio::ip::address address_;
 };
 
 std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
@@ -156,10 +163,13 @@ class Stream {
 
 // ---- WebSockets
 
-class WebSocketConnection final : public Registered, public WebSocketPeer, public std::enable_shared_from_this<WebSocketConnection> {
+class WebSocketConnection final : public Connection, public WebSocketPeer, public std::enable_shared_from_this<WebSocketConnection> {
  public:
-  WebSocketConnection(Stream stream, std::shared_ptr<Shared> shared, WebSocketAccepted accepted)
-      : Registered(std::move(shared)), socket_(std::move(stream)), accepted_(std::move(accepted)), timer_(socket_.get_executor()) {}
+  WebSocketConnection(Stream stream, std::shared_ptr<Shared> shared, const asio::ip::address& address, WebSocketAccepted accepted)
+      : Connection(std::move(shared), address),
+        socket_(std::move(stream)),
+        accepted_(std::move(accepted)),
+        timer_(socket_.get_executor()) {}
 
   void Run(const http::request<http::string_body>& request) {
     beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has times of its own
@@ -291,14 +301,14 @@ class WebSocketConnection final : public Registered, public WebSocketPeer, publi
 
 // ---- HTTP
 
-class HttpConnection final : public Registered, public std::enable_shared_from_this<HttpConnection> {
+class HttpConnection final : public Connection, public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(Stream stream, std::shared_ptr<Shared> shared)
-      : Registered(std::move(shared)), stream_(std::move(stream)), watch_(stream_.get_executor()) {}
+  HttpConnection(Stream stream, std::shared_ptr<Shared> shared, const asio::ip::address& address)
+      : Connection(std::move(shared), address), stream_(std::move(stream)), watch_(stream_.get_executor()) {}
 
   void Run() {
     if (TlsStream* tls = stream_.tls()) {
-      Lowest().expires_after(shared_->limits.reading);
+      WaitAtMost(shared_->limits.reading);
       tls->async_handshake(asio::ssl::stream_base::server, [self = shared_from_this()](Error error) {
         if (!error) self->Read();
       });
@@ -315,11 +325,22 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
  private:
   PlainStream& Lowest() { return stream_.next_layer(); }
 
+  // The other end has so long for its part.
+  void WaitAtMost(Duration time) {
+    waits_since_ = MonotonicNow();
+    Lowest().expires_after(time);
+  }
+  // The application has it now.
+  void Work() {
+    waits_since_ = Time::max();
+    Lowest().expires_never();
+  }
+
   void Read() {
     parser_.emplace();
     parser_->header_limit(std::uint32_t(shared_->limits.header_bytes));
     parser_->body_limit(shared_->limits.body_bytes);
-    Lowest().expires_after(shared_->limits.reading);
+    WaitAtMost(shared_->limits.reading);
     http::async_read(stream_, buffer_, *parser_, [self = shared_from_this()](Error error, std::size_t) { self->OnRead(error); });
   }
 
@@ -331,7 +352,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
       return Refuse(400, "malformed", "the request is not HTTP/1.1");
     }
     if (error) return;
-    Lowest().expires_never();
+    Work();
     message_ = parser_->release();
     HttpRequest request = RequestOf(message_);
     if (websocket::is_upgrade(message_)) return Upgrade(request);
@@ -366,7 +387,8 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   void Upgrade(const HttpRequest& request) {
     auto answer = shared_->application.Accept(request);
     if (auto* reply = std::get_if<HttpReply>(&answer)) return Write(std::move(*reply), false);
-    std::make_shared<WebSocketConnection>(std::move(stream_), shared_, std::move(std::get<WebSocketAccepted>(answer)))->Run(message_);
+    std::make_shared<WebSocketConnection>(std::move(stream_), shared_, address(), std::move(std::get<WebSocketAccepted>(answer)))
+        ->Run(message_);
   }
 
   void Refuse(unsigned status, std::string_view what, std::string_view why) {
@@ -383,7 +405,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
       part_ = std::move(reply.body);
     }
     response_.emplace(ResponseOf(std::move(reply), message_.version() == 0 ? 11 : message_.version(), keep_alive, *shared_));
-    Lowest().expires_after(shared_->limits.writing);
+    WaitAtMost(shared_->limits.writing);
     const auto written = [self = shared_from_this()](Error error, std::size_t) {
       if (error) return self->DropAfter(error);
       if (self->rest_ == nullptr) return self->Next();
@@ -410,7 +432,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
 
   // The next part of a body that is made while it leaves. One of no bytes is the end.
   void WritePart() {
-    Lowest().expires_after(shared_->limits.writing);
+    WaitAtMost(shared_->limits.writing);
     const bool last = part_.empty();
     const auto written = [self = shared_from_this(), last](Error error, std::size_t) {
       if (error || self->rest_ == nullptr) return self->DropAfter(error);
@@ -424,7 +446,7 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   }
 
   void ReadPart() {
-    Lowest().expires_never();
+    Work();
     gone_ = std::make_shared<std::function<void()>>([] {});  // CloseNow tells the stream
     Watch();
     rest_->Read([self = shared_from_this()](Result<std::string> part) {
@@ -437,8 +459,8 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   }
 
   void Shutdown() {
+    WaitAtMost(std::chrono::seconds(2));
     if (TlsStream* tls = stream_.tls()) {
-      Lowest().expires_after(std::chrono::seconds(2));
       tls->async_shutdown([self = shared_from_this()](Error) { self->CloseNow(); });
     } else {
       Error ignored;
@@ -451,7 +473,6 @@ class HttpConnection final : public Registered, public std::enable_shared_from_t
   // a while.
   void Drain() {
     if (drained_ > shared_->limits.body_bytes) return;
-    Lowest().expires_after(std::chrono::seconds(2));
     stream_.async_read_some(asio::buffer(waste_), [self = shared_from_this()](Error error, std::size_t size) {
       self->drained_ += size;
       if (!error) self->Drain();
@@ -506,7 +527,7 @@ class Server final : public HttpServer {
   void Stop() override {
     Error ignored;
     acceptor_.close(ignored);
-    for (Closable* connection : std::set<Closable*>(shared_->open)) connection->CloseNow();
+    for (Connection* connection : std::set<Connection*>(shared_->open)) connection->CloseNow();
   }
 
  private:
@@ -530,14 +551,35 @@ class Server final : public HttpServer {
   }
 
   void Begin(tcp::socket socket) {
-    if (shared_->open.size() >= shared_->limits.connections) {
-      shared_->application.CountRefusal("connections");
-      return shared_->log.Warning(fmt::format("a connection was closed: there are {} already", shared_->open.size()));
-    }
-    Error ignored;
-    socket.set_option(tcp::no_delay(true), ignored);
+    Error error;
+    const tcp::endpoint from = socket.remote_endpoint(error);
+    if (error || !MakeRoomFor(from.address())) return;  // an error: it has gone already
+    socket.set_option(tcp::no_delay(true), error);
     PlainStream plain(std::move(socket));
-    std::make_shared<HttpConnection>(tls_ ? Stream(std::move(plain), *tls_) : Stream(std::move(plain)), shared_)->Run();
+    std::make_shared<HttpConnection>(tls_ ? Stream(std::move(plain), *tls_) : Stream(std::move(plain)), shared_, from.address())->Run();
+  }
+
+  // At a limit, the slowest connection goes: of this address if it has as many as it may, else of the address that has most. Viewers and
+  // those whose request is worked on stay. False: there is no room.
+  bool MakeRoomFor(const asio::ip::address& address) {
+    const HttpLimits& limits = shared_->limits;
+    std::map<asio::ip::address, std::size_t> counts;
+    for (const Connection* connection : shared_->open) ++counts[connection->address()];
+    const bool of_it = counts[address] >= limits.connections_an_address;
+    if (!of_it && shared_->open.size() < limits.connections) return true;
+    const auto rank = [&](const Connection* c) { return std::pair(counts[c->address()], MonotonicNow() - c->waits_since()); };
+    Connection* slowest = nullptr;
+    for (Connection* c : shared_->open) {
+      if (c->waits_since() == Time::max() || (of_it && c->address() != address)) continue;
+      if (slowest == nullptr || rank(c) > rank(slowest)) slowest = c;
+    }
+    shared_->application.CountRefusal("connections");
+    shared_->log.Warning(
+        fmt::format("a connection was closed: {} has {} of {} open ones", address.to_string(), counts[address], shared_->open.size()));
+    if (slowest == nullptr) return false;
+    shared_->open.erase(slowest);  // at once, not when it has heard of it
+    slowest->CloseNow();
+    return true;
   }
 
   std::optional<asio::ssl::context> tls_;

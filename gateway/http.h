@@ -25,7 +25,8 @@ struct HttpLimits {
   std::size_t header_bytes = std::size_t{16} << 10;
   std::size_t body_bytes = std::size_t{1} << 20;
   std::size_t message_bytes = std::size_t{1} << 20;  // of a WebSocket's message
-  std::size_t connections = 256;                     // further ones are closed at once
+  std::size_t connections = 256;                     // one more takes the place of the slowest, or is closed at once
+  std::size_t connections_an_address = 128;          // the same; so one address alone cannot keep others out
   Duration reading = std::chrono::seconds(30);       // for a request to arrive, also on a connection that waits for one
   Duration writing = std::chrono::seconds(30);       // for a response or message to leave
   Duration silence = std::chrono::seconds(30);       // of a WebSocket, pings and their answers included

@@ -1,6 +1,5 @@
 // slabstream-gateway: pictures of a service over HTTP and WebSockets (docs/http.md). It ends on SIGINT or SIGTERM.
 #include <CLI/CLI.hpp>
-#include <csignal>
 #include <cstdio>
 #include <string>
 
@@ -49,7 +48,7 @@ Status Serve(Options options) {
   if (!gateway.ok()) return gateway.status();
   // Whoever started this process reads the address from this line.
   (void)std::printf("ready %s\n", (*gateway)->url().c_str());
-  (void)std::fflush(stdout);
+  if (Status told = FlushOutput(); !told.ok()) return told;
   const sigset_t signals = StopSignals();
   int signal = 0;
   (void)::sigwait(&signals, &signal);

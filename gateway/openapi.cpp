@@ -6,7 +6,6 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "client/movie/turntable.h"
 #include "client/request/picture_fields.h"
@@ -147,6 +146,12 @@ Json OpenApi() {
       {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
       {"/api/v1/value", "The voxel, value and label of a dataset at a point", "application/json", false,
        With(dataset, {field("at", kPointHelp, "X,Y,Z")})},
+      {"/api/v1/profile", "The values of a dataset along a line, interpolated between its voxels", "application/json", false,
+       With(dataset,
+            {field("from", kLineHelp, "X,Y,Z"), field("to", kLineHelp, "X,Y,Z"),
+             field("samples", "Number of points along the line, both ends included: 2 to 4096", "N", fmt::format("{}", kProfileSamples))})},
+      {"/api/v1/statistics", "Mean, deviation and range of the values in a box", "application/json", false,
+       With(dataset, {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,

@@ -8,7 +8,6 @@
 #include <cstdio>  // jpeglib.h needs FILE
 #include <cstdlib>
 #include <cstring>
-#include <memory>
 #include <new>
 
 #include <jpeglib.h>

@@ -11,6 +11,8 @@
 #include "client/request/values.h"
 #include "common/base/printable.h"
 #include "common/classification/transfer_function.h"
+#include "common/cli/parse.h"
+#include "common/math/points_along.h"
 #include "gateway/openapi.h"
 #include "gateway/request_fields.h"
 
@@ -65,6 +67,35 @@ void QuestionRequests::Value(PictureFields fields, ReplyFunction reply, const Go
   if (!dataset.ok()) return reply(Failure(dataset.status()));
   const auto make = [](const QuestionReply& answer) { return JsonReply(SampleJson(std::get<SampleReply>(answer).samples.at(0))); };
   Ask("value", SampleQuery{.dataset = *dataset, .points = {*point}}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  const Result<std::string> from_text = Take(fields, "from", kLineHelp), to_text = Take(fields, "to", kLineHelp),
+                            samples_text = TakeOr(fields, "samples", std::to_string(kProfileSamples));
+  for (const Result<std::string>* text : {&from_text, &to_text, &samples_text}) {
+    if (!text->ok()) return reply(Failure(text->status()));
+  }
+  const Result<Vec3> from = ParsePoint("from", *from_text), to = ParsePoint("to", *to_text);
+  for (const Result<Vec3>* point : {&from, &to}) {
+    if (!point->ok()) return reply(Failure(Printable(point->status())));
+  }
+  const Result<int> samples = ParseInteger("samples", *samples_text, 2, int(kMaxSamplePoints));
+  if (!samples.ok()) return reply(Failure(Printable(samples.status())));
+  const Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [](const QuestionReply& answer) { return JsonReply(ProfileJson(std::get<SampleReply>(answer).samples)); };
+  Ask("profile", SampleQuery{.dataset = *dataset, .points = PointsAlong(*from, *to, *samples)}, make, std::move(reply), gone);
+}
+
+void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  const Result<std::string> text = Take(fields, "box", kBoxHelp);
+  if (!text.ok()) return reply(Failure(text.status()));
+  const Result<ClipBox> box = ParseClipBox("box", *text);
+  if (!box.ok()) return reply(Failure(Printable(box.status())));
+  const Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [](const QuestionReply& answer) { return JsonReply(BoxStatisticsJson(std::get<StatisticsReply>(answer).statistics)); };
+  Ask("statistics", StatisticsQuery{.dataset = *dataset, .box = *box}, make, std::move(reply), gone);
 }
 
 void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gone& gone) {

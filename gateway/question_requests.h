@@ -16,6 +16,8 @@ class QuestionRequests {
   void Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Labels(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Value(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Profile(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Pick(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Transfer(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "common/base/printable.h"
-#include "common/wire/validate_request.h"
 
 namespace slabstream {
 

@@ -10,7 +10,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "client/client.h"
 #include "client/movie/movie_encoder.h"

@@ -173,7 +173,8 @@ void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress)
                           {"groups_done", progress.groups_done},
                           {"group_count", progress.group_count},
                           {"attempt", progress.attempt},
-                          {"workers", progress.workers}}));
+                          {"workers", progress.workers},
+                          {"read_percent", progress.read_percent}}));
 }
 
 void ViewSession::OnFrames(std::uint64_t order, Result<std::vector<Picture>> pictures) {

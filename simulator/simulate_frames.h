@@ -11,7 +11,6 @@
 // and each unbroken stretch of tiles that are not empty.
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <vector>
 

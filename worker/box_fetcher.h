@@ -2,11 +2,10 @@
 // padded boxes to drop.
 //
 //   1. Acquire pins a padded box that covers the box; it opens one if none is cached or on its way. Voxels that complete padded boxes hold
-//   are copied
-//      from them: these stay until the new padded box has been rendered from (Rendered) or is dropped. The rest is fetched, box by box.
+//      are copied from them: these stay until the new padded box has been rendered from (Rendered) or is dropped. The rest is fetched, box
+//      by box.
 //   2. RequestChunks, in the order in which padded boxes will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive
-//   within
-//      chunk_timeout, or arrives damaged, is asked for again, chunk_attempts times; then the padded box is given up (TakeFailures).
+//      within chunk_timeout, or arrives damaged, is requested again, chunk_attempts times; then the padded box is given up (TakeFailures).
 //   3. complete(padded box): it can be rendered from. Release when that is done; the padded box stays cached.
 // Clients that wait for voxels at the same time have equal parts of the credit.
 // Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then the least recently used above

@@ -5,10 +5,7 @@
 // each image that might gain. A link to a worker about which nothing is known yet does not count as slow.
 #pragma once
 
-#include <cstddef>
-#include <cstdint>
 #include <optional>
-#include <span>
 #include <string_view>
 
 #include "common/base/bytes.h"

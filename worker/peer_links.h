@@ -10,7 +10,6 @@
 #include <map>
 #include <set>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "worker/link_rates.h"

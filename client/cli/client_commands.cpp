@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <memory>
 
+#include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/cores.h"
+#include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/value.h"
 #include "client/movie/movie_format.h"
@@ -103,6 +105,24 @@ void DeclareValue(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunValue);
 }
 
+void DeclareMeasure(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles and boxes in a dataset or a volume file");
+  auto options = std::make_shared<MeasureOptions>();
+  AddSource(*sub, options->source, options->connection);
+  sub->option_defaults()->group("Measures, in the unit of the world (mm of a patient); each may be repeated");
+  AddRepeated(*sub, "--distance", options->distances, "Distance of two points of the world")->type_name("X,Y,Z:X,Y,Z");
+  AddRepeated(*sub, "--angle", options->angles, "Angle at the second of three points")->type_name("X,Y,Z:X,Y,Z:X,Y,Z");
+  AddRepeated(*sub, "--profile", options->profiles, "Values from one point to another, interpolated between voxels")
+      ->type_name("X,Y,Z:X,Y,Z");
+  AddInteger(*sub, "--samples", options->samples, 2, int(kMaxSamplePoints), "Values of each profile")->default_str("one for each voxel");
+  AddRepeated(*sub, "--box", options->boxes,
+              "Mean, standard deviation and extremes of the voxels with their centres in a box, given as for --clip-box of `render`")
+      ->type_name("X0:X1,Y0:Y1,Z0:Z1");
+  sub->option_defaults()->group("Options");
+  sub->add_flag("--json", options->json, "Print JSON");
+  RunWith(*sub, line.run, options, RunMeasure);
+}
+
 void DeclareTransfer(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("transfer", "Print a preset transfer function as JSON for --transfer");
   auto options = std::make_shared<TransferOptions>();
@@ -115,9 +135,13 @@ void DeclareTransfer(const CommandLine& line) {
         if (!name.ok()) return name.status();
         return std::variant<std::string, TransferFunction>(*name);
       },
-      "Which" + Explained(TransferPresets()))
-      ->required();
-  sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values")->required();
+      "Which" + Explained(TransferPresets()));
+  sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values");
+  CLI::Option* const list =
+      sub->add_flag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");
+  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture, .png or .exr")
+      ->type_name("FILE")
+      ->needs(list);
   AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);
   AddReadOptions(*sub);
   sub->parse_complete_callback([sub, options] { options->path = WithReadOptions(*sub, options->path); });
@@ -213,6 +237,9 @@ void DeclareView(const CommandLine& line) {
   auto options = std::make_shared<ViewOptions>();
   sub->add_option("SOURCE", options->source, "A volume file, which a new service serves, or the name of a dataset at the service")
       ->required();
+  AddLayerFiles(*sub, options->layers, nullptr);
+  AddReadOptions(*sub);
+  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
   AddService(*sub, options->service);
   sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
       ->type_name("HOST:PORT")
@@ -224,7 +251,10 @@ void DeclareView(const CommandLine& line) {
 void DeclareDown(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("down", "End a service that `up` started");
   auto options = std::make_shared<DownOptions>();
-  AddService(*sub, options->service);
+  CLI::Option* const endpoint = AddService(*sub, options->service);
+  sub->add_flag("--all", options->all, "End every service that `up` started here")
+      ->excludes(endpoint)
+      ->excludes(sub->get_option("--service"));
   RunWith(*sub, line.run, options, RunDown);
 }
 
@@ -322,12 +352,18 @@ void DeclareSlurm(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunSlurm);
 }
 
+void DeclareAnnotate(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand(kAnnotateCommand, "Draw annotations onto the pixels on stdin; for the Python package");
+  sub->callback([&run = line.run] { run = RunAnnotate; });
+}
+
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice, DeclareInfo, DeclareValue, DeclareTransfer,
-                                                 DeclareConvert, DeclareSphere,    DeclareUp,    DeclareView, DeclareDown,  DeclareStatus,
-                                                 DeclareKeys,    DeclareData,      DeclareLogs,  DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice,   DeclareInfo,     DeclareValue,
+                                                 DeclareMeasure, DeclareTransfer,  DeclareConvert, DeclareSphere,   DeclareUp,
+                                                 DeclareView,    DeclareDown,      DeclareStatus,  DeclareAnnotate, DeclareKeys,
+                                                 DeclareData,    DeclareLogs,      DeclareSlurm};
   return kCommands;
 }
 

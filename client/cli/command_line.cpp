@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"
@@ -104,7 +105,7 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   DeclareHelp(line);
   const CLI::App* const options = DeclareOptions(line);
   for (CLI::App* sub : app.get_subcommands(nullptr)) {
-    sub->group(sub == options ? kHidden : "Commands");
+    sub->group(sub == options || sub->get_name() == kAnnotateCommand ? kHidden : "Commands");
     AllowLogLevel(*sub, log_level);
   }
 

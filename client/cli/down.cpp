@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <iostream>
+#include <utility>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/service_connection.h"
 #include "client/service/service_state.h"
+#include "common/cli/program.h"
 
 namespace slabstream {
 namespace {
@@ -20,10 +23,8 @@ Status EndRemains(const ServiceState& remains) {
   return Status::Ok();
 }
 
-}  // namespace
-
-Status RunDown(const DownOptions& options) {
-  const Result<ServiceChoice> named = NamedService(options.service);
+Status EndOne(const ServiceChoice& choice) {
+  const Result<ServiceChoice> named = NamedService(choice);
   if (!named.ok()) return named.status();
   // If none is named, the last service that runs is meant. If none runs, it is the last one whose coordinator has crashed.
   if (named->file.empty() && !FindState(named->endpoint)) {
@@ -48,5 +49,20 @@ Status RunDown(const DownOptions& options) {
   std::cout << fmt::format("{} is down ({} workers)\n", service->endpoint, state->workers.size());
   return Status::Ok();
 }
+
+// Those that do not end do not keep the others.
+Status EndAll() {
+  const std::vector<ServiceState> states = AllStates();
+  if (states.empty()) std::cout << "no service that `up` started runs here\n";
+  std::vector<Status> failures;
+  for (const ServiceState& state : states) {
+    if (Status status = EndOne({.endpoint = state.endpoint, .file = {}}); !status.ok()) failures.push_back(std::move(status));
+  }
+  return ReportAll("slabstream down", failures);
+}
+
+}  // namespace
+
+Status RunDown(const DownOptions& options) { return options.all ? EndAll() : EndOne(options.service); }
 
 }  // namespace slabstream

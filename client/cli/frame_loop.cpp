@@ -1,14 +1,18 @@
 #include "client/cli/frame_loop.h"
 
+#include <fmt/format.h>
+
 #include <chrono>
 #include <deque>
 #include <future>
 #include <map>
+#include <optional>
 #include <thread>
 #include <utility>
 
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_display.h"
+#include "client/report/picture_warnings.h"
 
 namespace slabstream {
 namespace {
@@ -18,11 +22,7 @@ using std::chrono::milliseconds;
 class FrameLoop {
  public:
   FrameLoop(Client& client, const std::vector<FrameJob>& jobs, const FrameLoopOptions& options)
-      : client_(client),
-        jobs_(jobs),
-        options_(options),
-        display_(options.progress, int(jobs.size()), options.label),
-        records_(jobs.size()) {}
+      : client_(client), jobs_(jobs), options_(options), display_(options.progress, int(jobs.size()), options.label) {}
 
   Status Run() {
     const InterruptGuard interrupt(client_.wakeup());
@@ -41,7 +41,11 @@ class FrameLoop {
     return Status::Ok();
   }
 
-  std::vector<FrameRecord> TakeRecords() { return std::move(records_); }
+  std::vector<FrameRecord> TakeRecords() {
+    std::vector<FrameRecord> records;
+    for (auto& [index, record] : records_) records.push_back(std::move(record));
+    return records;
+  }
 
  private:
   // A call of the sink, on a thread of its own.
@@ -72,19 +76,31 @@ class FrameLoop {
       display_.Show(int(index), *progress);
       return Status::Ok();
     }
-    if (auto* failure = std::get_if<Status>(&event.what)) {
+    if (const auto* failure = std::get_if<Status>(&event.what)) {
       open_.erase(found);
-      return std::move(*failure);
+      return PassOver(index, *failure);
     }
     auto& picture = std::get<Picture>(event.what);
     // A preview is put at once, so that it cannot come after the final picture.
     if (!picture.final) return options_.pictures == nullptr ? Status::Ok() : options_.pictures->Put(picture, jobs_[index]);
     open_.erase(found);
     display_.FrameDone(int(index));
+    failed_in_a_row_ = 0;
     FrameRecord& record = records_[index];
-    record = {jobs_[index].output, picture.latency, std::move(picture.statistics)};
+    record = {jobs_[index].output, picture.latency, std::move(picture.statistics), IsEmpty(picture.image)};
     if (!options_.keep_reports) record.statistics.reports = {};
     if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
+    return Status::Ok();
+  }
+
+  // Ok: the loop goes on without this frame.
+  Status PassOver(std::size_t index, const Status& failure) {
+    constexpr int kMostInARow = 2;
+    if (options_.failures == nullptr || index == 0 || records_.empty() || ++failed_in_a_row_ > kMostInARow) return failure;
+    options_.failures->emplace_back(
+        failure.code(), fmt::format("frame {} of {} ({}): {}", index + 1, jobs_.size(), jobs_[index].output, failure.message()));
+    display_.FrameDone(int(index));
+    if (options_.pictures != nullptr) waiting_.emplace(index, std::nullopt);
     return Status::Ok();
   }
 
@@ -94,8 +110,9 @@ class FrameLoop {
     while (!waiting_.empty() && (!pictures->in_order() || (waiting_.begin()->first == put_ && tasks_.empty()))) {
       auto first = waiting_.extract(waiting_.begin());
       ++put_;
-      StartTask(
-          [this, pictures, index = first.key(), picture = std::move(first.mapped())] { return pictures->Put(picture, jobs_[index]); });
+      StartTask([pictures, &job = jobs_[first.key()], picture = std::move(first.mapped())] {
+        return picture ? pictures->Put(*picture, job) : pictures->Skip(job);
+      });
     }
     if (put_ == jobs_.size() && tasks_.empty() && !std::exchange(finishing_, true)) {
       StartTask([pictures] { return pictures->Finish(); });
@@ -134,13 +151,14 @@ class FrameLoop {
   const std::vector<FrameJob>& jobs_;
   const FrameLoopOptions& options_;
   ProgressDisplay display_;
-  std::vector<FrameRecord> records_;
-  std::size_t next_ = 0;                    // of jobs_: the first that has not been requested yet
-  std::map<RequestId, std::size_t> open_;   // to the job's index
-  std::map<std::size_t, Picture> waiting_;  // to be put, by the job's index
-  std::size_t put_ = 0;                     // pictures that have been given to the sink
-  bool finishing_ = false;                  // the sink's Finish has been called
-  std::deque<Task> tasks_;                  // oldest first
+  std::map<std::size_t, FrameRecord> records_;             // of pictures, by the job's index
+  int failed_in_a_row_ = 0;                                // frames since the last picture
+  std::size_t next_ = 0;                                   // of jobs_: the first that has not been requested yet
+  std::map<RequestId, std::size_t> open_;                  // to the job's index
+  std::map<std::size_t, std::optional<Picture>> waiting_;  // to be put, by the job's index; nullopt: it has failed
+  std::size_t put_ = 0;                                    // pictures that have been given to the sink
+  bool finishing_ = false;                                 // the sink's Finish has been called
+  std::deque<Task> tasks_;                                 // oldest first
 };
 
 }  // namespace

@@ -6,9 +6,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <numeric>
 #include <span>
-#include <string_view>
 
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
@@ -17,7 +15,7 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 #include "common/volume/summary.h"
 #include "data/volume_io/mesh_reader.h"
 

@@ -15,6 +15,7 @@
 #include "client/cli/log_lines.h"
 #include "client/service/service_state.h"
 #include "common/base/printable.h"
+#include "common/cli/program.h"
 #include "common/transport/socket.h"
 
 namespace slabstream {
@@ -27,7 +28,7 @@ class Logs {
  public:
   explicit Logs(std::string folder) : folder_(std::move(folder)) {}
 
-  void Print(const std::string& since) {
+  Status Print(const std::string& since) {
     std::error_code error;
     for (const auto& entry : std::filesystem::directory_iterator(folder_, error)) {
       if (entry.path().extension() == ".log") files_.try_emplace(entry.path().string(), entry.path().string());
@@ -40,7 +41,7 @@ class Logs {
       }
     }
     for (const std::string& line : MergeLogLines(lines, since)) std::cout << Printable(line) << '\n';
-    std::cout << std::flush;
+    return FlushOutput();
   }
 
  private:
@@ -83,7 +84,7 @@ Status RunLogs(const LogsOptions& options) {
   bool runs = true;
   do {
     runs = options.follow && IsRunning(service->coordinator, kCoordinatorProgram) && !guard.interrupted();
-    logs.Print(since);
+    if (Status printed = logs.Print(since); !printed.ok()) return printed;
     since.clear();  // all later lines are new
     if (runs) Wait({}, &wakeup, kLogPollInterval);
   } while (runs);  // what was written before the end is printed

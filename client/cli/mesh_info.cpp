@@ -44,7 +44,7 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::opt
   text += fmt::format("extent       {:.6g} x {:.6g} x {:.6g}\n", extent.x, extent.y, extent.z);
   const Index3 lattice = LatticeOf(bounds, std::int64_t(loaded.mesh.tetrahedra.size()), longest_side).size;
   text += fmt::format("lattice      {} x {} x {} voxels (--lattice); renderers that draw the cells instead: {}\n", lattice.x, lattice.y,
-                      lattice.z, NamesOfAble(Ability::kCells));
+                      lattice.z, NamesOfAble(NameOf(Ability::kCells)));
   text += "arrays       name, of what, components, type\n";
   for (const MeshArray& array : info.arrays) {
     text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, ToString(array.type));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 
@@ -36,9 +35,16 @@ Status Movie::OfFile(Status status) const {
 
 Status Movie::Put(const Picture& picture, const FrameJob&) {
   CHECK(picture.final && picture.size == options_.shape.size);
-  const Result<ComposedPicture> composed = ComposedPicture::Make(picture.image, picture.size, options_.format, picture.geometry);
+  const Result<ComposedPicture> composed =
+      ComposedPicture::Make(picture.image, picture.size, options_.format, picture.geometry, options_.key);
   if (!composed.ok()) return composed.status();
-  return OfFile(encoder_->Put(MovieFrame(*composed)));
+  last_ = MovieFrame(*composed);
+  return OfFile(encoder_->Put(last_));
+}
+
+Status Movie::Skip(const FrameJob&) {
+  CHECK(!last_.empty());
+  return OfFile(encoder_->Put(last_));
 }
 
 Status Movie::Finish() {

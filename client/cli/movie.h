@@ -1,8 +1,10 @@
 // Movie: where the frames of a sequence go that become one movie in a file.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "client/cli/picture_sink.h"
 #include "client/image_io/composed_picture.h"
@@ -16,7 +18,8 @@ namespace slabstream {
 struct MovieOptions {
   std::string path;  // of a movie, as MovieFormatOf has it
   MovieShape shape;
-  PictureFormat format;  // black shows through a transparent background
+  PictureFormat format;
+  PictureKey key = {};  // black shows through a transparent background
 };
 
 // For a message before the work begins. Errors of CheckShape and CheckHasMovieEncoder.
@@ -32,6 +35,7 @@ class Movie : public PictureSink {
 
   bool in_order() const override { return true; }
   Status Put(const Picture& picture, const FrameJob& job) override;
+  Status Skip(const FrameJob& job) override;  // shows the frame before it in its place
   Status Finish() override;
   void Abandon() override { encoder_->Abandon(); }
 
@@ -42,6 +46,7 @@ class Movie : public PictureSink {
   const MovieOptions options_;
   OutputFile file_;
   const std::unique_ptr<MovieEncoder> encoder_;
+  std::vector<std::byte> last_;  // the frame that was put last
 };
 
 }  // namespace slabstream

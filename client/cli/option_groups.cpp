@@ -3,11 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <optional>
-#include <vector>
 
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
+#include "client/service/service_state.h"
+#include "common/volume/memory_budget.h"
 #include "common/wire/control_messages.h"
 #include "data/volume_io/read_options.h"
 
@@ -18,15 +18,29 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   app.option_defaults()->group("Service");
   const std::string every_core = std::to_string(std::min(CoreCount(), kMaxLocalWorkers));
   const auto parse = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxLocalWorkers); };
-  CLI::Option* local =
-      AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
-                       fmt::format("Render the file SOURCE in this process, with N workers, or with one per core ({} here) if N "
-                                   "is left out; needs no service",
-                                   every_core))
-          ->type_name("[N]");
-  AddThreads(app, connection.local_threads, "Render threads of each worker of --local")->needs(local);
+  AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
+                   fmt::format("Render the file SOURCE in this process, with N workers, or with one per core ({} here) if N "
+                               "is left out; needs no service, and is not needed where no service is named and none runs",
+                               every_core))
+      ->type_name("[N]");
+  AddThreads(app, connection.local_threads, "Render threads of each worker of --local");
+  AddParsed(app, "--memory", connection.local_memory, ParseMemoryLimit, "Memory limit of this process, with --local: 2G or 512M")
+      ->type_name("SIZE")
+      ->default_str("none");
   AddService(app, connection.service);
 }
+
+// Whether this process renders SOURCE: --local says so, or the user names no service, none runs here, and SOURCE is a file.
+bool RendersHere(const std::string& source, ConnectionOptions& connection) {
+  if (connection.local_workers > 0) return true;
+  const Result<ServiceChoice> named = NamedService(connection.service);
+  if (!named.ok() || !named->text().empty() || !NamesVolumeFile(source) || FindState("")) return false;
+  connection.local_workers = std::min(CoreCount(), kMaxLocalWorkers);
+  connection.unasked = true;
+  return true;
+}
+
+constexpr char kSourceHelp[] = "A dataset's name at the service, or a volume file, with --local or where no service runs";
 
 }  // namespace
 
@@ -94,33 +108,34 @@ void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume
 
 void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection) {
   app.option_defaults()->group("Options");
-  app.add_option("SOURCE", source, "A dataset's name at the service, or with --local a volume file")->required();
+  app.add_option("SOURCE", source, kSourceHelp)->required();
   AddReadOptions(app);
   AddConnectionOptions(app, connection);
   app.option_defaults()->group("Options");
-  app.parse_complete_callback([&app, &source, &connection] { source = WithReadOptionsOfFile(app, source, connection.local_workers > 0); });
+  app.parse_complete_callback(
+      [&app, &source, &connection] { source = WithReadOptionsOfFile(app, source, RendersHere(source, connection)); });
 }
 
 void AddSliceOptions(CLI::App& app, SliceOptions& options) {
   app.option_defaults()->group("Options");
-  CLI::Option* source =
-      app.add_option("SOURCE", options.source, "A dataset's name at the service, or with --local a volume file")->required();
+  CLI::Option* source = app.add_option("SOURCE", options.source, kSourceHelp)->required();
   AddReadOptions(app);
   AddConnectionOptions(app, options.connection);
   AddSlicePictureOptions(app, options.slice, &options.layers);
-  ResolveSource(app, source, options.source, options.slice.frame.transfer, [&options] { return options.connection.local_workers > 0; });
+  ResolveSource(app, source, options.source, options.slice.frame.transfer,
+                [&options] { return RendersHere(options.source, options.connection); });
 }
 
 void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except) {
   app.option_defaults()->group("Options");
-  CLI::Option* source = app.add_option("SOURCE", options.source,
-                                       "A dataset's name at the service, or with --local a volume file; append :TRANSFER to choose "
-                                       "its transfer function")
-                            ->required();
+  CLI::Option* source =
+      app.add_option("SOURCE", options.source, fmt::format("{}; append :TRANSFER to choose its transfer function", kSourceHelp))
+          ->required();
   AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
   AddRenderPictureOptions(app, options.request, options.format, &options.layers);
-  ResolveSource(app, source, options.source, options.request.transfer, [&options] { return options.connection.local_workers > 0; });
+  ResolveSource(app, source, options.source, options.request.transfer,
+                [&options] { return RendersHere(options.source, options.connection); });
   app.option_defaults()->group(kOutputGroup);
   app.add_flag("!--no-record", options.record,
                "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");

@@ -9,8 +9,6 @@
 
 #include "client/cli/options.h"
 #include "client/request/picture_options.h"
-#include "client/service/service_choice.h"
-#include "common/cli/add_option.h"
 
 namespace slabstream {
 

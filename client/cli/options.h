@@ -3,13 +3,11 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
-#include "client/image_io/image_writer.h"
 #include "client/request/slice_request.h"
 #include "client/service/service_choice.h"
 #include "common/base/time.h"
@@ -28,8 +26,10 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
 // Where the frames are rendered.
 struct ConnectionOptions {
-  int local_workers = 0;  // 0: render at the service; else in this process, by this many workers
-  int local_threads = 0;  // of each local worker; 0: LocalThreads
+  int local_workers = 0;           // 0: render at the service; else in this process, by this many workers
+  int local_threads = 0;           // of each local worker; 0: LocalThreads
+  std::uint64_t local_memory = 0;  // bytes, limit of this process with local workers; 0: none
+  bool unasked = false;            // local workers that nobody asked for (RendersHere)
   ServiceChoice service;
 };
 
@@ -78,7 +78,9 @@ struct InfoOptions {
 
 struct TransferOptions {
   FrameRequest request;  // its transfer function alone, a preset
-  std::string path;      // the volume that it is made for
+  std::string path;      // the volume that it is made for; "": none was given
+  bool list = false;     // all presets, instead of one
+  std::string preview;   // with `list`: a picture of the colour maps; "": none
 };
 
 struct ConvertOptions {
@@ -111,12 +113,14 @@ struct UpOptions {
 struct ViewOptions {
   ServiceChoice service;
   std::string source;                  // a volume file, or a dataset's name at the service
+  LayerFiles layers;                   // of a file
   std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
   bool browser = true;                 // open it, if there is a display
 };
 
 struct DownOptions {
   ServiceChoice service;
+  bool all = false;  // every service that `up` started here
 };
 
 struct StatusOptions {

@@ -12,16 +12,18 @@ namespace slabstream {
 class PictureFiles : public PictureSink {
  public:
   // `record`: the files say how they were made (picture_record.h), with these files of layers.
-  PictureFiles(const PictureFormat& format, bool record, LayerFiles layers)
-      : format_(format), record_(record), layers_(std::move(layers)) {}
+  PictureFiles(const PictureFormat& format, PictureKey key, bool record, LayerFiles layers)
+      : format_(format), key_(std::move(key)), record_(record), layers_(std::move(layers)) {}
 
   bool in_order() const override { return false; }
   Status Put(const Picture& picture, const FrameJob& job) override;
+  Status Skip(const FrameJob&) override { return Status::Ok(); }
   Status Finish() override { return Status::Ok(); }
   void Abandon() override {}  // files wait for nobody
 
  private:
   const PictureFormat format_;
+  const PictureKey key_;
   const bool record_;
   const LayerFiles layers_;
 };

@@ -6,7 +6,6 @@
 #include <iostream>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "client/image_io/picture_header.h"
 #include "client/request/picture_record.h"

@@ -15,6 +15,8 @@ class PictureSink {
   // Whether pictures come one after the other, in the order of their jobs. Else several may come at a time, in any order, and previews too.
   virtual bool in_order() const = 0;
   virtual Status Put(const Picture& picture, const FrameJob& job) = 0;
+  // Instead of Put: this frame has failed. Never the first one in order.
+  virtual Status Skip(const FrameJob& job) = 0;
   virtual Status Finish() = 0;
   // No picture will come any more. A Put or Finish that waits for somebody else returns soon, with an error. Any thread.
   virtual void Abandon() = 0;

@@ -1,28 +1,29 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
-#include <variant>
 
 #include "client/cli/commands.h"
 #include "client/cli/frame_loop.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/movie.h"
 #include "client/cli/picture_files.h"
+#include "client/cli/picture_keys.h"
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "client/movie/turntable.h"
+#include "client/report/picture_warnings.h"
 #include "client/request/request_options.h"
 #include "common/base/files.h"
+#include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
-#include "common/planning/frame_plan.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
 
@@ -71,25 +72,41 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
   return Status::Ok();
 }
 
+// One line if the first picture shows nothing, or has one colour because of --scalar-range. No picture fails for want of it.
+void WarnOf(Client& client, const FrameRequest& request, const FrameRecord& frame) {
+  const std::optional<ScalarRange>& range = request.transfer.scalar_range;
+  if (!frame.empty && !range) return;
+  const Result<SummaryReply> summary = client.Summarize(request.dataset, request.transfer);
+  if (!summary.ok()) return;
+  std::optional<std::string> warning;
+  if (range && !range->percentiles) warning = RangeWarning("--scalar-range", range->min, range->max, summary->range);
+  if (!warning && frame.empty) warning = EmptyWarning(request, *summary);
+  if (warning) PrintWarning(*warning);
+}
+
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up.
-using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>()>;
+// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
+using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight) {
+                                                int in_flight, std::vector<Status>* failures) {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
   if (Status status = SettleTransfer(connection->client(), jobs); !status.ok()) return status;
-  const Result<std::unique_ptr<PictureSink>> pictures = open_pictures();
+  const Result<PictureKey> key = KeyFor(connection->client(), options.format.annotations, jobs.front().request);
+  if (!key.ok()) return key.status();
+  const Result<std::unique_ptr<PictureSink>> pictures = open_pictures(*key);
   if (!pictures.ok()) return pictures.status();
 
   FrameLoopOptions loop;
   loop.in_flight = in_flight;
   loop.pictures = pictures->get();
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
+  loop.failures = failures;
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
+  WarnOf(connection->client(), jobs.front().request, frames->front());
   if (!options.camera_path.empty()) {
     const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";
     if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;
@@ -103,20 +120,21 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   return frames;
 }
 
-std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options) {
-  return std::make_unique<PictureFiles>(options.format, options.record, options.layers);
+std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options, const PictureKey& key) {
+  return std::make_unique<PictureFiles>(options.format, key, options.record, options.layers);
 }
 
-MovieOptions MovieOf(const TurntableOptions& options) {
-  MovieOptions movie{.path = options.output.movie, .shape = {.size = options.frame.request.size}, .format = options.frame.format};
+MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}) {
+  MovieOptions movie{
+      .path = options.output.movie, .shape = {.size = options.frame.request.size}, .format = options.frame.format, .key = key};
   if (options.frames_per_second) movie.shape.frames_per_second = *options.frames_per_second;
   return movie;
 }
 
 // Where the frames of a turntable go.
-Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options) {
-  if (options.output.movie.empty()) return FilesOf(options.frame);
-  Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options));
+Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const PictureKey& key) {
+  if (options.output.movie.empty()) return FilesOf(options.frame, key);
+  Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options, key));
   if (!movie.ok()) return movie.status();
   return std::unique_ptr<PictureSink>(*std::move(movie));
 }
@@ -146,7 +164,7 @@ Status CheckTurntable(const TurntableOptions& options) {
   } else if (options.frames_per_second) {
     return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
                                                *options.frames_per_second, MovieEndings(), first_output));
-  } else if (Status status = CheckPicturePath(first_output); !status.ok()) {
+  } else if (Status status = CheckCanWritePicture(first_output); !status.ok()) {
     return status;
   }
   return CheckPaths(options.frame, first_output);
@@ -177,10 +195,11 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
 
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  const auto open_pictures = [&] { return FilesOf(options.frame); };
-  const auto frames = RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1);
+  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key); };
+  const auto frames =
+      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -193,15 +212,20 @@ Status RunTurntable(const TurntableOptions& options) {
   const Time start = MonotonicNow();
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);
   if (!jobs.ok()) return jobs.status();
-  const auto open_pictures = [&] { return OpenPictures(options); };
-  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight);
-  if (!frames.ok()) return frames.status();
+  const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
+  std::vector<Status> failures;
+  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight, &failures);
+  const std::string who = "slabstream turntable";
+  if (!frames.ok()) {
+    failures.push_back(frames.status());
+    return ReportAll(who, failures);
+  }
   const ImageSize size = options.frame.request.size;
   const std::string files = options.output.movie.empty() ? fmt::format("{} to {}", frames->front().output, frames->back().output)
                                                          : fmt::format("into {}", options.output.movie);
   std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
                            size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
-  return Status::Ok();
+  return ReportAll(who, failures);
 }
 
 }  // namespace slabstream

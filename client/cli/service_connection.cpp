@@ -8,6 +8,9 @@
 #include "client/cli/input_volume.h"
 #include "client/embedded/embedded_service.h"
 #include "client/service/service_state.h"
+#include "common/base/printable.h"
+#include "common/cli/program.h"
+#include "common/volume/memory_budget.h"
 
 namespace slabstream {
 namespace {
@@ -31,6 +34,10 @@ ServiceConnection::~ServiceConnection() = default;
 Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& connection, std::span<const std::string> sources,
                                                   const LayerFiles& layers) {
   if (connection.local_workers == 0) {
+    if (connection.local_threads > 0 || connection.local_memory > 0) {
+      return Status::InvalidArgument(fmt::format("--{} needs --local: the processes of a service have limits of their own",
+                                                 connection.local_threads > 0 ? "threads" : "memory"));
+    }
     if (layers.any()) {
       return Status::InvalidArgument(
           fmt::format("--{} needs --local: at a service layers belong to the dataset, as --data "
@@ -53,6 +60,10 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
   if (layers.any()) {
     if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
   }
+  if (connection.unasked) {
+    PrintNote(fmt::format("no service is named and none runs here, so this process renders {} itself, as with --local",
+                          Printable(sources.front())));
+  }
   return OpenLocal(connection, std::move(files));
 }
 
@@ -67,10 +78,17 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
     options.coordinator.catalogue[opened.datasets_.back()] = std::move(source);
   }
   options.worker.threads = std::uint32_t(LocalThreads(connection));
+  if (connection.local_memory > 0) {
+    const Result<MemoryShares> shares = ShareMemory(connection.local_memory, connection.local_workers);
+    if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
+    options.coordinator.machine.memory_bytes = shares->coordinator;
+    options.worker.memory_bytes = shares->worker;
+    LimitMemory(connection.local_memory);
+  }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();
   opened.service_ = *std::move(service);
-  Result<Client> client = Client::Connect(*opened.context_, opened.service_->endpoint());
+  Result<Client> client = opened.service_->Connect();
   if (!client.ok()) return client.status();
   opened.client_ = std::make_unique<Client>(*std::move(client));
   return opened;

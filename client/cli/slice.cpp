@@ -1,19 +1,44 @@
 // `slice`: a plane through a volume, or a slab of it (slice_request.h).
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iostream>
+#include <optional>
 #include <utility>
 
 #include "client/cli/commands.h"
+#include "client/cli/picture_keys.h"
 #include "client/cli/service_connection.h"
 #include "client/image_io/image_writer.h"
+#include "client/report/picture_warnings.h"
 #include "common/base/files.h"
+#include "common/cli/program.h"
 
 namespace slabstream {
+namespace {
+
+// One line if the picture shows nothing, or has one colour. No picture fails for want of it.
+void WarnOf(Client& client, const SliceRequest& slice, const FrameRequest& frame, bool empty) {
+  const std::optional<ScalarRange>& range = frame.transfer.scalar_range;
+  if (!empty && !slice.window && !range) return;
+  const Result<SummaryReply> summary = client.Summarize(frame.dataset, frame.transfer);
+  if (!summary.ok()) return;
+  std::optional<std::string> warning;
+  if (const auto window = slice.shown_window()) {
+    warning = RangeWarning("--window", window->low(), window->high(), summary->range);
+  } else if (range && !range->percentiles) {
+    warning = RangeWarning("--scalar-range", range->min, range->max, summary->range);
+  }
+  if (!warning && empty) warning = EmptyWarning(frame, *summary);
+  if (warning) PrintWarning(*warning);
+}
+
+}  // namespace
 
 Status RunSlice(const SliceOptions& options) {
-  if (Status status = CheckPicturePath(options.output); !status.ok()) return status;
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
+  if (Status status = CheckCanDraw(options.slice.format.annotations); !status.ok()) return status;
   SliceRequest slice = options.slice;
   slice.frame.dataset = "-";  // not known yet, and the rest is checked before anything is connected
   if (const auto frames = FramesOf(slice); !frames.ok()) return frames.status();
@@ -22,14 +47,20 @@ Status RunSlice(const SliceOptions& options) {
   slice.frame.dataset = connection->dataset();
   const Result<std::vector<FrameRequest>> frames = FramesOf(slice);
   if (!frames.ok()) return frames.status();
+  const Result<PictureKey> key = KeyFor(connection->client(), slice.format.annotations, frames->front());
+  if (!key.ok()) return key.status();
+  PictureNotes notes{.key = *key};
   std::vector<LocalImage> images;
   for (const FrameRequest& frame : *frames) {
     Result<Picture> picture = connection->client().Render(frame);
     if (!picture.ok()) return picture.status();
     images.push_back(std::move(picture->image));
+    notes.panes.push_back(picture->geometry);
   }
   const ImageSize whole = slice.size();
-  if (Status status = WritePicture(SideBySide(images, slice.frame.size), whole, options.output, slice.format); !status.ok()) return status;
+  const LocalImage all = SideBySide(images, slice.frame.size);
+  if (Status status = WritePicture(all, whole, options.output, slice.format, notes); !status.ok()) return status;
+  WarnOf(connection->client(), slice, frames->front(), std::ranges::all_of(images, IsEmpty));
   std::cout << fmt::format("wrote {} {}x{}\n", options.output, whole.width, whole.height);
   return Status::Ok();
 }

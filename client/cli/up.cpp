@@ -14,7 +14,6 @@
 #include <ctime>
 #include <filesystem>
 #include <iostream>
-#include <memory>
 #include <optional>
 
 #include "client/cli/commands.h"
@@ -261,7 +260,7 @@ Result<std::string> KeysFolder(const UpOptions& options, const std::string& stat
   return fmt::format("{}/keys-{}", state_directory, FileNameOf(fmt::format("{}-{}", listen->host, listen->port)));
 }
 
-void PrintReady(const UpOptions& options, const ServiceState& state) {
+Status PrintReady(const UpOptions& options, const ServiceState& state) {
   const bool default_endpoint = state.endpoint == kDefaultEndpoint || !state.keys_folder.empty();
   const std::string endpoint = default_endpoint ? "" : fmt::format(" --endpoint {}", state.endpoint);
   std::cout << fmt::format("slabstream is up at {} (coordinator pid {}, {} workers); logs are in {}\n", state.endpoint, state.coordinator,
@@ -278,7 +277,7 @@ void PrintReady(const UpOptions& options, const ServiceState& state) {
   } else {
     std::cout << "Ctrl-C ends it.\n";
   }
-  std::cout << std::flush;
+  return FlushOutput();
 }
 
 // Goes on in a process of its own, in a session of its own: nothing that happens to the terminal ends it. This process waits until it is
@@ -334,12 +333,11 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
     if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
   }
-  PrintReady(options, service.state());
-  if (ready) {
-    if (Status left = LeaveTerminal(log_directory + "/up.log", *ready); !left.ok()) {
-      service.Stop(true);
-      return left;
-    }
+  Status told = PrintReady(options, service.state());
+  if (told.ok() && ready) told = LeaveTerminal(log_directory + "/up.log", *ready);
+  if (!told.ok()) {
+    service.Stop(true);
+    return told;
   }
   Status status = service.Watch(signals);
   // The workers of a detached service outlive a coordinator that crashed, until `down` has told of it.

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -18,6 +17,9 @@
 #include "client/service/service_state.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
+#include "common/cli/program.h"
+#include "common/frame/dataset_name.h"
+#include "data/layers/layer_reader.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -43,11 +45,32 @@ bool IsVolumeFile(const std::string& source) {
   return parsed.ok() && std::filesystem::exists(parsed->path, error);
 }
 
-// NAME=PATH as --data takes it, with an absolute path.
-std::string CatalogueEntry(const std::string& source) {
+// The file of a source, or of a layer with what follows its name, with an absolute path.
+std::string AbsoluteSource(const std::string& source) {
   const std::size_t options = source.find('?');
-  const std::filesystem::path path = std::filesystem::absolute(source.substr(0, options));
-  return fmt::format("{}={}{}", DatasetName(path), path.string(), options == std::string::npos ? "" : source.substr(options));
+  const std::string path = std::filesystem::absolute(source.substr(0, options)).string();
+  return options == std::string::npos ? path : path + source.substr(options);
+}
+
+// NAME=PATH as --data takes it, with absolute paths.
+std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
+  std::string entry =
+      fmt::format("{}={}", DatasetName(std::filesystem::absolute(source.substr(0, source.find('?')))), AbsoluteSource(source));
+  if (!layers.labels.empty()) {
+    layers.labels = AbsoluteSource(layers.labels);
+    if (!layers.label_colors.empty()) layers.label_colors = AbsoluteSource(layers.label_colors);
+    entry += ",labels=" + LabelText(layers);
+  }
+  if (!layers.overlay.empty()) entry += ",overlay=" + AbsoluteSource(layers.overlay);
+  return entry;
+}
+
+// What the viewer shows first: of several times of a file the first one.
+std::string ShownDataset(const std::string& source) {
+  const std::string name = DatasetName(std::filesystem::absolute(source.substr(0, source.find('?'))));
+  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const bool several = parsed.ok() && parsed->options.time && parsed->options.time->count() > 1;
+  return several ? NameAtTime(name, parsed->options.time->first) : name;
 }
 
 // The threads of one worker draw one image together, while images of several workers must be combined. A task of splatting is 64 rows, so a
@@ -94,11 +117,16 @@ Result<std::string> EndpointOfUp(Helper& up) {
   return line->substr(from, line->find(' ', from) - from);
 }
 
-void OpenBrowser(const std::string& url) {
-  const char *x11 = std::getenv("DISPLAY"), *wayland = std::getenv("WAYLAND_DISPLAY");
+bool IsSet(const char* variable) {
+  const char* value = std::getenv(variable);
+  return value != nullptr && *value != 0;
+}
+
+Status OpenBrowser(const std::string& url) {
+  if (!IsSet("DISPLAY") && !IsSet("WAYLAND_DISPLAY")) return Status::Unavailable("there is no display here");
   const std::string opener = ProgramInPath("xdg-open");
-  if ((x11 == nullptr && wayland == nullptr) || opener.empty()) return;
-  (void)Child::Start({.command = {opener, url}, .log_path = "/dev/null", .outlives_us = true});
+  if (opener.empty()) return Status::NotFound("there is no xdg-open in $PATH (Debian package xdg-utils)");
+  return Child::Start({.command = {opener, url}, .log_path = "/dev/null", .outlives_us = true}).status();
 }
 
 // Until Ctrl-C (Ok), or one of the children ends.
@@ -114,10 +142,10 @@ Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
 }
 
 // The dataset that the service has for the file. With keys it takes an admin's.
-Status AddToService(const ServiceChoice& choice, const std::string& source) {
+Status AddToService(const ServiceChoice& choice, const std::string& entry) {
   Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
   if (!connection.ok()) return connection.status();
-  return connection->client().OrderData({.action = DataAction::kAdd, .items = {CatalogueEntry(source)}}).status();
+  return connection->client().OrderData({.action = DataAction::kAdd, .items = {entry}}).status();
 }
 
 // NotFound: the service has no dataset of this name; Unavailable: there is no service.
@@ -136,6 +164,9 @@ Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
 
 Status RunView(const ViewOptions& options) {
   const bool file = IsVolumeFile(options.source);
+  if (!file && options.layers.any()) {
+    return Status::InvalidArgument(fmt::format("SOURCE '{}' is no file, and --labels and --overlay are layers of a file", options.source));
+  }
   const Result<ServiceChoice> named = NamedService(options.service);
   if (!named.ok()) return named.status();
   const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
@@ -147,14 +178,14 @@ Status RunView(const ViewOptions& options) {
   if (file && choice.text().empty()) {
     if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
     Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--workers", std::to_string(WorkersForView()),
-                                       "--data", CatalogueEntry(options.source)});
+                                       "--data", CatalogueEntry(options.source, options.layers)});
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));
     Result<std::string> endpoint = EndpointOfUp(*service);
     if (!endpoint.ok()) return endpoint.status();
     choice.endpoint = *std::move(endpoint);
   } else if (file) {
-    if (Status status = AddToService(choice, options.source); !status.ok()) return status;
+    if (Status status = AddToService(choice, CatalogueEntry(options.source, options.layers)); !status.ok()) return status;
   } else if (Status status = CheckDataset(choice, options.source); !status.ok()) {
     return status;
   }
@@ -165,11 +196,17 @@ Status RunView(const ViewOptions& options) {
   if (!gateway.ok()) return gateway.status();
   const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
   if (!line.ok()) return Status(line.status().code(), "the gateway did not start; see its error above");
-  const std::string dataset =
-      file ? DatasetName(std::filesystem::absolute(options.source.substr(0, options.source.find('?')))) : options.source;
-  const std::string url = fmt::format("{}&dataset={}", line->substr(line->find(' ') + 1), dataset);
-  std::cout << fmt::format("{} is at {}\nCtrl-C ends it.\n", dataset, url) << std::flush;
-  if (options.browser) OpenBrowser(url);
+  const std::string dataset = file ? ShownDataset(options.source) : options.source;
+  const std::string url =
+      fmt::format("{}&dataset={}{}{}", line->substr(line->find(' ') + 1), dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
+                  options.layers.overlay.empty() ? "" : "&overlay=1");
+  std::cout << fmt::format("{} is at {}\n", dataset, url);
+  if (options.browser) {
+    const Status opened = OpenBrowser(url);
+    if (!opened.ok()) std::cout << fmt::format("No browser was opened, because {}: open this address in one.\n", opened.message());
+  }
+  std::cout << "Ctrl-C ends it.\n";
+  if (Status told = FlushOutput(); !told.ok()) return told;
   return WatchHelpers(*gateway, service);
 }
 

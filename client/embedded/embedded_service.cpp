@@ -3,7 +3,6 @@
 #include <atomic>
 #include <cstdint>
 #include <utility>
-#include <vector>
 
 #include "common/base/check.h"
 
@@ -11,6 +10,9 @@ namespace slabstream {
 namespace {
 
 constexpr int kMaxEmbeddedWorkers = 256;
+
+// A process does not lose single threads, and what they send arrives. So silence only means that the machine is busy.
+constexpr Duration kPatience = std::chrono::minutes(10);  // what a Welcome can say at most
 
 // Names within one process: several embedded services may share a context.
 std::string UniqueEndpoint() {
@@ -28,6 +30,8 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   options.coordinator.client_endpoint = UniqueEndpoint();
   options.coordinator.worker_endpoint = UniqueEndpoint();
   options.coordinator.voxels_endpoint = UniqueEndpoint();
+  CoordinatorConfig& machine = options.coordinator.machine;
+  machine.worker_timeout = machine.client_timeout = machine.stall_timeout = options.worker.chunk_timeout = kPatience;
   Result<std::unique_ptr<CoordinatorService>> coordinator = CoordinatorService::Start(context, std::move(options.coordinator));
   if (!coordinator.ok()) return coordinator.status();
   std::unique_ptr<EmbeddedService> service(new EmbeddedService(context, std::move(options.worker), std::move(*coordinator)));
@@ -49,6 +53,8 @@ EmbeddedService::~EmbeddedService() {
 }
 
 const std::string& EmbeddedService::endpoint() const { return coordinator_->client_endpoint(); }
+
+Result<Client> EmbeddedService::Connect() const { return Client::Connect(context_, endpoint(), kPatience); }
 
 WorkerService& EmbeddedService::worker(int index) {
   CHECK(index >= 0 && std::size_t(index) < workers_.size()) << "worker " << index;

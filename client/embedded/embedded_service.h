@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "client/client.h"
 #include "common/base/status.h"
 #include "common/transport/socket.h"
 #include "coordinator/service.h"
@@ -14,8 +15,8 @@ namespace slabstream {
 
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
-  CoordinatorOptions coordinator;  // endpoints are filled in; catalogue and machine timings are used
-  WorkerConfig worker;             // of each; threads, timings and budgets are used
+  CoordinatorOptions coordinator;  // endpoints and time-outs are filled in; the catalogue is used
+  WorkerConfig worker;             // of each; threads and budgets are used
 };
 
 class EmbeddedService {
@@ -24,6 +25,7 @@ class EmbeddedService {
   ~EmbeddedService();
 
   const std::string& endpoint() const;  // for Client::Connect with the same context
+  Result<Client> Connect() const;       // waits as long as it takes
   WorkerService& worker(int index);     // tests: RequestStop makes it leave
   Status AddWorker();                   // joins the running service
 

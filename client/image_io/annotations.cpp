@@ -6,9 +6,11 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <optional>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/base/utf8.h"
 #include "common/view/picture_labels.h"
 
@@ -69,10 +71,22 @@ std::array<InkPoint, 3> LabelPlaces(const std::array<ShownAxis, 3>& axes, double
   return places;
 }
 
-// Draws the annotations of one picture, each by one function.
+Color ColorOf(const Rgb& color) { return {color.r, color.g, color.b}; }
+
+// Draws the annotations of one picture, or of one of several side by side, each by one function.
 class Artist {
  public:
-  Artist(ImageSize size, const PictureGeometry& geometry) : size_(size), geometry_(geometry), scale_(size) {}
+  // `left`: of this picture, in pixels of the whole.
+  Artist(ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale)
+      : size_(size), left_(left), geometry_(geometry), scale_(scale) {}
+
+  // What others have drawn at the top and on the right, in pixels from the edges.
+  void KeepClear(double top, double right) {
+    top_ = top;
+    right_ = right;
+  }
+  double top() const { return top_; }
+  double right() const { return right_; }
 
   Status DrawTitle(const std::string& title) {
     top_ += kAscender * scale_.letters;
@@ -87,9 +101,9 @@ class Artist {
     const std::pair<Vec3, InkPoint> sides[] = {{geometry_.up, {x, top_ + 2 * half}},
                                                {-geometry_.up, {x, double(size_.height - scale_.margin)}},
                                                {-geometry_.right, {0, y}},  // PutText keeps texts inside the picture
-                                               {geometry_.right, {double(size_.width), y}}};
+                                               {geometry_.right, {size_.width - right_, y}}};
     for (const auto& [direction, place] : sides) {
-      if (Status status = PutText(PatientSides(direction), place); !status.ok()) return status;
+      if (Status status = PutText(PatientSides(direction), place, kWhite, right_); !status.ok()) return status;
     }
     return Status::Ok();
   }
@@ -120,17 +134,84 @@ class Artist {
     return PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
   }
 
+  // Between the top and what may stand at the bottom: values upwards, with ticks to the left of the bar and the caption above it.
+  Status DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
+    const double width = 0.8 * scale_.letters, right = size_.width - scale_.margin, left = right - width, tick = 0.3 * scale_.letters;
+    double top = top_ + 0.5 * scale_.letters;
+    if (!caption.empty()) {
+      top = top_ + kAscender * scale_.letters;
+      if (Status status = PutText(caption, {double(size_.width), top}); !status.ok()) return status;
+      top += (kDescender + 0.5) * scale_.letters;
+    }
+    const double bottom = size_.height - scale_.margin - 2.5 * scale_.letters;
+    const int rows = int(bottom - top);
+    if (rows < 1) return Status::Ok();
+    const TransferFunction colors{.colors = bar.colors, .opacities = {}};
+    PutHalo(RectangleInk({left, std::floor(top)}, {right, std::floor(top) + rows}));
+    for (int row = 0; row < rows; ++row) {
+      const double y = std::floor(top) + row, value = std::lerp(bar.high, bar.low, (row + 0.5) / rows);
+      PutPlain(RectangleInk({left, y}, {right, y + 1}), ColorOf(colors.Color(value)));
+    }
+    int widest = 0;
+    for (const double value : TicksOf(bar.low, bar.high)) {
+      const double y = std::floor(top) + rows * (bar.high - value) / (bar.high - bar.low);
+      Put(RectangleInk({left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}), kWhite);
+      const std::string text = fmt::format("{:.6g}", value);
+      const Result<int> text_width = TextWidth(text, scale_.letters);
+      if (!text_width.ok()) return text_width.status();
+      widest = std::max(widest, *text_width);
+      const double x = left - 1.5 * tick - 0.5 * *text_width;
+      if (Status status = PutText(text, {x, y + 0.5 * kCapital * scale_.letters}); !status.ok()) return status;
+    }
+    right_ = scale_.margin + width + 2 * tick + widest;
+    return Status::Ok();
+  }
+
+  // One line each, as many as there is room for.
+  Status DrawLegend(const std::vector<PictureKey::Entry>& entries) {
+    const double line = 1.35 * scale_.letters, swatch = 0.8 * scale_.letters, left = scale_.margin;
+    const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
+    const std::size_t lines = std::max(std::size_t(std::max(room / line, 0.0)), std::size_t{1});
+    const std::size_t shown = entries.size() <= lines ? entries.size() : lines - 1;
+    double y = top_ + 0.2 * scale_.letters;
+    const auto put = [&](const std::string& text, double x) { return PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
+    for (std::size_t i = 0; i < shown; ++i, y += line) {
+      Put(RectangleInk({left, y + 0.1 * scale_.letters}, {left + swatch, y + 0.1 * scale_.letters + swatch}), ColorOf(entries[i].color));
+      if (Status status = put(entries[i].name, left + 1.4 * swatch); !status.ok()) return status;
+    }
+    return shown < entries.size() ? put(fmt::format("and {} more", entries.size() - shown), left) : Status::Ok();
+  }
+
   std::vector<ColoredInk> TakeLayers() { return std::move(layers_); }
 
  private:
   // The ink on its halo.
   void Put(const Ink& ink, Color color) {
-    layers_.push_back({Grown(ink, scale_.halo), 0, 0, 0, kHaloOpacity});
-    layers_.push_back({ink, color.red, color.green, color.blue, 1});
+    PutHalo(ink);
+    PutPlain(ink, color);
+  }
+  void PutHalo(const Ink& ink) { layers_.push_back({Shifted(Grown(ink, scale_.halo), left_, 0), 0, 0, 0, kHaloOpacity}); }
+  void PutPlain(const Ink& ink, Color color) { layers_.push_back({Shifted(ink, left_, 0), color.red, color.green, color.blue, 1}); }
+
+  // The text, with its baseline centred at `place`, but not beyond the picture's sides, and `right` pixels from the right one. One that is
+  // too wide shrinks.
+  Status PutText(const std::string& text, InkPoint place, Color color = kWhite, double right = 0) {
+    const Result<std::pair<Ink, int>> fitted = Fitted(text);
+    if (!fitted.ok()) return fitted.status();
+    const auto& [ink, width] = *fitted;
+    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - width, least);
+    Put(Shifted(ink, std::clamp(int(std::lround(place.x - 0.5 * width)), least, most), int(std::lround(place.y))), color);
+    return Status::Ok();
+  }
+  // Its baseline begins at `place`.
+  Status PutTextFrom(const std::string& text, InkPoint place) {
+    const Result<std::pair<Ink, int>> fitted = Fitted(text);
+    if (fitted.ok()) Put(Shifted(fitted->first, int(std::lround(place.x)), int(std::lround(place.y))), kWhite);
+    return fitted.status();
   }
 
-  // The text, with its baseline centred at `place`, but not beyond the picture's sides. One that is too wide shrinks.
-  Status PutText(const std::string& text, InkPoint place, Color color = kWhite) {
+  // The text's ink and width.
+  Result<std::pair<Ink, int>> Fitted(const std::string& text) const {
     const int room = std::max(size_.width - 2 * scale_.margin, 1);
     int letters = scale_.letters;
     Result<int> width = TextWidth(text, letters);
@@ -139,17 +220,17 @@ class Artist {
       width = TextWidth(text, letters);
     }
     if (!width.ok()) return width.status();
-    const Result<Ink> ink = TextInk(text, letters);
+    Result<Ink> ink = TextInk(text, letters);
     if (!ink.ok()) return ink.status();
-    const int least = scale_.margin, most = std::max(size_.width - scale_.margin - *width, least);
-    Put(Shifted(*ink, std::clamp(int(std::lround(place.x - 0.5 * *width)), least, most), int(std::lround(place.y))), color);
-    return Status::Ok();
+    return std::pair(*std::move(ink), *width);
   }
 
   ImageSize size_;
+  int left_;
   PictureGeometry geometry_;
   Scale scale_;
   double top_ = scale_.margin;  // of the room that is left
+  double right_ = 0;            // what is taken of it
   std::vector<ColoredInk> layers_;
 };
 
@@ -174,16 +255,33 @@ Status CheckTitle(std::string_view name, std::string_view title) {
 
 Status CheckCanDraw(const Annotations& annotations) { return annotations.any() ? AnnotationFont().status() : Status::Ok(); }
 
-Result<AnnotationLayers> AnnotationLayers::Draw(const Annotations& annotations, ImageSize size, const PictureGeometry& geometry) {
-  Artist artist(size, geometry);
-  Status status;
-  if (!annotations.title.empty()) status = artist.DrawTitle(annotations.title);
-  if (status.ok() && annotations.orientation_marker && geometry.world == World::kPatient) status = artist.DrawSides();
-  if (status.ok() && annotations.orientation_marker) status = artist.DrawAxes();
-  if (status.ok() && annotations.scale_bar) status = artist.DrawScaleBar();
-  if (!status.ok()) return status;
+Result<AnnotationLayers> AnnotationLayers::Draw(const Annotations& annotations, ImageSize size, std::span<const PictureGeometry> panes,
+                                                const PictureKey& key) {
+  CHECK(!panes.empty());
+  const ImageSize pane = {size.width / int(panes.size()), size.height};
+  const Scale scale(pane);
   AnnotationLayers layers;
-  layers.layers_ = artist.TakeLayers();
+  const auto keep = [&layers](std::vector<ColoredInk> more) { std::ranges::move(more, std::back_inserter(layers.layers_)); };
+
+  Artist whole(size, 0, panes.front(), scale);
+  Status status;
+  if (!annotations.title.empty()) status = whole.DrawTitle(annotations.title);
+  if (status.ok() && annotations.color_bar && key.bar) status = whole.DrawColorBar(*key.bar, *annotations.color_bar);
+  if (status.ok() && annotations.legend && !key.entries.empty()) status = whole.DrawLegend(key.entries);
+  if (!status.ok()) return status;
+  keep(whole.TakeLayers());
+
+  for (std::size_t i = 0; i < panes.size(); ++i) {
+    const PictureGeometry& geometry = panes[i];
+    Artist artist(pane, int(i) * pane.width, geometry, scale);
+    artist.KeepClear(whole.top(), i + 1 == panes.size() ? whole.right() : 0);
+    const bool sides = annotations.orientation_marker && geometry.world == World::kPatient;
+    if (sides) status = artist.DrawSides();
+    if (status.ok() && annotations.orientation_marker && !(sides && annotations.sides_only)) status = artist.DrawAxes();
+    if (status.ok() && annotations.scale_bar) status = artist.DrawScaleBar();
+    if (!status.ok()) return status;
+    keep(artist.TakeLayers());
+  }
   return layers;
 }
 

@@ -10,9 +10,9 @@
 namespace slabstream {
 
 Result<ComposedPicture> ComposedPicture::Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
-                                              const PictureGeometry& geometry) {
+                                              std::span<const PictureGeometry> panes, const PictureKey& key) {
   CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds)));
-  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, geometry);
+  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, panes, key);
   if (!annotations.ok()) return annotations.status();
   return ComposedPicture(image, size, format.background, *std::move(annotations));
 }

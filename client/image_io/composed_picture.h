@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
@@ -28,10 +27,14 @@ struct PictureFormat {
 // Rows are made one by one, so that no second copy of the picture is needed. Any thread.
 class ComposedPicture {
  public:
-  // `image` is premultiplied and must outlive this; its bounds lie within `size`, pixels outside are empty. NotFound: the font of
-  // annotations.
+  // `image` is premultiplied and must outlive this; its bounds lie within `size`, pixels outside are empty. `panes`: of pictures side by
+  // side, of equal widths, at least one. NotFound: the font of annotations.
   static Result<ComposedPicture> Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
-                                      const PictureGeometry& geometry);
+                                      std::span<const PictureGeometry> panes, const PictureKey& key = {});
+  static Result<ComposedPicture> Make(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureGeometry& geometry,
+                                      const PictureKey& key = {}) {
+    return Make(image, size, format, {&geometry, 1}, key);
+  }
 
   ImageSize size() const { return size_; }
   bool has_depth() const { return HasDepth(image_->format); }

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -60,6 +59,10 @@ bool WriteExrRows(const ComposedPicture& picture, const PictureEncoder::WriteRow
   return true;
 }
 
+std::span<const PictureGeometry> PanesOf(const PictureNotes& notes) {
+  return notes.panes.empty() ? std::span(&notes.geometry, 1) : std::span(notes.panes);
+}
+
 // PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch. nullopt:
 // pixels do not all have the same size, or none that is known.
 std::optional<double> PixelDensity(const PictureGeometry& geometry, bool png) {
@@ -76,7 +79,10 @@ Result<const PictureEncoder*> FindEncoder() {
   static const Result<const PictureEncoder*> encoder = []() -> Result<const PictureEncoder*> {
     void* const module = dlopen("libslabstream-pictures.so", RTLD_NOW | RTLD_LOCAL);
     void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
-    if (entry == nullptr) return Status::Unavailable(fmt::format("pictures cannot be written: {}", dlerror()));
+    if (entry == nullptr) {
+      return Status::Unavailable(fmt::format(
+          "pictures cannot be written: {} (libslabstream-pictures.so belongs beside the program and needs libopenimageio2.4)", dlerror()));
+    }
     return reinterpret_cast<PictureEncoderEntry>(entry)();
   }();
   return encoder;
@@ -116,10 +122,15 @@ Status CheckPicturePath(const std::string& path) {
   return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
 }
 
+Status CheckCanWritePicture(const std::string& path) {
+  const Status status = CheckPicturePath(path);
+  return status.ok() ? FindEncoder().status() : status;
+}
+
 Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes) {
   if (Status status = CheckPicturePath(path); !status.ok()) return status;
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
   if (!picture.ok()) return picture.status();
   Result<OutputFile> file = OutputFile::Create(path);
   if (!file.ok()) return file.status();
@@ -135,7 +146,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
 }
 
 Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, notes.geometry);
+  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
   if (!picture.ok()) return picture.status();
   std::vector<std::byte> file;
   const auto write = [&](std::int64_t offset, std::span<const std::byte> bytes) {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -21,12 +22,18 @@ namespace slabstream {
 // What a file holds beside the pixels.
 struct PictureNotes {
   PictureGeometry geometry;
+  std::vector<PictureGeometry> panes = {};  // of several pictures side by side, of equal widths; empty: it is one
+  PictureKey key = {};
   std::string record;  // ASCII text that says how the picture was made, under the name kRecordName; empty: none
 };
 inline constexpr char kRecordName[] = "slabstream";
 
 // InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
+
+// The same, and Unavailable if libslabstream-pictures.so (picture_encoder.h) or a library that it needs is missing. To be called before the
+// picture is made.
+Status CheckCanWritePicture(const std::string& path);
 
 // `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that writing
 // needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.

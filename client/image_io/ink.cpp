@@ -12,7 +12,6 @@
 #include <filesystem>
 #include <memory>
 #include <string_view>
-#include <utility>
 
 #include "common/base/utf8.h"
 

@@ -8,7 +8,6 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "client/movie/movie_format.h"
 #include "client/service/process.h"

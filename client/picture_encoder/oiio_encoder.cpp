@@ -8,7 +8,8 @@
 namespace slabstream {
 namespace {
 
-// Takes the library's bytes, which may come in any order.
+// Takes the library's bytes, which may come in any order. After a failure it drops them: libpng ends a picture that it could not write with
+// a line of its own on stderr.
 class Sink : public OIIO::Filesystem::IOProxy {
  public:
   explicit Sink(const PictureEncoder::WriteBytes& write) : IOProxy("", Write), write_(write) {}
@@ -21,7 +22,7 @@ class Sink : public OIIO::Filesystem::IOProxy {
   }
   std::size_t pwrite(const void* bytes, std::size_t size, std::int64_t offset) override {
     ok_ = ok_ && write_(offset, {static_cast<const std::byte*>(bytes), size});
-    return ok_ ? size : 0;
+    return size;
   }
   bool ok() const { return ok_; }
 
@@ -70,9 +71,10 @@ class OiioEncoder final : public PictureEncoder {
     const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(format.png ? "png" : "openexr");
     if (!out) return OIIO::geterror();
     if (!out->open(format.png ? "picture.png" : "picture.exr", spec)) return out->geterror();
-    const bool written = rows([&](int y, const void* row) { return sink.ok() && out->write_scanline(y, 0, spec.format, row); });
+    const bool written = rows([&](int y, const void* row) { return out->write_scanline(y, 0, spec.format, row); });
     const bool closed = out->close();
     if (!written || !closed) return out->geterror();
+    if (!sink.ok()) return "the bytes were not taken";
     return std::nullopt;
   }
 };

@@ -23,9 +23,9 @@ struct EncodedFormat {
 
 class PictureEncoder {
  public:
-  // Takes bytes of the file, in any order. False: it cannot.
+  // Takes bytes of the file, in any order. False: it cannot, and is not called again.
   using WriteBytes = std::function<bool(std::int64_t offset, std::span<const std::byte> bytes)>;
-  // Takes row y, of samples in the file's own layout. False: the encoder or WriteBytes has failed.
+  // Takes row y, of samples in the file's own layout. False: the encoder has failed.
   using WriteRow = std::function<bool(int y, const void* row)>;
 
   // Calls `rows` once, which passes on all rows from 0 and returns false as soon as one fails. nullopt: done; else the reason.

@@ -45,7 +45,21 @@ Json SampleJson(const VolumeSample& sample) {
   json["value"] = OrNull(sample.value);
   if (sample.label) json["label"] = {{"value", sample.label->value}, {"name", sample.label->name}};
   if (sample.overlay) json["overlay"] = *sample.overlay;
+  json["interpolated"] = OrNull(sample.interpolated);
   return json;
+}
+
+Json ProfileJson(const std::vector<VolumeSample>& samples) {
+  Json values = Json::array();
+  for (const VolumeSample& sample : samples) values.push_back(OrNull(sample.interpolated));
+  const Vec3 from = samples.front().at, to = samples.back().at;
+  return {{"from", Vector(from)}, {"to", Vector(to)}, {"length", Length(to - from)}, {"values", std::move(values)}};
+}
+
+Json BoxStatisticsJson(const BoxStatistics& box) {
+  const auto known = [&](double value) { return box.voxels > 0 ? Json(value) : Json(nullptr); };
+  return {{"voxels", box.voxels},      {"non_finite", box.non_finite}, {"mean", known(box.mean)}, {"deviation", known(box.deviation)},
+          {"least", known(box.least)}, {"largest", known(box.largest)}};
 }
 
 Json PickJson(const PickReply& picked) {

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "common/wire/client_messages.h"
 
@@ -14,10 +15,17 @@ nlohmann::ordered_json HistogramJson(const std::string& dataset, const SummaryRe
 // {"dataset", "labels": [{"value", "name", "color": "#rrggbb"}, ...]}
 nlohmann::ordered_json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 
-// {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"}. Null: there is none.
+// {"at", "inside", "voxel", "value", and, if there are such layers, "label": {"value", "name"}, "overlay"; "interpolated"}. Null: there is
+// none.
 nlohmann::ordered_json SampleJson(const VolumeSample& sample);
 // The same with "hit", and "depth"; {"hit": false} if there is none.
 nlohmann::ordered_json PickJson(const PickReply& picked);
+
+// {"from", "to", "length", "values"}: what samples along a line hold, at least two of them. Null: nothing, or no finite value.
+nlohmann::ordered_json ProfileJson(const std::vector<VolumeSample>& samples);
+
+// {"voxels", "non_finite", "mean", "deviation", "least", "largest"}. Null: there are no voxels.
+nlohmann::ordered_json BoxStatisticsJson(const BoxStatistics& box);
 
 // One line.
 std::string SampleText(const VolumeSample& sample);

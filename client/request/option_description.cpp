@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/request/request_options.h"
+#include "common/classification/transfer_function.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
 
@@ -41,6 +42,12 @@ Json DescribeRenderers() {
   return renderers;
 }
 
+Json DescribePresets() {
+  Json presets = Json::array();
+  for (const TransferPreset& preset : TransferPresets()) presets.push_back(preset.name);
+  return presets;
+}
+
 Json Describe(CLI::Option& option) {
   Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
   if (option.get_items_expected_max() > 0) json["type"] = option.get_type_name();
@@ -62,6 +69,7 @@ Json Describe(CLI::Option& option) {
     if (!field->ability.empty()) json["ability"] = field->ability;
     if (field->same_picture) json["same_picture"] = true;
     if (field->path == "renderer") json["renderers"] = DescribeRenderers();
+    if (option.get_type_name() == "TRANSFER") json["presets"] = DescribePresets();
   }
   json["help"] = option.get_description();
   return json;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/request/layer_options.h"
+#include "client/request/value_window.h"
 #include "client/request/values.h"
-#include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
@@ -81,10 +81,11 @@ void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
 
-void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
+// `here`: whoever draws the picture asks for its key.
+void AddAnnotationOptions(CLI::App& app, Annotations& annotations, bool here) {
   app.option_defaults()->group("Annotations (drawn onto the picture)");
   app.add_flag("--scale-bar", annotations.scale_bar,
-               "A scale bar: mm for patients, else voxels or the unit of the file; under perspective it holds at the depth of the target");
+               "A scale bar: mm for patients, else the unit of the file or voxels; under perspective it holds at the depth of the target");
   app.add_flag("--orientation-marker", annotations.orientation_marker,
                "The axes of the world; of patients also the sides (R, L, A, P, S, I) at the edges of the picture");
   AddParsed(
@@ -92,6 +93,16 @@ void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
       [](const std::string& option, const std::string& text) { return TextIf(CheckTitle(option, text), text); },
       fmt::format("A line of at most {} characters at the top", kMaxTitleCharacters))
       ->type_name("TITLE");
+  if (!here) return;
+  AddOptionalValue(
+      app, "--color-bar", annotations.color_bar, "",
+      [](const std::string& option, const std::string& text) -> Result<std::optional<std::string>> {
+        if (Status status = CheckTitle(option, text); !status.ok()) return status;
+        return std::optional(text);
+      },
+      "The colours of the transfer function with their data values; CAPTION stands above them, such as a unit")
+      ->type_name("[=CAPTION]");
+  app.add_flag("--legend", annotations.legend, "Names and colours of the labels that are shown, and of isosurfaces");
 }
 
 }  // namespace
@@ -123,7 +134,7 @@ void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat
   AddWholeViews(app, request.view, files != nullptr);
   if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddPictureFormat(app, format);
-  AddAnnotationOptions(app, format.annotations);
+  AddAnnotationOptions(app, format.annotations, files != nullptr);
 }
 
 void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* files) {
@@ -153,12 +164,14 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
 
   app.option_defaults()->group("Look");
   const auto value = [](const std::string& option, const std::string& text) { return ParseNumber(option, text, {-1e30, 1e30}); };
-  const auto width = [](const std::string& option, const std::string& text) { return ParseNumber(option, text, {0, 1e30, true}); };
   CLI::Option* const window =
-      AddParsed(app, "--window", slice.window, width, "Width of the range of values from black to white")->type_name("VALUE");
+      AddParsed(app, "--window", slice.window, ParseValueWindow,
+                "Width of the range of values from black to white, or width and level by name, for CT in Hounsfield units" +
+                    Explained(kNamedWindows))
+          ->type_name("VALUE|NAME");
   AddParsed(app, "--level", slice.level, value, "Middle of the range of values from black to white")
       ->type_name("VALUE")
-      ->default_str("half of --window")
+      ->default_str("half of --window, or that of its name")
       ->needs(window);
   const auto& parameters = RequireRenderer(slice.frame.renderer).value()->parameters();
   const auto wanted = [&](const RequestOption& option) {
@@ -171,6 +184,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
   app.get_option("--transfer")->excludes(window)->default_str("window");
   app.get_option("--size")->group("Plane");
   AddPictureFormat(app, slice.format);
+  if (files != nullptr) AddAnnotationOptions(app, slice.format.annotations, true);
 }
 
 Result<ViewParameters> ParseCamera(const std::string& text) {

@@ -24,6 +24,8 @@ Json FormatJson(const PictureFormat& format) {
   if (!format.annotations.title.empty()) json["title"] = format.annotations.title;
   if (format.annotations.scale_bar) json["scale_bar"] = true;
   if (format.annotations.orientation_marker) json["orientation_marker"] = true;
+  if (format.annotations.color_bar) json["color_bar"] = *format.annotations.color_bar;
+  if (format.annotations.legend) json["legend"] = true;
   return json;
 }
 
@@ -34,13 +36,16 @@ void ReadFormat(const JsonValue& value, PictureFormat& format) {
     if (channels.size() != 4) return v.Complain(v.Shown() + " must be four numbers");
     format.background = {channels[0], channels[1], channels[2], channels[3]};
   };
-  const auto title = [&](const JsonValue& v) {
-    format.annotations.title = v.Text();
-    if (const Status status = CheckTitle("the title", format.annotations.title); !status.ok()) v.Complain(status.message());
+  const auto line = [](const JsonValue& v) {
+    std::string text = v.Text();
+    if (const Status status = CheckTitle("the text", text); !status.ok()) v.Complain(status.message());
+    return text;
   };
   value.Fields({{"depth", [&](const JsonValue& v) { format.png_bits = v.Integer(8, 16); }},
                 {"background", color},
-                {"title", title},
+                {"title", [&](const JsonValue& v) { format.annotations.title = line(v); }},
+                {"color_bar", [&](const JsonValue& v) { format.annotations.color_bar = line(v); }},
+                {"legend", [&](const JsonValue& v) { format.annotations.legend = v.Boolean(); }},
                 {"scale_bar", [&](const JsonValue& v) { format.annotations.scale_bar = v.Boolean(); }},
                 {"orientation_marker", [&](const JsonValue& v) { format.annotations.orientation_marker = v.Boolean(); }}});
   if (format.png_bits != 8 && format.png_bits != 16) value.Complain(fmt::format("depth {} is neither 8 nor 16", format.png_bits));
@@ -95,7 +100,7 @@ void AddRequest(OptionList& out, const FrameRequest& request) {
 void AddFormat(OptionList& out, const PictureFormat& format) {
   const PictureFormat usual;
   const auto& [png_bits, background, annotations] = format;
-  const auto& [scale_bar, orientation_marker, title] = annotations;
+  const auto& [scale_bar, orientation_marker, sides_only, title, color_bar, legend] = annotations;  // sides_only: of slices
   if (background != usual.background) {
     out.Add("--background", fmt::format("{},{},{},{}", background.r, background.g, background.b, background.a));
   }
@@ -103,6 +108,8 @@ void AddFormat(OptionList& out, const PictureFormat& format) {
   out.Name("--title", title, "");
   out.Flag("--scale-bar", scale_bar);
   out.Flag("--orientation-marker", orientation_marker);
+  if (color_bar) out.Add(color_bar->empty() ? "--color-bar" : "--color-bar=" + *color_bar);
+  out.Flag("--legend", legend);
 }
 
 void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {

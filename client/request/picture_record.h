@@ -3,7 +3,7 @@
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
 //    "layers": {"labels", "overlay"},                                     likewise, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
-//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker"},
+//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend"},
 //    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"}}
 //
 // It names no host, no time and no place of the service, so the same picture has the same record wherever and whenever it is made.

@@ -65,15 +65,6 @@ Choices ChoicesOf(const std::string& list) {
   return choices;
 }
 
-std::string RenderersWith(std::string_view ability) {
-  std::string names;
-  for (const RendererKind* kind : Renderers()) {
-    if (!std::ranges::any_of(kind->abilities(), [&](Ability a) { return NameOf(a) == ability; })) continue;
-    names += (names.empty() ? "" : " and ") + std::string(kind->name());
-  }
-  return names;
-}
-
 template <class T>
 RequestOption Describe(const Field& field, const T&, std::string path, const std::string& group) {
   const v1::About& about = AboutOf(field);
@@ -93,7 +84,7 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
     option.choices = std::move(choices.names);
     option.help += choices.explained;
   }
-  if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", RenderersWith(option.ability));
+  if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
   const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };
   if constexpr (requires(T value) { value.number(); }) {
     option.choices = WordsOf(*field.enum_type());
@@ -116,7 +107,7 @@ void AddParameters(const std::string& group, std::vector<RequestOption>& table) 
     for (const RendererParameter& parameter : kind->parameters()) {
       auto& [entry, renderers] = parameters[parameter.name];
       entry = &parameter;
-      renderers += (renderers.empty() ? "" : " and ") + std::string(kind->name());
+      renderers += (renderers.empty() ? "" : ", ") + std::string(kind->name());
     }
   }
   for (const auto& [name, entry] : parameters) {

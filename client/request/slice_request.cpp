@@ -30,9 +30,9 @@ std::string RendererThat(bool (*suits)(const RendererKind&)) {
   return std::string((*found)->name());
 }
 
-// Values from level - window / 2 to level + window / 2 are black to white; all are opaque.
-TransferFunction Window(double window, double level) {
-  return {.colors = {{level - window / 2, {0, 0, 0}}, {level + window / 2, {1, 1, 1}}}, .opacities = {{level, 1}}};
+// Black to white; all values are opaque.
+TransferFunction FunctionOf(const ValueWindow& window) {
+  return {.colors = {{window.low(), {0, 0, 0}}, {window.high(), {1, 1, 1}}}, .opacities = {{window.level, 1}}};
 }
 
 }  // namespace
@@ -42,6 +42,7 @@ SliceRequest::SliceRequest() {
     return std::ranges::find(kind.parameters(), "projection-mode", &RendererParameter::name) != kind.parameters().end();
   });
   frame.transfer.choice = "window";
+  format.annotations.sides_only = true;
 }
 
 Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
@@ -61,7 +62,7 @@ Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
       frame.renderer = RendererThat([](const RendererKind& kind) { return kind.Can(Ability::kLabels) && kind.Can(Ability::kOverlay); });
       frame.shading.model = ShadingModel::kNone;
     }
-    if (slice.window) frame.transfer.choice = Window(*slice.window, slice.level.value_or(*slice.window / 2));
+    if (const auto window = slice.shown_window()) frame.transfer.choice = FunctionOf(*window);
     if (Status status = Validate(frame); !status.ok()) return status;
   }
   return frames;

@@ -10,6 +10,7 @@
 
 #include "client/image_io/composed_picture.h"
 #include "client/request/slice_planes.h"
+#include "client/request/value_window.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/image/local_image.h"
@@ -20,13 +21,18 @@ struct SliceRequest {
   SliceRequest();
 
   std::span<const SlicePlane> planes = kSliceChoices.back().planes;
-  std::optional<Vec3> at;               // a point of the world
-  std::optional<std::int32_t> index;    // of the slice; of one plane only. Neither: the volume's centre
-  double thickness = 0;                 // unit of the world; 0: a plane
-  std::optional<double> window, level;  // data values; none: `frame.transfer`
-  FrameRequest frame;                   // dataset, renderer, its parameters, size of each plane, transfer function, layers
+  std::optional<Vec3> at;             // a point of the world
+  std::optional<std::int32_t> index;  // of the slice; of one plane only. Neither: the volume's centre
+  double thickness = 0;               // unit of the world; 0: a plane
+  std::optional<ValueWindow> window;  // none: `frame.transfer`
+  std::optional<double> level;        // data value, in place of the window's
+  FrameRequest frame;                 // dataset, renderer, its parameters, size of each plane, transfer function, layers
   PictureFormat format;
 
+  // What is shown from black to white; none: `frame.transfer` says it.
+  std::optional<ValueWindow> shown_window() const {
+    return window ? std::optional(ValueWindow{window->width, level.value_or(window->level)}) : std::nullopt;
+  }
   ImageSize size() const { return {frame.size.width * int(planes.size()), frame.size.height}; }  // of the whole picture
 };
 

@@ -8,34 +8,11 @@
 #include <optional>
 #include <vector>
 
+#include "client/request/named_colors.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {
 namespace {
-
-struct NamedColor {
-  std::string_view name, code;
-};
-constexpr std::array<NamedColor, 18> kNamedColors = {{
-    {"black", "#000000"},
-    {"silver", "#c0c0c0"},
-    {"gray", "#808080"},
-    {"grey", "#808080"},
-    {"white", "#ffffff"},
-    {"maroon", "#800000"},
-    {"red", "#ff0000"},
-    {"purple", "#800080"},
-    {"fuchsia", "#ff00ff"},
-    {"green", "#008000"},
-    {"lime", "#00ff00"},
-    {"olive", "#808000"},
-    {"yellow", "#ffff00"},
-    {"orange", "#ffa500"},
-    {"navy", "#000080"},
-    {"blue", "#0000ff"},
-    {"teal", "#008080"},
-    {"aqua", "#00ffff"},
-}};
 
 std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
   if (digits.size() != 6 && digits.size() != 8) return std::nullopt;
@@ -103,16 +80,22 @@ Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view t
 
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
   ClipBox box;
-  std::string_view bounds = text;
-  if (text.ends_with('%')) box.unit = ClipUnit::kPercent;
-  if (text.ends_with('v')) box.unit = ClipUnit::kVoxels;
-  if (box.unit != ClipUnit::kWorld) bounds.remove_suffix(1);
+  const bool percent = text.find('%') != std::string_view::npos, voxels = text.find('v') != std::string_view::npos;
+  if (percent) box.unit = ClipUnit::kPercent;
+  if (voxels) box.unit = ClipUnit::kVoxels;
   const auto refuse = [&] { return Status::InvalidArgument(fmt::format("{} '{}' is not X0:X1,Y0:Y1,Z0:Z1", option, text)); };
-  const std::vector<std::string_view> axes = Split(bounds, ',');
+  if (percent && voxels) {
+    return Status::InvalidArgument(
+        fmt::format("{} '{}' has bounds in voxels (v) and in percent (%): all must have one unit", option, text));
+  }
+  const std::vector<std::string_view> axes = Split(text, ',');
   if (axes.size() != kAxes.size()) return refuse();
   for (const Axis axis : kAxes) {
-    const std::vector<std::string_view> ends = Split(axes[std::size_t(Number(axis))], ':');
+    std::vector<std::string_view> ends = Split(axes[std::size_t(Number(axis))], ':');
     if (ends.size() != 2) return refuse();
+    for (std::string_view& end : ends) {
+      if (end.ends_with('%') || end.ends_with('v')) end.remove_suffix(1);
+    }
     for (const bool high : {false, true}) {
       double& bound = high ? box.high[axis] : box.low[axis];
       bound = high ? kMaxWorldCoordinate : -kMaxWorldCoordinate;
@@ -141,10 +124,10 @@ Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text)
 }
 
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {
-  const auto named = std::ranges::find(kNamedColors, text, &NamedColor::name);
-  const std::string_view code = named != kNamedColors.end() ? named->code : text;
+  const auto* const named = std::ranges::find(kNamedColors, text, &NamedColor::name);
+  const std::string code = named != kNamedColors.end() ? fmt::format("#{:06x}", named->code) : std::string(text);
   if (code.starts_with('#')) {
-    if (const std::optional<StraightColor> color = FromHexadecimal(code.substr(1))) return *color;
+    if (const std::optional<StraightColor> color = FromHexadecimal(std::string_view(code).substr(1))) return *color;
     return Status::InvalidArgument(fmt::format("{} '{}' is neither #rrggbb nor #rrggbbaa", option, text));
   }
   const std::vector<std::string_view> parts = Split(text, ',');

@@ -25,13 +25,14 @@ Result<Vec3> ParseDirection(std::string_view option, std::string_view text);
 // "LOW:HIGH", which rise, in [-kMaxScalar, kMaxScalar]; or "LOW%:HIGH%", percentiles.
 Result<ScalarRange> ParseScalarRange(std::string_view option, std::string_view text);
 
-// "X0:X1,Y0:Y1,Z0:Z1", with "v" behind it in voxels, with "%" in percent of the volume's sides. A bound may be left out: it does not clip.
+// "X0:X1,Y0:Y1,Z0:Z1"; with "v" behind any bound all are in voxels, with "%" in percent of the volume's sides. A bound may be left out: it
+// does not clip.
 Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text);
 // "NX,NY,NZ,D".
 Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text);
 
-// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS 2.1, such as "white". Codes and names
-// become codes of an 8-bit PNG as they are, without a transfer curve.
+// "R,G,B" (opaque) or "R,G,B,A", each in [0, 1]; "#rrggbb" or "#rrggbbaa"; or one of the names of CSS, such as "white" or "steelblue"
+// (named_colors.h). Codes and names become codes of an 8-bit PNG as they are, without a transfer curve.
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text);
 
 // "V[:COLOUR[:OPACITY]],...", such as "120:red:0.3,300": 1 to kMaxIsosurfaces different values in any order, here returned in ascending

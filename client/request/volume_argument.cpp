@@ -17,6 +17,13 @@ constexpr std::size_t kMaxTransferFileBytes = std::size_t{16} << 20;
 
 using TransferText = std::variant<std::string, TransferFunction>;
 
+// Options are checked with the volume.
+bool Exists(const std::string& volume) {
+  const Result<VolumeSource> source = ParseVolumeSource(volume);
+  std::error_code error;
+  return source.ok() && std::filesystem::exists(source->path, error);
+}
+
 bool IsJson(const std::string& text) { return text.starts_with('{') || text.starts_with('['); }
 
 Result<TransferText> ColorMap(const std::string& option, const std::string& json, const std::string& name) {
@@ -52,19 +59,15 @@ Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::str
   return transfer;
 }
 
+bool NamesVolumeFile(const std::string& text) { return Exists(text) || Exists(text.substr(0, text.rfind(':'))); }
+
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
-  // Options are checked with the volume.
-  const auto exists = [](const std::string& volume) {
-    const Result<VolumeSource> source = ParseVolumeSource(volume);
-    std::error_code error;
-    return source.ok() && std::filesystem::exists(source->path, error);
-  };
   const VolumeArgument whole{text, "", {}};
   const std::size_t colon = text.rfind(':');
   std::error_code error;
   if (colon == std::string::npos || (is_file && std::filesystem::exists(text, error))) return whole;
   VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
-  if (is_file && !exists(parts.volume)) return whole;
+  if (is_file && !Exists(parts.volume)) return whole;
   auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);
   if (!transfer.ok() && !is_file && !NamesFile(parts.transfer_text)) return whole;
   if (!transfer.ok()) return transfer.status();

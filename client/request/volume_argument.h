@@ -11,6 +11,9 @@
 
 namespace slabstream {
 
+// Whether VOLUME or VOLUME:TRANSFER names a file, or a folder, that exists.
+bool NamesVolumeFile(const std::string& text);
+
 // A value of --transfer: the name of a preset, or a ParaView colour map, as its JSON. `option` begins messages.
 Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text);
 // The same; and the colour map may also be the file that the text names.

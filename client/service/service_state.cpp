@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -98,20 +96,27 @@ void RemoveState(const ServiceState& state) {
   if (std::filesystem::path(state.log_directory).parent_path() == *directory) std::filesystem::remove_all(state.log_directory, ignored);
 }
 
+std::vector<ServiceState> AllStates() {
+  std::vector<ServiceState> states;
+  const Result<std::string> directory = StateDirectory();
+  if (!directory.ok()) return states;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
+    if (entry.path().extension() != ".json") continue;
+    if (std::optional<ServiceState> state = Load(entry.path())) states.push_back(*std::move(state));
+  }
+  std::ranges::sort(states, {}, &ServiceState::started_unix);
+  return states;
+}
+
 namespace {
 
 // The newest one at `endpoint`, or anywhere if that is empty.
 std::optional<ServiceState> Newest(const std::string& endpoint, bool runs) {
-  const Result<std::string> directory = StateDirectory();
-  if (!directory.ok()) return std::nullopt;
   std::optional<ServiceState> newest;
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(*directory, error)) {
-    if (entry.path().extension() != ".json") continue;
-    std::optional<ServiceState> state = Load(entry.path());
-    if (!state || IsRunning(state->coordinator, kCoordinatorProgram) != runs) continue;
-    if (!endpoint.empty() && state->endpoint != endpoint) continue;
-    if (!newest || state->started_unix > newest->started_unix) newest = std::move(state);
+  for (ServiceState& state : AllStates()) {
+    if (IsRunning(state.coordinator, kCoordinatorProgram) != runs || (!endpoint.empty() && state.endpoint != endpoint)) continue;
+    if (!newest || state.started_unix > newest->started_unix) newest = std::move(state);
   }
   return newest;
 }

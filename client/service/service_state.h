@@ -41,6 +41,8 @@ void RemoveState(const ServiceState& state);  // and its logs
 std::optional<ServiceState> FindState(const std::string& endpoint);
 // The same of a service whose coordinator has ended without its doing, so that its workers may still run.
 std::optional<ServiceState> FindRemains(const std::string& endpoint);
+// All services that `up` has a record of, the first one started first: also those whose coordinators have ended.
+std::vector<ServiceState> AllStates();
 // Ends the processes of the service that still run: takes the EndSteps, unless they end by themselves within `patience`.
 inline constexpr Duration kEndPatience = std::chrono::seconds(5);
 void EndProcesses(const ServiceState& state, Duration patience);

@@ -1,5 +1,6 @@
 // BackgroundTasks: tasks that may take long, on threads of their own. At most `most_threads` run at a time, in the order in which they were
-// posted. Unlike TaskThread it does not wait for a running task when it is destroyed, so that a service can end at once.
+// posted. Unlike TaskThread it does not wait for a running task when it is destroyed, so that a service can end at once. The first thread
+// begins with the object, so a later lack of memory does not keep tasks from running. Without memory for more threads, fewer run at a time.
 #pragma once
 
 #include <atomic>
@@ -20,7 +21,8 @@ namespace slabstream {
 
 class BackgroundTasks {
  public:
-  explicit BackgroundTasks(std::size_t most_threads) : shared_(std::make_shared<Shared>()), most_threads_(most_threads) {}
+  // Throws std::system_error if no thread can be started.
+  explicit BackgroundTasks(std::size_t most_threads) : shared_(std::make_shared<Shared>()), most_threads_(most_threads) { StartThread(); }
   // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
   ~BackgroundTasks() {
     const std::lock_guard lock(shared_->mutex);
@@ -31,15 +33,18 @@ class BackgroundTasks {
   BackgroundTasks(const BackgroundTasks&) = delete;
   BackgroundTasks& operator=(const BackgroundTasks&) = delete;
 
-  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory or no thread; the
-  // task then never runs.
+  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory; the task then
+  // never runs.
   void Post(std::function<void()> task) {
     const std::lock_guard lock(shared_->mutex);
-    if (shared_->idle <= shared_->tasks.size() && shared_->threads < most_threads_) {
-      std::thread([shared = shared_] { Run(*shared); }).detach();
-      ++shared_->threads;
-    }
     shared_->tasks.push_back(std::move(task));
+    if (shared_->idle < shared_->tasks.size() && threads_ < most_threads_) {
+      try {
+        StartThread();
+      } catch (const std::exception& error) {
+        LogWarning(std::string("no further thread for background tasks: ") + error.what());
+      }
+    }
     shared_->changed.notify_one();
   }
 
@@ -52,9 +57,14 @@ class BackgroundTasks {
     std::mutex mutex;  // guards everything
     std::condition_variable changed;
     std::deque<std::function<void()>> tasks;
-    std::size_t threads = 0, idle = 0;
+    std::size_t idle = 0;
     bool closed = false;
   };
+
+  void StartThread() {
+    std::thread([shared = shared_] { Run(*shared); }).detach();
+    ++threads_;
+  }
 
   static void Run(Shared& shared) {
     std::unique_lock lock(shared.mutex);
@@ -81,6 +91,7 @@ class BackgroundTasks {
   inline static std::atomic<int> running_ = 0;
   const std::shared_ptr<Shared> shared_;
   const std::size_t most_threads_;
+  std::size_t threads_ = 0;  // Post's
 };
 
 }  // namespace slabstream

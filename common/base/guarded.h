@@ -5,13 +5,15 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <type_traits>
 
 #include "common/base/status.h"
 
 namespace slabstream {
 
-// The current exception as a Status that begins with `what`. ResourceExhausted: no memory; Internal: anything else.
+// The current exception as a Status that begins with `what`. ResourceExhausted: no memory, or none for another thread; Internal: anything
+// else.
 inline Status CurrentFailure(const std::string& what) {
   try {
     throw;
@@ -19,6 +21,10 @@ inline Status CurrentFailure(const std::string& what) {
     return Status::ResourceExhausted(what + ": not enough memory");
   } catch (const std::length_error&) {  // a container larger than any memory
     return Status::ResourceExhausted(what + ": not enough memory");
+  } catch (const std::system_error& error) {
+    const bool no_thread = error.code() == std::errc::resource_unavailable_try_again;
+    return no_thread ? Status::ResourceExhausted(what + ": not enough memory for another thread")
+                     : Status::Internal(what + ": " + error.what());
   } catch (const std::exception& error) {
     return Status::Internal(what + ": " + error.what());
   } catch (...) {

@@ -1,8 +1,10 @@
 #include "common/base/shared_arena.h"
 
 #include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -146,6 +148,11 @@ Result<std::shared_ptr<const MappedArena>> MappedArena::Open(const ArenaName& na
   if (file.number() < 0) return SystemError(errno == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable, path.c_str());
   const int seals = ::fcntl(file.number(), F_GET_SEALS);
   if (seals < 0 || (seals & F_SEAL_SHRINK) == 0 || ::fstat(file.number(), &found) != 0 || found.st_size != off_t(kArenaBytes)) {
+    return Status::InvalidArgument("shared memory: " + path + " is none");
+  }
+  // One of huge pages, of which there may be none left, would end this process when it is read.
+  struct statfs system {};
+  if (::fstatfs(file.number(), &system) != 0 || system.f_type != TMPFS_MAGIC) {
     return Status::InvalidArgument("shared memory: " + path + " is none");
   }
   void* const base = ::mmap(nullptr, kArenaBytes, PROT_READ, MAP_SHARED | MAP_NORESERVE, file.number(), 0);

@@ -6,7 +6,6 @@
 // Bins ascend with the stored value. Samples that are not finite have no bin: they are empty.
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "common/classification/transfer_function.h"

@@ -1,7 +1,6 @@
 // ParaView's colour-map JSON, as Edit Color Map > Choose Preset > Export writes it.
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "common/base/printable.h"

@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "common/base/find_named.h"
+#include "common/classification/color_maps.h"
 #include "common/classification/histogram_analysis.h"
 #include "common/classification/transfer_function.h"
 
@@ -208,10 +210,23 @@ TransferFunction Simulation(const VolumeSummary& summary) {
           {{begin, 0}, {at(0.40), 0.02}, {at(0.75), 0.08}, {at(0.93), 0.25}, {at(0.998), 0.7}}};
 }
 
-}  // namespace
+template <std::size_t map>
+TransferFunction Mapped(const VolumeSummary& summary) {
+  TransferFunction transfer;
+  for (const auto& [at, color] : NamedColorMaps()[map].points) {
+    transfer.colors.push_back({std::lerp(double(summary.range.min), double(summary.range.max), at), color});
+  }
+  transfer.opacities = Automatic(summary).opacities;
+  return transfer;
+}
 
-const std::vector<TransferPreset>& TransferPresets() {
-  static const std::vector<TransferPreset> presets = {
+template <std::size_t... maps>
+void AddColorMaps(std::vector<TransferPreset>& presets, std::index_sequence<maps...>) {
+  (presets.push_back({NamedColorMaps()[maps].name, NamedColorMaps()[maps].purpose, Mapped<maps>}), ...);
+}
+
+std::vector<TransferPreset> AllPresets() {
+  std::vector<TransferPreset> presets = {
       {"auto", "from the histogram: all that differs from the background", Automatic},
       {"gray-ramp", "black to white and clear to opaque over the value range", GrayRamp},
       {"window", "black to white and opaque, from the background to the brightest material: slices", Window},
@@ -225,6 +240,14 @@ const std::vector<TransferPreset>& TransferPresets() {
       {"simulation", "simulations: glowing gas", Simulation},
       {kNoTransfer, "nothing is visible, so that isosurfaces (--isovalue) stand alone", None},
   };
+  AddColorMaps(presets, std::make_index_sequence<kColorMapCount>());
+  return presets;
+}
+
+}  // namespace
+
+const std::vector<TransferPreset>& TransferPresets() {
+  static const std::vector<TransferPreset> presets = AllPresets();
   return presets;
 }
 

@@ -9,7 +9,6 @@
 // Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>

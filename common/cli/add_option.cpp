@@ -58,11 +58,6 @@ ParseText OneOf(std::vector<std::string_view> names) {
   };
 }
 
-CLI::Option* AddName(CLI::App& app, const std::string& name, std::string& target, const std::vector<std::string_view>& names,
-                     const std::string& help) {
-  return NoteChoices(AddParsed(app, name, target, OneOf(names), help)->type_name("NAME"), names);
-}
-
 CLI::Option* AddNumber(CLI::App& app, const std::string& names, double& target, NumberRange range, const std::string& help) {
   const auto parse = [range](const std::string& option, const std::string& text) { return ParseNumber(option, text, range); };
   return NoteRange(AddParsed(app, names, target, parse, help)->type_name("NUMBER")->default_str(fmt::format("{}", target)), range);

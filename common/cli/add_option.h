@@ -77,10 +77,6 @@ CLI::Option* AddOptionalValue(CLI::App& app, const std::string& name, T& target,
 using ParseText = std::function<Result<std::string>(const std::string& option, const std::string& text)>;
 ParseText OneOf(std::vector<std::string_view> names);
 
-// An option that takes one of `names` and keeps the text.
-CLI::Option* AddName(CLI::App& app, const std::string& name, std::string& target, const std::vector<std::string_view>& names,
-                     const std::string& help);
-
 // For other parsers that keep the text: the text if `checked` is ok.
 inline Result<std::string> TextIf(const Status& checked, const std::string& text) {
   return checked.ok() ? Result<std::string>(text) : Result<std::string>(checked);

@@ -1,7 +1,10 @@
 #include "common/cli/program.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <iostream>
 #include <memory>
@@ -27,12 +30,14 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   } catch (const std::exception& error) {
     std::cerr << name << ": " << error.what() << std::endl;
   }
-  if (BackgroundTasks::AnyRunning()) {  // a load that takes long does not keep the process
-    std::cout.flush();
-    std::_Exit(exit_status);
-  }
+  const Status written = FlushOutput();
+  if (exit_status == 0) exit_status = Finish(name, written);
+  if (BackgroundTasks::AnyRunning()) std::_Exit(exit_status);  // a load that takes long does not keep the process
   return exit_status;
 }
+
+void PrintNote(const std::string& message) { std::cerr << "slabstream: note: " << message << std::endl; }
+void PrintWarning(const std::string& message) { std::cerr << "slabstream: warning: " << message << std::endl; }
 
 int Finish(const std::string& who, const Status& status) {
   if (status.ok()) return 0;
@@ -45,6 +50,16 @@ int Finish(const std::string& who, const Status& status) {
     case StatusCode::kCancelled: return 130;  // 128 + SIGINT, as shells count
     default: return 1;
   }
+}
+
+Status FlushOutput() {
+  errno = 0;
+  std::cout.flush();
+  (void)std::fflush(stdout);
+  const int error = errno;
+  if (std::cout.good() && std::ferror(stdout) == 0) return Status::Ok();
+  const std::string reason = error != 0 ? std::string(": ") + std::strerror(error) : "";  // of an earlier failure it is not known any more
+  return Status::Unavailable("standard output cannot be written" + reason);
 }
 
 Status ReportAll(const std::string& who, const std::vector<Status>& failures) {

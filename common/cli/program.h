@@ -10,15 +10,24 @@
 
 namespace slabstream {
 
-// Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). For main alone.
+// Runs `program`, which returns the exit status, and catches what it throws (mostly a lack of memory). Fails if standard output cannot be
+// written. For main alone.
 int RunMain(const std::string& name, const std::function<int()>& program);
 
 // Unless the status is ok, writes "who: message" as one line to stderr. Returns the exit status. 0: ok. 1: the service or the frame failed.
 // 2: bad arguments or input. 130: stopped by Ctrl-C.
 int Finish(const std::string& who, const Status& status);
 
-// Writes all of them but the last one as Finish does, and returns that one. Ok if there is none.
+// Flushes standard output, of std::cout and of printf. Unavailable if this fails or has failed before. A program calls this when it has
+// printed something that somebody waits for and then goes on; RunMain calls it at the end of every program.
+Status FlushOutput();
+
+// Writes every failure but the last one, as Finish does, and returns the last one. Ok if there is no failure.
 Status ReportAll(const std::string& who, const std::vector<Status>& failures);
+
+// What a user should know of a command that goes on: one line to stderr, "slabstream: note: message" or "slabstream: warning: message".
+void PrintNote(const std::string& message);
+void PrintWarning(const std::string& message);
 
 // The style of help texts, --help and --version.
 void SetUp(CLI::App& app, const std::string& version);

@@ -1,7 +1,6 @@
 #include "common/combining/step_order.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "common/base/check.h"

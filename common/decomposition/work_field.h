@@ -1,7 +1,7 @@
 // WorkField: how work is distributed in a volume, so that boxes of equal work can be cut.
 //
-// Work is known for each cell of an OccupancyGrid and assumed to be even within a cell. Sums over boxes come from a summed-volume table
-// (Crow, "Summed-area tables for texture mapping", 1984, in three dimensions), so a lookup takes the same time for a box of any size.
+// Work is known for each macrocell of an OccupancyGrid and assumed to be even within a macrocell. Sums over boxes come from a summed-volume
+// table (Crow, "Summed-area tables for texture mapping", 1984, in three dimensions), so a lookup takes the same time for a box of any size.
 // Values, immutable.
 #pragma once
 
@@ -12,7 +12,7 @@
 
 namespace slabstream {
 
-// Work of every cell of the grid, estimated from occupied voxels: 1 for each, and calibration::kMacrocellWork more for a cell that has any.
+// Work of every macrocell of the grid: 1 for each occupied voxel, and calibration::kMacrocellWork more if the macrocell has any.
 std::vector<double> MacrocellWork(const OccupancyGrid& grid);
 
 class WorkField {
@@ -20,7 +20,7 @@ class WorkField {
   // Every voxel of a volume of `size` is work 1.
   static WorkField Uniform(const Index3& size);
   explicit WorkField(const OccupancyGrid& grid) : WorkField(grid.size, MacrocellWork(grid)) {}
-  // `work` by cell of an OccupancyGrid of this size: finite, >= 0. Kept in steps of 2^-40 of the total, none of them lost.
+  // `work` by macrocell of an OccupancyGrid of this size: finite, >= 0. Kept in steps of 2^-40 of the total, none of them lost.
   WorkField(const Index3& size, std::span<const double> work);
 
   const Index3& size() const { return size_; }
@@ -30,7 +30,7 @@ class WorkField {
   // Work in `box`, which is cut to the volume and may be empty.
   double Sum(const Box& box) const;
 
-  // The smallest box of cells, cut to `box`, that holds all work of `box`; empty if there is none. All of `box` if work is uniform.
+  // The smallest box of macrocells, cut to `box`, that holds all work of `box`; empty if there is none. All of `box` if work is uniform.
   Box Hull(const Box& box) const;
 
  private:

@@ -1,4 +1,4 @@
-// ToCodes and FromCodes for every instruction set that the compiler knows. The bits are the reference's.
+// ToCodes and FromCodes for every instruction set that the compiler knows. All give the same bits.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "common/image/color_coding.cpp"
@@ -12,65 +12,64 @@ namespace slabstream {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Floats = hn::ScalableTag<float>;
-using Words = hn::RebindToUnsigned<Floats>;
-using Integers = hn::RebindToSigned<Floats>;
-using Codes = hn::Rebind<std::uint16_t, Floats>;
-constexpr std::uint32_t kBias = std::uint32_t{127 - 15} << 23;
+constexpr std::uint32_t kBias = std::uint32_t{127 - 15} << 23;  // between the exponents of binary16 and float
 
-template <ColorCoding coding, class V>
-auto ToCode(V values) {  // Floats to Integers
-  const Floats df;
-  const Words du;
+// As many values as D has lanes. Returns which of them can be coded.
+template <ColorCoding coding, class D>
+HWY_INLINE hn::Mask<D> CodeValues(D df, const float* values, std::uint16_t* codes) {
+  const hn::RebindToUnsigned<D> du;
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<std::uint16_t, D> dc;
+  const auto v = hn::LoadU(df, values);
   if constexpr (coding == ColorCoding::kFixed16) {
-    return hn::NearestInt(hn::Mul(values, hn::Set(df, 65535.0F)));
+    hn::StoreU(hn::DemoteTo(dc, hn::NearestInt(hn::Mul(v, hn::Set(df, 65535.0F)))), dc, codes);
   } else {
+    // Subnormal halves have the step 2^-24, like floats from 0.5 to 1: adding 0.5 rounds.
     const auto half = hn::Set(df, 0.5F);
-    const auto small = hn::Sub(hn::BitCast(du, hn::Add(values, half)), hn::BitCast(du, half));
-    const auto bits = hn::Sub(hn::BitCast(du, values), hn::Set(du, kBias));
+    const auto small = hn::Sub(hn::BitCast(du, hn::Add(v, half)), hn::BitCast(du, half));
+    const auto bits = hn::Sub(hn::BitCast(du, v), hn::Set(du, kBias));
     const auto odd = hn::And(hn::ShiftRight<13>(bits), hn::Set(du, 1));
     const auto normal = hn::ShiftRight<13>(hn::Add(hn::Add(bits, hn::Set(du, 0xFFF)), odd));
-    const auto is_small = hn::RebindMask(du, hn::Lt(values, hn::Set(df, 0x1p-14F)));
-    return hn::BitCast(Integers(), hn::IfThenElse(is_small, small, normal));
+    const auto is_small = hn::RebindMask(du, hn::Lt(v, hn::Set(df, 0x1p-14F)));
+    hn::StoreU(hn::DemoteTo(dc, hn::BitCast(di, hn::IfThenElse(is_small, small, normal))), dc, codes);
   }
+  return hn::And(hn::Ge(v, hn::Zero(df)), hn::Le(v, hn::Set(df, kLargestColor)));
 }
 
-template <ColorCoding coding, class V>
-auto FromCode(V codes) {  // Words to Floats
-  const Floats df;
-  const auto number = hn::BitCast(Integers(), codes);
+template <ColorCoding coding, class D>
+HWY_INLINE void ReadCodes(D df, const std::uint16_t* codes, float* values) {
+  const hn::RebindToUnsigned<D> du;
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<std::uint16_t, D> dc;
+  const auto bits = hn::PromoteTo(du, hn::LoadU(dc, codes));
+  const auto number = hn::BitCast(di, bits);
   if constexpr (coding == ColorCoding::kFixed16) {
-    return hn::Div(hn::ConvertTo(df, number), hn::Set(df, 65535.0F));
+    hn::StoreU(hn::Div(hn::ConvertTo(df, number), hn::Set(df, 65535.0F)), df, values);
   } else {
     const auto small = hn::Mul(hn::ConvertTo(df, number), hn::Set(df, 0x1p-24F));
-    const auto normal = hn::BitCast(df, hn::Add(hn::ShiftLeft<13>(codes), hn::Set(Words(), kBias)));
-    return hn::IfThenElse(hn::RebindMask(df, hn::Lt(number, hn::Set(Integers(), 0x400))), small, normal);
+    const auto normal = hn::BitCast(df, hn::Add(hn::ShiftLeft<13>(bits), hn::Set(du, kBias)));
+    hn::StoreU(hn::IfThenElse(hn::RebindMask(df, hn::Lt(number, hn::Set(di, 0x400))), small, normal), df, values);
   }
 }
 
 template <ColorCoding coding>
 bool ToCodesOf(const float* values, std::uint16_t* codes, std::size_t count) {
-  const Floats df;
-  const std::size_t lanes = hn::Lanes(df);
+  const hn::ScalableTag<float> df;
+  const hn::CappedTag<float, 1> one;
   auto inside = hn::Eq(hn::Zero(df), hn::Zero(df));
+  auto rest_inside = hn::Eq(hn::Zero(one), hn::Zero(one));
   std::size_t i = 0;
-  for (; i + lanes <= count; i += lanes) {
-    const auto v = hn::LoadU(df, values + i);
-    inside = hn::And(inside, hn::And(hn::Ge(v, hn::Zero(df)), hn::Le(v, hn::Set(df, kLargestColor))));
-    hn::StoreU(hn::DemoteTo(Codes(), ToCode<coding>(v)), Codes(), codes + i);
-  }
-  return hn::AllTrue(df, inside) && ToCodesReference(coding, values + i, codes + i, count - i);
+  for (; i + hn::Lanes(df) <= count; i += hn::Lanes(df)) inside = hn::And(inside, CodeValues<coding>(df, values + i, codes + i));
+  for (; i < count; ++i) rest_inside = hn::And(rest_inside, CodeValues<coding>(one, values + i, codes + i));
+  return hn::AllTrue(df, inside) && hn::AllTrue(one, rest_inside);
 }
 
 template <ColorCoding coding>
 void FromCodesOf(const std::uint16_t* codes, float* values, std::size_t count) {
-  const Floats df;
-  const std::size_t lanes = hn::Lanes(df);
+  const hn::ScalableTag<float> df;
   std::size_t i = 0;
-  for (; i + lanes <= count; i += lanes) {
-    hn::StoreU(FromCode<coding>(hn::PromoteTo(Words(), hn::LoadU(Codes(), codes + i))), df, values + i);
-  }
-  FromCodesReference(coding, codes + i, values + i, count - i);
+  for (; i + hn::Lanes(df) <= count; i += hn::Lanes(df)) ReadCodes<coding>(df, codes + i, values + i);
+  for (; i < count; ++i) ReadCodes<coding>(hn::CappedTag<float, 1>(), codes + i, values + i);
 }
 
 bool ToCodes(ColorCoding coding, const float* values, std::uint16_t* codes, std::size_t count) {

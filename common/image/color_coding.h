@@ -36,8 +36,5 @@ constexpr double CodingError(ColorCoding coding, std::uint32_t hops, std::uint32
 // codes are undefined, if a value does not lie in [0, kLargestColor]. FromCodes takes codes up to LargestCode.
 bool ToCodes(ColorCoding coding, const float* values, std::uint16_t* codes, std::size_t count);
 void FromCodes(ColorCoding coding, const std::uint16_t* codes, float* values, std::size_t count);
-// The definition of both.
-bool ToCodesReference(ColorCoding coding, const float* values, std::uint16_t* codes, std::size_t count);
-void FromCodesReference(ColorCoding coding, const std::uint16_t* codes, float* values, std::size_t count);
 
 }  // namespace slabstream

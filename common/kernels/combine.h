@@ -11,7 +11,6 @@
 
 #include "common/image/image_view.h"
 #include "common/image/local_image.h"
-#include "common/image/run_image.h"
 
 namespace slabstream {
 
@@ -61,6 +60,5 @@ using TargetPixels = RowOfPixels<float, std::uint32_t>;
 
 // Replaces pixels of `target` by those of `source` that are nearer. With depths; rows do not alias.
 void NearestRow(const SourcePixels& source, const TargetPixels& target, std::size_t pixel_count);
-void NearestRowReference(const SourcePixels& source, const TargetPixels& target, std::size_t pixel_count);
 
 }  // namespace slabstream

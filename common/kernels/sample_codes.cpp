@@ -13,22 +13,14 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-#if HWY_TARGET == HWY_SCALAR
-
-void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) { SampleCodesReference(samples, count, codes); }
-void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { StraightCodesReference(rgba, pixels, codes); }
-void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes) { StraightCodesReference(rgba, pixels, codes); }
-
-#else
-
 using FloatTag = hn::ScalableTag<float>;
-using Floats = hn::Vec<FloatTag>;
+using OneTag = hn::CappedTag<float, 1>;
 
-template <class Code>
-HWY_INLINE void StoreCodes(Floats samples, Code* codes) {
-  const FloatTag d;
-  const hn::RebindToSigned<FloatTag> di;
-  const hn::Rebind<Code, FloatTag> dc;
+// As many samples as D has lanes.
+template <class D, class Code>
+HWY_INLINE void StoreCodes(D d, hn::Vec<D> samples, Code* codes) {
+  const hn::RebindToSigned<D> di;
+  const hn::Rebind<Code, D> dc;
   const auto clamped = hn::Min(hn::Max(samples, hn::Zero(d)), hn::Set(d, 1.0F));
   const auto value = hn::Mul(hn::Set(d, float(std::numeric_limits<Code>::max())), clamped);
   const auto whole = hn::ConvertTo(di, value);  // cut off
@@ -39,30 +31,34 @@ HWY_INLINE void StoreCodes(Floats samples, Code* codes) {
 
 void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) {
   const FloatTag d;
+  const OneTag one;
   std::size_t i = 0;
-  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) StoreCodes(hn::LoadU(d, samples + i), codes + i);
-  SampleCodesReference(samples + i, count - i, codes + i);
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) StoreCodes(d, hn::LoadU(d, samples + i), codes + i);
+  for (; i < count; ++i) StoreCodes(one, hn::LoadU(one, samples + i), codes + i);
 }
 
 template <class Code>
 HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
+  const std::size_t count = 4 * pixels;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
   const FloatTag d;
   const hn::RebindToUnsigned<FloatTag> du;
   const auto is_alpha = hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(du, 0), hn::Set(du, 3)), hn::Set(du, 3)));
-  const std::size_t count = 4 * pixels;
-  std::size_t i = 0;
   for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
     const auto color = hn::LoadU(d, rgba + i), alpha = hn::Broadcast<3>(color);  // within each 128-bit block: one pixel
     const auto straight = hn::Div(color, hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), alpha));
-    StoreCodes(hn::IfThenElseZero(hn::Gt(alpha, hn::Zero(d)), straight), codes + i);
+    StoreCodes(d, hn::IfThenElseZero(hn::Gt(alpha, hn::Zero(d)), straight), codes + i);
   }
-  StraightCodesReference(rgba + i, (count - i) / 4, codes + i);
+#endif
+  for (; i < count; ++i) {
+    const float alpha = rgba[i | 3], sample = i % 4 == 3 ? alpha : alpha > 0 ? rgba[i] / alpha : 0;
+    StoreCodes(OneTag(), hn::Set(OneTag(), sample), codes + i);
+  }
 }
 
 void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { Straight(rgba, pixels, codes); }
 void Straight16(const float* rgba, std::size_t pixels, std::uint16_t* codes) { Straight(rgba, pixels, codes); }
-
-#endif
 
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

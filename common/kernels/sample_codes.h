@@ -1,5 +1,5 @@
 // Whole numbers for the samples of a picture, as files and messages hold them: round(max * sample), halves up, without a transfer curve.
-// Samples are finite; those outside [0, 1] are clamped. All instruction sets give the reference's codes. Any thread.
+// Samples are finite; those outside [0, 1] are clamped. All instruction sets give the same codes. Any thread.
 #pragma once
 
 #include <cstddef>
@@ -9,12 +9,9 @@ namespace slabstream {
 
 // Of each sample. Of premultiplied colours these are the colours over black.
 void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes);
-void SampleCodesReference(const float* samples, std::size_t count, std::uint8_t* codes);
 
 // `premultiplied`: [pixel][4], as `codes`, which hold the colours before they were multiplied by alpha; 0 where alpha is 0.
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes);
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes);
-void StraightCodesReference(const float* premultiplied, std::size_t pixels, std::uint8_t* codes);
-void StraightCodesReference(const float* premultiplied, std::size_t pixels, std::uint16_t* codes);
 
 }  // namespace slabstream

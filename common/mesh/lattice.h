@@ -6,7 +6,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
 #include "common/mesh/mesh.h"
 #include "common/volume/summary.h"

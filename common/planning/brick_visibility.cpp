@@ -29,27 +29,15 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
   return false;
 }
 
-std::optional<BrickVisibility::Ball> BrickVisibility::VisibleBall(const ClipRegion& clip) const {
-  const VolumeGeometry& geometry = summary_.description.geometry;
+std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
   std::vector<Box> visible;
-  Box hull;
   for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
     if (!Visible(i, 0)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
-    const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, geometry.bounds());
-    if (!clip.MayKeep(box)) continue;
-    visible.push_back(box);
-    hull = Hull(hull, visible.back());
+    const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary_.description.geometry.bounds());
+    if (clip.MayKeep(box)) visible.push_back(box);
   }
-  if (visible.empty()) return std::nullopt;
-  const auto middle = [](const Box& box) { return 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}); };
-  Ball ball{.centre = middle(hull), .half_extent = 0.5 * (ToVec3(hull.size()) * geometry.spacing)};
-  for (const Box& box : visible) {
-    const Vec3 from = middle(box) - ball.centre, half = 0.5 * ToVec3(box.size());
-    const Vec3 farthest = Absolute(from) + half;
-    ball.radius = std::max(ball.radius, Length(farthest * geometry.spacing));
-  }
-  return ball;
+  return visible;
 }
 
 OccupancyGrid BrickVisibility::VisibleCells() const {

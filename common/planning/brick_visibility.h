@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "common/classification/classification_table.h"
@@ -26,14 +25,8 @@ class BrickVisibility {
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
 
-  // A ball round all bricks that are visible and not clipped away, but for rounding: for framing, where nothing depends on a voxel. None:
-  // no brick is.
-  struct Ball {
-    Vec3 centre;        // data space
-    double radius = 0;  // physical, > 0
-    Vec3 half_extent;   // physical: half the sides of the smallest box of bricks
-  };
-  std::optional<Ball> VisibleBall(const ClipRegion& clip = {}) const;
+  // The bricks that are visible and not clipped away, but for rounding: for framing, where nothing depends on a voxel.
+  std::vector<Box> VisibleBricks(const ClipRegion& clip = {}) const;
 
   // Counts all voxels of bricks that can be visible as occupied: a substitute for an exact count.
   OccupancyGrid VisibleCells() const;

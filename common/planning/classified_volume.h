@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "common/planning/frame_plan.h"
+#include "common/frame/frame_setup.h"
 
 namespace slabstream {
 

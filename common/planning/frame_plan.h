@@ -1,7 +1,7 @@
 // FramePlan: everything that a frame will do, as a value. Built by pure functions; the service, the embedded executor and the simulator run
 // it.
 //
-//   request + volume summary + roster + costs  --PlanFrame-->  FramePlan  --executor-->  image + reports
+//   resolved request + roster + costs  --PlanFrame-->  FramePlan  --executor-->  image + reports
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,7 @@
 #include "common/frame/frame_setup.h"
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
+#include "common/planning/resolved_request.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -69,19 +70,16 @@ struct Roster {
   friend bool operator==(const Roster&, const Roster&) = default;
 };
 
-// The part of a plan that does not depend on the policy. Errors: NotFound (no such preset), InvalidArgument (a frame that is too large).
-// The request must be valid.
-Result<FrameSetup> MakeFrameSetup(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary);
+// The part of a plan that does not depend on the policy. InvalidArgument: a view that cannot be rendered, or a frame that is too large.
+Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 
-// Pure. Errors: InvalidArgument (an image along the slices that is too large), NotFound (no such preset), Unavailable (no worker in the
-// roster). The request must be valid (Validate); its own policy is ignored. `layout` was made for this volume, transfer function and policy
-// and for as many slots as the roster has.
-Result<FramePlan> PlanFrame(const FrameRequest& request, const ResolvedPolicy& policy, DatasetId dataset, const VolumeSummary& summary,
-                            const Roster& roster, std::shared_ptr<const Layout> layout, const Turn& turn = {});
-// The same with the request's own policy and no knowledge but the volume's summary. Errors also as of ResolvePolicy. Null `layout`: uses
-// MakeLayout.
+// Pure. Unavailable: no worker in the roster. `layout` was made for the setup's volume and look and this policy, and for as many slots as
+// the roster has.
+Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
+                            const Turn& turn = {});
+// Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
+// for a policy that leaves a choice.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
-                            std::shared_ptr<const Layout> layout = nullptr, const Turn& turn = {},
                             std::int64_t box_bytes_target = kBoxBytesTarget);
 
 }  // namespace slabstream

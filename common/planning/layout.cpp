@@ -27,14 +27,9 @@ int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
   const std::int64_t boxes = policy.decomposition->one_axis
-                                 ? size[policy.axis] / std::max(request.renderer->reach(), 1)
+                                 ? size[policy.axis] / std::max(request.volume->renderer()->reach(), 1)
                                  : Box{{0, 0, 0}, size}.voxel_count() / (kSmallestCube * kSmallestCube * kSmallestCube);
   return int(std::clamp<std::int64_t>(boxes / slots, 1, kMaxGroups));
-}
-
-std::vector<std::uint8_t> BricksOfLayers(const LayoutRequest& request) {
-  if (request.looks == nullptr) return {};
-  return LayerBricks(*request.summary, *request.renderer, *request.looks);
 }
 
 // The fields of work that layouts are made from, each made at its first use.
@@ -42,8 +37,9 @@ class WorkFields {
  public:
   explicit WorkFields(const LayoutRequest& request)
       : request_(request),
-        visibility_(*request.summary, request.renderer->DrawnTable(*request.transfer, *request.summary), BricksOfLayers(request)),
-        clip_(request.clip != nullptr ? *request.clip : ClipRegion{}),
+        visibility_(*request.summary, request.volume->renderer()->DrawnTable(request.volume->transfer(), *request.summary),
+                    LayerBricks(*request.summary, *request.volume->renderer(), request.volume->looks())),
+        clip_(request.volume->clip()),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
   const WorkField& Of(BalanceBy metric) {
@@ -65,7 +61,7 @@ class WorkFields {
   // Whether any sample that `box` owns may show something.
   bool Shows(const Box& box) {
     if (!clip_.MayKeep(box)) return false;
-    const Box with_halo = Grown(box, request_.renderer->reach(), request_.summary->description.geometry.bounds());
+    const Box with_halo = Grown(box, request_.volume->renderer()->reach(), request_.summary->description.geometry.bounds());
     if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
     return !Of(BalanceBy::kOccupied).Hull(with_halo).empty();
   }
@@ -73,7 +69,7 @@ class WorkFields {
  private:
   const LayoutRequest& request_;
   const BrickVisibility visibility_;
-  const ClipRegion clip_;
+  const ClipRegion& clip_;
   const WorkField voxels_;
   std::optional<OccupancyGrid> drawn_;
   std::optional<WorkField> occupied_;
@@ -93,7 +89,7 @@ struct LayoutMaker::State {
                                        .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
                                        .together = int(std::min(slots, kMostBoxes)),
                                        .axis = policy.axis,
-                                       .halo = request.renderer->reach(),
+                                       .halo = request.volume->renderer()->reach(),
                                        .resized = resized,
                                        .shape = shape});
   }
@@ -103,13 +99,15 @@ struct LayoutMaker::State {
   bool BoxesFit(const Partition& partition) {
     const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
-      const std::int64_t bytes = Grown(box, request.renderer->reach(), partition.bounds()).voxel_count() * sample_bytes;
+      const std::int64_t bytes = Grown(box, request.volume->renderer()->reach(), partition.bounds()).voxel_count() * sample_bytes;
       return bytes <= request.box_bytes_target || !fields.Shows(box);
     });
   }
 
   const CostEstimator& Costs() {
-    if (!costs) costs.emplace(*request.renderer, CostBasis{&fields.Grid(), request.summary, request.transfer}, request.known.cost);
+    if (!costs)
+      costs.emplace(*request.volume->renderer(), CostBasis{&fields.Grid(), request.summary, &request.volume->transfer()},
+                    request.known.cost);
     return *costs;
   }
 

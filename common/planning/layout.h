@@ -11,13 +11,11 @@
 
 #include "common/decomposition/partition.h"
 #include "common/decomposition/work_field.h"
+#include "common/planning/classified_volume.h"
 #include "common/planning/resolved_policy.h"
-#include "common/view/clip.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
-
-class RendererKind;
 
 inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max();  // the box shows nothing, so nobody renders it
 
@@ -39,12 +37,9 @@ inline constexpr std::int64_t kBoxBytesTarget = std::int64_t{256} << 20;
 
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
-  const TransferFunction* transfer = nullptr;
+  const ClassifiedVolume* volume = nullptr;  // which has this summary
   const ResolvedPolicy* policy = nullptr;
-  const RendererKind* renderer = nullptr;
-  const ClipRegion* clip = nullptr;   // null: nothing is clipped
-  const LayerLooks* looks = nullptr;  // null: no layer is shown
-  std::uint32_t slots = 1;            // >= 1
+  std::uint32_t slots = 1;  // >= 1
   std::int64_t box_bytes_target = kBoxBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew

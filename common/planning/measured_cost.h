@@ -1,8 +1,8 @@
 // MeasuredCost: the render cost of each part of a volume, learnt from the render times of boxes in earlier frames.
 //
-// Every cell of the volume's OccupancyGrid has a cost, which begins as its work (MacrocellWork). A frame reports the time of each of its
-// boxes; all cells of a box are then scaled by the ratio of measured to predicted time (iterative proportional fitting: Deming and Stephan
-// 1940). So what one partition taught about the inside of a box stays known when boxes are cut anew.
+// Every macrocell of the volume's OccupancyGrid has a cost, which begins as its work (MacrocellWork). A frame reports the time of each of
+// its boxes; all macrocells of a box are then scaled by the ratio of measured to predicted time (iterative proportional fitting: Deming and
+// Stephan 1940). So what one partition taught about the inside of a box stays known when boxes are cut anew.
 #pragma once
 
 #include <cstdint>
@@ -34,7 +34,7 @@ class MeasuredCost {
   static constexpr double kLeastFactor = 0.1, kMostFactor = 10;
 
   Index3 size_;
-  std::vector<double> cost_;  // by cell: seconds; until anything is learnt, work
+  std::vector<double> cost_;  // by macrocell: seconds; until anything is learnt, work
   bool any_ = false;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <map>
+#include <ranges>
 #include <set>
 
 #include "common/base/check.h"
@@ -25,17 +26,34 @@ std::vector<WorkerId> Present(const Roster& roster) {
 // A display worker that holds a rank of a group can be the root of its schedule, so that the image need not travel.
 WorkerId ChooseDisplay(const FramePlan& plan, const std::vector<WorkerId>& present) {
   std::map<WorkerId, std::size_t> groups;  // number of groups in which it holds a rank
+  for (const WorkerId worker : present) groups[worker] = 0;
   for (const GroupPlan& group : plan.groups) {
     std::set<WorkerId> workers;
     for (const Placement& placement : group.placements) workers.insert(placement.worker);
-    for (const WorkerId worker : workers) ++groups[worker];
+    for (const WorkerId worker : workers) {
+      if (const auto found = groups.find(worker); found != groups.end()) ++found->second;
+    }
   }
-  std::size_t most = 0;
-  for (const auto& [worker, count] : groups) most = std::max(most, count);
+  const std::size_t most = std::ranges::max(groups | std::views::values);
   std::vector<WorkerId> candidates;
-  std::copy_if(present.begin(), present.end(), std::back_inserter(candidates),
-               [&](WorkerId worker) { return most == 0 || (groups.contains(worker) && groups.at(worker) == most); });
+  std::ranges::copy_if(present, std::back_inserter(candidates), [&](WorkerId worker) { return groups.at(worker) == most; });
   return candidates[plan.turn.number % candidates.size()];
+}
+
+// Gives what else `apart.worker` holds of the groups of its boxes to `others`, in turn.
+void Separate(const SetApart& apart, const std::vector<WorkerId>& others, FramePlan& plan) {
+  std::size_t next = 0;
+  for (GroupPlan& group : plan.groups) {
+    const auto is_apart = [&](const Placement& placement) { return apart.boxes.contains(placement.id); };
+    if (std::ranges::none_of(group.placements, is_apart)) continue;
+    for (Placement& placement : group.placements) {
+      if (is_apart(placement)) {
+        placement.worker = apart.worker;
+      } else if (placement.worker == apart.worker) {
+        placement.worker = others[next++ % others.size()];
+      }
+    }
+  }
 }
 
 // The fewest bits with which combining changes no channel by more than the plan allows. Of two codings with as many bits, the finer one.
@@ -93,12 +111,16 @@ void PlaceBoxes(FramePlan& plan) {
   if (plan.groups.empty()) plan.groups.emplace_back();
 }
 
-Status AssignWorkers(const Roster& roster, FramePlan& plan) {
-  const std::vector<WorkerId> present = Present(roster);
+Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apart) {
+  std::vector<WorkerId> present = Present(roster);
   if (present.empty()) return Status::Unavailable("the frame needs a worker, but none is registered");
   const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster);
   for (GroupPlan& group : plan.groups) {
     for (Placement& placement : group.placements) placement.worker = owners[placement.id];
+  }
+  if (!apart.boxes.empty()) {
+    if (present.size() > 1) std::erase(present, apart.worker);
+    Separate(apart, present, plan);
   }
   if (!Contains(roster, plan.display)) plan.display = ChooseDisplay(plan, present);
 
@@ -109,10 +131,10 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan) {
   return Status::Ok();
 }
 
-Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster) {
+Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster, const SetApart& apart) {
   CHECK_EQ(roster.slots.size(), plan.slots) << "a plan's boxes belong to its slots";
   FramePlan changed = plan;
-  if (Status status = AssignWorkers(roster, changed); !status.ok()) return status;
+  if (Status status = AssignWorkers(roster, changed, apart); !status.ok()) return status;
   return changed;
 }
 

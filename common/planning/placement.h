@@ -1,6 +1,8 @@
 // Who renders and combines what: the part of a plan that depends on the roster.
 #pragma once
 
+#include <set>
+
 #include "common/planning/frame_plan.h"
 
 namespace slabstream {
@@ -11,14 +13,20 @@ Roster RosterOf(std::uint32_t workers);
 // Groups of `plan.slots` boxes of its layout that show something, in visibility order; at least one group.
 void PlaceBoxes(FramePlan& plan);
 
+// Boxes for one worker that renders nothing else of their groups. It is not the display worker either, unless it is the only worker.
+struct SetApart {
+  std::set<BoxId> boxes;
+  WorkerId worker = 0;  // in the roster, if there are boxes
+};
+
 // Fills in the workers of all placements, the display worker and the schedules. The display worker stays if it is in the roster. Else the
 // turn picks one of the workers that hold a rank in the most groups (in an empty frame: of all), in the order of slots. Unavailable: no
 // worker in the roster; the plan is then unchanged.
-Status AssignWorkers(const Roster& roster, FramePlan& plan);
+Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apart = {});
 
 // Plans the same frame for another roster with the same number of slots. Setup, layout and groups stay; workers of placements, schedules
 // and display change. The display worker stays if it is still in the roster: it holds the accumulated image. Unavailable: no worker.
-Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster);
+Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster, const SetApart& apart = {});
 
 // The plan of another frame of the same request, for a roster of the same size with a worker in it. Only who does what changes.
 FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);

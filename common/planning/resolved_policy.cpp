@@ -38,22 +38,18 @@ Policy SettledPolicy(const FrameRequest& request, const VolumeGeometry& geometry
   return policy;
 }
 
-Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGeometry& geometry) {
-  const Policy policy = SettledPolicy(request, geometry);
-  if (Status status = CheckNames(policy); !status.ok()) return status;
-  if (LeavesChoice(policy)) {
-    return Status::InvalidArgument("policy: 'auto' leaves a choice, which must be made before a frame is planned");
-  }
+ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometry) {
+  CHECK(!LeavesChoice(policy));
   const DecompositionEntry* const decomposition = FindNamed(Decompositions(), policy.decomposition);
-  return ResolvedPolicy{.decomposition = decomposition,
-                        .balance_by = FindBalanceBy(BalanceByOf(policy)).value(),
-                        .axis = SlabAxis(policy.axis, *decomposition, geometry.size),
-                        .groups = policy.groups,
-                        .assignment = FindNamed(Assignments(), policy.assignment),
-                        .dynamic_balance = policy.balance == kDynamicBalance,
-                        .combine = policy.combine,
-                        .pixel_error = policy.pixel_error,
-                        .teams = policy.teams};
+  return {.decomposition = decomposition,
+          .balance_by = FindBalanceBy(BalanceByOf(policy)).value(),
+          .axis = SlabAxis(policy.axis, *decomposition, geometry.size),
+          .groups = policy.groups,
+          .assignment = FindNamed(Assignments(), policy.assignment),
+          .dynamic_balance = policy.balance == kDynamicBalance,
+          .combine = policy.combine,
+          .pixel_error = policy.pixel_error,
+          .teams = policy.teams};
 }
 
 Policy AskFor(const ResolvedPolicy& policy) {
@@ -89,10 +85,6 @@ bool NeedsOccupancy(const Policy& policy) {
   if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
   return FindBalanceBy(BalanceByOf(policy)) != BalanceBy::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
          policy.balance == kDynamicBalance;
-}
-
-bool NeedsOccupancy(const ResolvedPolicy& policy) {
-  return policy.balance_by != BalanceBy::kVoxels || policy.assignment->by_cost || policy.dynamic_balance;
 }
 
 }  // namespace slabstream

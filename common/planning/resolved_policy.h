@@ -27,8 +27,8 @@ struct ResolvedPolicy {
   friend bool operator==(const ResolvedPolicy&, const ResolvedPolicy&) = default;
 };
 
-// InvalidArgument: a name that is in no list (CheckNames), or an open one (LeavesChoice). The request must be valid.
-Result<ResolvedPolicy> ResolvePolicy(const FrameRequest& request, const VolumeGeometry& geometry);
+// The policy is valid and settled (SettledPolicy), has known names (CheckNames) and leaves no choice (LeavesChoice).
+ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometry);
 
 // The policy that asks for exactly this.
 Policy AskFor(const ResolvedPolicy& policy);
@@ -49,6 +49,5 @@ std::string_view BalanceByOf(const Policy& policy);
 
 // Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);
-bool NeedsOccupancy(const ResolvedPolicy& policy);
 
 }  // namespace slabstream

@@ -49,10 +49,10 @@ std::vector<std::string_view> RendererNames() {
   return names;
 }
 
-std::string NamesOfAble(Ability ability) {
+std::string NamesOfAble(std::string_view ability) {
   std::vector<std::string_view> names;
   for (const RendererKind* kind : Renderers()) {
-    if (kind->Can(ability)) names.push_back(kind->name());
+    if (std::ranges::count(kind->AbilityNames(), ability) != 0) names.push_back(kind->name());
   }
   return fmt::format("{}", fmt::join(names, ", "));
 }

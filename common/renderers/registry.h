@@ -18,7 +18,7 @@ std::span<const RendererKind* const> Renderers();
 
 std::vector<std::string_view> RendererNames();
 // "splat, mip": those that have the ability.
-std::string NamesOfAble(Ability ability);
+std::string NamesOfAble(std::string_view ability);
 
 // Null: no renderer has this name.
 const RendererKind* FindRenderer(std::string_view name);

@@ -3,7 +3,6 @@
 // at all. One process at a time writes; one thread at a time.
 #pragma once
 
-#include <map>
 #include <set>
 #include <string>
 #include <vector>

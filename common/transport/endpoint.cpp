@@ -11,7 +11,6 @@
 #include <cctype>
 #include <cerrno>
 #include <charconv>
-#include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -171,7 +170,8 @@ std::string LocalHostOf(int descriptor) {
       ::getnameinfo(reinterpret_cast<sockaddr*>(&own), bytes, text.data(), text.size(), nullptr, 0, NI_NUMERICHOST) != 0) {
     return "";
   }
-  return own.ss_family == AF_INET6 ? "[" + std::string(text.data()) + "]" : text.data();
+  const std::string host = text.data();
+  return own.ss_family == AF_INET6 ? '[' + host + ']' : host;
 }
 
 Endpoint WorkerEndpointFor(const Endpoint& client_endpoint) {

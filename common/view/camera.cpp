@@ -5,9 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <string>
-
-#include "common/base/range_status.h"
 
 namespace slabstream {
 namespace {

@@ -4,9 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "common/base/range_status.h"
 #include "common/view/camera.h"
 
 namespace slabstream {
@@ -81,12 +79,6 @@ void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<H
 }
 
 }  // namespace
-
-bool ClipRegion::Keeps(const Vec3& p) const {
-  if (empty()) return true;
-  const bool inside = std::ranges::all_of(sides, [&](const HalfSpace& side) { return side.Distance(p) >= 0; });
-  return inside == (mode == ClipMode::kKeep);
-}
 
 bool ClipRegion::MayKeep(const Box& box) const {
   if (empty()) return true;

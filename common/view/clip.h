@@ -80,12 +80,11 @@ inline constexpr std::size_t kMaxClipSides = kMaxClipPlanes + 6 + 2;  // planes,
 inline constexpr double kFaceDepth = 2.5;
 
 struct ClipRegion {
-  std::vector<HalfSpace> sides;  // at most kMaxClipSides; none: nothing is clipped, in either mode
+  std::vector<HalfSpace>
+      sides;  // at most kMaxClipSides, of points inside no Distance is negative; none: nothing is clipped, in either mode
   ClipMode mode = ClipMode::kKeep;
 
   bool empty() const { return sides.empty(); }
-  // Whether a sample at p is drawn.
-  bool Keeps(const Vec3& p) const;
   // Whether any sample in the voxels of `box` (not empty) may be drawn. False is certain.
   bool MayKeep(const Box& box) const;
   // Whether every point of the voxels of `box` (not empty) is drawn, and all round them that are nearer than `margin`, in the unit of the

@@ -74,17 +74,18 @@ Status CheckFitsMemory(std::int64_t bytes, std::string_view what) {
 std::string MemoryText(std::uint64_t bytes) { return fmt::format("{} MiB", (bytes + kMebi - 1) / kMebi); }
 
 Result<std::uint64_t> ParseMemoryLimit(const std::string& option, const std::string& text) {
-  constexpr std::string_view kUnits[] = {"MiB", "GiB", "TiB"};
+  constexpr std::string_view kUnits[] = {"M", "G", "T"};
+  const std::string_view short_text = text.ends_with("iB") ? std::string_view(text).substr(0, text.size() - 2) : text;
   for (std::size_t i = 0; i < std::size(kUnits); ++i) {
-    if (!text.ends_with(kUnits[i])) continue;
-    const std::optional<std::uint64_t> count = ParseNumber<std::uint64_t>(text.substr(0, text.size() - kUnits[i].size()));
+    if (!short_text.ends_with(kUnits[i])) continue;
+    const std::optional<std::uint64_t> count = ParseNumber<std::uint64_t>(short_text.substr(0, short_text.size() - 1));
     if (!count) break;
     const int shift = 20 + 10 * int(i);
     if (*count <= kMostMemoryBytes >> shift && *count << shift >= kLeastMemoryBytes) return *count << shift;
     return Status::InvalidArgument(
-        fmt::format("{} {} is out of range [{}MiB, {}TiB]", option, text, kLeastMemoryBytes >> 20, kMostMemoryBytes >> 40));
+        fmt::format("{} {} is out of range [{}M, {}T]", option, text, kLeastMemoryBytes >> 20, kMostMemoryBytes >> 40));
   }
-  return Status::InvalidArgument(fmt::format("{} '{}' is not a size such as 512MiB or 4GiB", option, text));
+  return Status::InvalidArgument(fmt::format("{} '{}' is not a size such as 512M or 4G", option, text));
 }
 
 // Lines "0::/path" of version 2, "7:memory:/path" of version 1. In a container the path may not exist below the mount: then the mount

@@ -37,8 +37,8 @@ inline constexpr std::uint64_t kIdleMemoryBytes = std::uint64_t{192} << 20;
 // Limits of a process that may be stated.
 inline constexpr std::uint64_t kLeastMemoryBytes = std::uint64_t{256} << 20, kMostMemoryBytes = std::uint64_t{1} << 50;
 
-// A limit of a process: a whole number with one of the units MiB, GiB, TiB, such as 4GiB. InvalidArgument, naming `option`: it is none, or
-// out of [kLeastMemoryBytes, kMostMemoryBytes].
+// A limit of a process: a whole number with one of the units M, G, T, or MiB, GiB, TiB, which mean the same: powers of 1024 bytes.
+// InvalidArgument, naming `option`: the text is no such number, or it is out of [kLeastMemoryBytes, kMostMemoryBytes].
 Result<std::uint64_t> ParseMemoryLimit(const std::string& option, const std::string& text);
 
 // The limits of the processes of a service on one machine.

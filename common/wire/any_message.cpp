@@ -144,7 +144,12 @@ std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, 
     case Envelope::kSubmitFrame: return FrameFailed{.request = envelope.submit_frame().request(), .status = why};
     case Envelope::kSummaryQuery: return OrderRefused{.nonce = envelope.summary_query().nonce(), .status = why};
     case Envelope::kSampleQuery: return OrderRefused{.nonce = envelope.sample_query().nonce(), .status = why};
+    case Envelope::kStatisticsQuery: return OrderRefused{.nonce = envelope.statistics_query().nonce(), .status = why};
     case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
+    case Envelope::kStatusQuery: return OrderRefused{.nonce = envelope.status_query().nonce(), .status = why};
+    case Envelope::kShutDown: return OrderRefused{.nonce = envelope.shut_down().nonce(), .status = why};
+    case Envelope::kKeysOrder: return OrderRefused{.nonce = envelope.keys_order().nonce(), .status = why};
+    case Envelope::kDataOrder: return OrderRefused{.nonce = envelope.data_order().nonce(), .status = why};
     case Envelope::kAddVolume: return OrderRefused{.nonce = envelope.add_volume().nonce(), .status = why};
     case Envelope::kVolumePart: return OrderRefused{.nonce = envelope.volume_part().nonce(), .status = why};
     default: return std::nullopt;

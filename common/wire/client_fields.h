@@ -29,6 +29,7 @@ void Fields(auto& io, Is<FrameProgress> auto& m) {
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
   io.Any(m.attempt, &P::attempt, &P::set_attempt);
   io.Any(m.workers, &P::workers, &P::set_workers);
+  io.Range("read_percent", m.read_percent, &P::read_percent, &P::set_read_percent, 0, 100);
 }
 
 void Fields(auto& io, Is<FramePrediction> auto& m) {
@@ -203,7 +204,7 @@ void Fields(auto& io, Is<KeysOrder> auto& m) {
   using P = v1::KeysOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kRevoke);
-  io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  if (m.action == KeysAction::kRotate) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Bytes("key", m.key, &P::key, &P::mutable_key, 0, kMaxKeyBytes);
 }
 
@@ -308,7 +309,7 @@ void Fields(auto& io, Is<LabelAt> auto& m) {
   io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxLabelNameBytes);
 }
 
-void Fields(auto& io, Is<VolumeSample> auto& m) {  // all but value and overlay
+void Fields(auto& io, Is<VolumeSample> auto& m) {  // all but value, overlay and interpolated
   using P = v1::VolumeSample;
   io.Message("at", m.at, &P::at, &P::mutable_at);
   io.Any(m.inside, &P::inside, &P::set_inside);
@@ -320,11 +321,13 @@ inline void Write(const VolumeSample& in, v1::VolumeSample& out) {
   WriteFields(in, out);
   if (in.value) out.set_value(*in.value);
   if (in.overlay) out.set_overlay(*in.overlay);
+  if (in.interpolated) out.set_interpolated(*in.interpolated);
 }
 inline void Read(const v1::VolumeSample& in, VolumeSample& out, Checker& check) {
   ReadFields(in, out, check);
   if (in.has_value()) out.value = check.Finite("value", in.value());
   if (in.has_overlay()) out.overlay = check.Finite("overlay", in.overlay());
+  if (in.has_interpolated()) out.interpolated = check.Finite("interpolated", in.interpolated());
 }
 
 v1::SampleReply ProtoOf(const SampleReply&);
@@ -332,6 +335,28 @@ void Fields(auto& io, Is<SampleReply> auto& m) {
   using P = v1::SampleReply;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Messages("samples", m.samples, &P::samples, &P::mutable_samples, kMaxSamplePoints);
+}
+
+v1::StatisticsQuery ProtoOf(const StatisticsQuery&);
+void Fields(auto& io, Is<StatisticsQuery> auto& m) {
+  using P = v1::StatisticsQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+}
+inline void Read(const v1::StatisticsQuery& in, StatisticsQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
+
+v1::StatisticsReply ProtoOf(const StatisticsReply&);
+void Fields(auto& io, Is<StatisticsReply> auto& m) {
+  using P = v1::StatisticsReply;
+  auto& [voxels, non_finite, mean, deviation, least, largest] = m.statistics;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Any(voxels, &P::voxels, &P::set_voxels);
+  io.Any(non_finite, &P::non_finite, &P::set_non_finite);
+  io.Finite("mean", mean, &P::mean, &P::set_mean);
+  io.Between("deviation", deviation, &P::deviation, &P::set_deviation, 0, std::numeric_limits<double>::max());
+  io.Finite("least", least, &P::least, &P::set_least);
+  io.Finite("largest", largest, &P::largest, &P::set_largest);
 }
 
 v1::PickQuery ProtoOf(const PickQuery&);

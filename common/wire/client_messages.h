@@ -15,6 +15,7 @@
 //   Any of the last three may be answered by OrderRefused: over encrypted connections they need an admin's key, but for lists of datasets.
 //   SummaryQuery ------------------------>  SummaryReply
 //   SampleQuery ------------------------->  SampleReply
+//   StatisticsQuery --------------------->  StatisticsReply
 //   PickQuery --------------------------->  PickReply
 //   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
 //   OrderRefused.
@@ -34,6 +35,7 @@
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 #include "common/wire/volume_messages.h"
+#include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
@@ -57,6 +59,7 @@ struct FrameProgress {
   std::uint32_t groups_done = 0, group_count = 0;
   std::uint32_t attempt = 0;  // above 1: workers were lost
   std::uint32_t workers = 0;
+  std::uint32_t read_percent = 0;  // kLoading: of the dataset's samples, as far as is known; [0, 100]
   friend bool operator==(const FrameProgress&, const FrameProgress&) = default;
 };
 
@@ -193,7 +196,7 @@ enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3 };
 struct KeysOrder {
   std::uint64_t nonce = 0;
   KeysAction action = KeysAction::kList;
-  Role role = Role::kClient;  // kRotate: whose file gets a new key
+  Role role = Role::kClient;  // kRotate: whose file gets a new key; does not travel with other actions
   std::string key;            // kRevoke: a public one
   friend bool operator==(const KeysOrder&, const KeysOrder&) = default;
 };
@@ -274,6 +277,20 @@ struct SampleReply {
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
+// The values in a box (coordinator/probe/box_statistics.h).
+struct StatisticsQuery {
+  std::uint64_t nonce = 0;
+  std::string dataset;  // 1 ... kMaxNameBytes
+  ClipBox box;
+  friend bool operator==(const StatisticsQuery&, const StatisticsQuery&) = default;
+};
+
+struct StatisticsReply {
+  std::uint64_t nonce = 0;
+  BoxStatistics statistics;
+  friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
+};
+
 // The point that a pixel shows (coordinator/probe/pick.h).
 struct PickQuery {
   std::uint64_t nonce = 0;
@@ -290,15 +307,16 @@ struct PickReply {
 };
 
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
-using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
 using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
 using CoordinatorToClient = std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply,
-                                         DataReply, OrderRefused, SummaryReply, SampleReply, PickReply, VolumeCredit>;
+                                         DataReply, OrderRefused, SummaryReply, SampleReply, StatisticsReply, PickReply, VolumeCredit>;
 
-using Question = std::variant<SummaryQuery, SampleQuery, PickQuery>;
-using QuestionReply = std::variant<SummaryReply, SampleReply, PickReply>;
+using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, PickQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, PickReply>;
 inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
+inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);

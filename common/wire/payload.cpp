@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/image/run_image.h"
 #include "common/wire/digest.h"
 
 namespace slabstream {

@@ -1,8 +1,6 @@
 // What a client asks for.
 #pragma once
 
-#include <string>
-
 #include "common/wire/about.h"
 #include "common/wire/validate_request.h"
 #include "common/wire/value_fields.h"

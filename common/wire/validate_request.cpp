@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <string>
 #include <variant>
@@ -113,7 +112,8 @@ class SchemaCheck {
     CHECK(found != kAbilityNames.end()) << name;
     const auto ability = Ability(found - kAbilityNames.begin());
     if (renderer_ == nullptr || renderer_->Can(ability)) return;
-    Keep(Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, NamesOfAble(ability))));
+    Keep(Status::InvalidArgument(
+        fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, NamesOfAble(NameOf(ability)))));
   }
 
   void Keep(const Status& status) {

@@ -1,7 +1,6 @@
 // Values that several messages are made of.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>

@@ -15,10 +15,15 @@ inline std::uint32_t LastChunk(const Box& box) {
   return std::max(ChunkCount(box, widest), 1U) - 1;
 }
 
-void CheckChunkNumber(auto& io, const Box& box, std::uint32_t chunk) {
+// Which chunk of which box.
+void ChunkNameFields(auto& io, auto& m) {
+  using P = decltype(ProtoOf(m));
+  io.Any(m.dataset, &P::dataset, &P::set_dataset);
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Any(m.chunk, &P::chunk, &P::set_chunk);
   io.Check([&](Checker& check) {
-    const bool of_cells = IsCellChunk(chunk) && chunk - kFirstCellChunk < CellChunkCount(kMaxCellBytes);
-    if (!of_cells) check.Range("chunk", chunk, 0, LastChunk(box));
+    const bool of_cells = IsCellChunk(m.chunk) && m.chunk - kFirstCellChunk < CellChunkCount(kMaxCellBytes);
+    if (!of_cells) check.Range("chunk", m.chunk, 0, LastChunk(m.box));
   });
 }
 
@@ -27,20 +32,14 @@ void Fields(auto& io, Is<ChunkRequest> auto& m) {
   using P = v1::ChunkRequest;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.worker, &P::worker, &P::set_worker);
-  io.Any(m.dataset, &P::dataset, &P::set_dataset);
-  io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Any(m.chunk, &P::chunk, &P::set_chunk);
-  CheckChunkNumber(io, m.box, m.chunk);
+  ChunkNameFields(io, m);
 }
 
 v1::Chunk ProtoOf(const Chunk&);
 void Fields(auto& io, Is<Chunk> auto& m) {
   using P = v1::Chunk;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
-  io.Any(m.dataset, &P::dataset, &P::set_dataset);
-  io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Any(m.chunk, &P::chunk, &P::set_chunk);
-  CheckChunkNumber(io, m.box, m.chunk);
+  ChunkNameFields(io, m);
   io.OneOf("codec", m.codec, &P::codec, &P::set_codec, Codec::kRaw, Codec::kZstd);
   io.Range("raw_bytes", m.raw_bytes, &P::raw_bytes, &P::set_raw_bytes, 1, kChunkBytes);
   const std::uint32_t least = m.codec == Codec::kRaw ? m.raw_bytes : 1;
@@ -63,10 +62,7 @@ v1::ChunkRefused ProtoOf(const ChunkRefused&);
 void Fields(auto& io, Is<ChunkRefused> auto& m) {
   using P = v1::ChunkRefused;
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
-  io.Any(m.dataset, &P::dataset, &P::set_dataset);
-  io.Message("box", m.box, &P::box, &P::mutable_box);
-  io.Any(m.chunk, &P::chunk, &P::set_chunk);
-  CheckChunkNumber(io, m.box, m.chunk);
+  ChunkNameFields(io, m);
   io.Message("status", m.status, &P::status, &P::mutable_status);
 }
 

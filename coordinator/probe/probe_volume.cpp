@@ -1,7 +1,6 @@
 #include "coordinator/probe/probe_volume.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace slabstream {
@@ -12,6 +11,11 @@ double SampleOf(const VoxelBricks& voxels, const Index3& voxel) {
     const BrickView<T> brick = voxels.View<T>(voxel / kBrick);
     return double(brick.Row(voxel.y, voxel.z)[voxel.x - brick.begin.x]);
   });
+}
+
+// Of a point of the world.
+Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at) {
+  return geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing;
 }
 
 }  // namespace
@@ -52,8 +56,7 @@ Index3 VoxelAt(const Vec3& p) {
 }
 
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at) {
-  const VolumeGeometry& geometry = summary.description.geometry;
-  return SampleAtVoxel(volume, summary, at, VoxelAt(geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing));
+  return SampleAtVoxel(volume, summary, at, VoxelAt(DataPoint(summary.description.geometry, at)));
 }
 
 VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at, const Index3& voxel) {
@@ -62,7 +65,9 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
   if (!sample.inside) return sample;
   sample.voxel = voxel;
   const auto finite = [](double value) { return std::isfinite(value) ? std::optional<double>(value) : std::nullopt; };
-  sample.value = finite(summary.description.mapping.FromStored(volume.StoredAt(voxel)));
+  const ValueMapping& mapping = summary.description.mapping;
+  sample.value = finite(mapping.FromStored(volume.StoredAt(voxel)));
+  sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
   if (volume.labels != nullptr && summary.label_table != nullptr) {
     const std::uint32_t number = volume.LabelNumberAt(voxel);
     const std::vector<Label>& labels = summary.label_table->labels;

@@ -1,8 +1,6 @@
 // ProbeVolume: the voxels of a dataset and of its layers, one by one and between voxels. For few points: renderers read rows.
 #pragma once
 
-#include <optional>
-
 #include "common/volume/bricks.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"

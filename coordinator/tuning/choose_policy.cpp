@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -22,7 +21,6 @@
 namespace slabstream {
 namespace {
 
-constexpr DatasetId kAnyDataset = 1;
 constexpr int kGroupFactors[] = {1, 2, 4};        // times the fewest that memory allows
 constexpr int kPartitionGroupFactors[] = {1, 2};  // likewise, to judge partitions
 // To judge partitions, where the scheme is open: a tree, and two that divide the picture among the workers. How well a partition does
@@ -47,19 +45,16 @@ bool HasLinks(const MachineModel& machine, std::size_t workers) { return workers
 
 class Search {
  public:
-  Search(const PolicyQuestion& question, const FrameSetup& setup, const FramePredictor& predictor)
+  Search(const PolicyQuestion& question, const FramePredictor& predictor)
       : question_(question),
-        layouts_({.summary = question.summary,
-                  .transfer = &setup.transfer,
-                  .renderer = setup.renderer,
-                  .clip = &setup.clip,
-                  .looks = &setup.looks,
+        layouts_({.summary = question.resolved->summary.get(),
+                  .volume = &question.resolved->volume,
                   .slots = question.slots,
                   .box_bytes_target = question.box_bytes_target,
                   .known = question.known,
                   .stop = question.stop}),
         predictor_(predictor),
-        asked_(SettledPolicy(*question.frame, question.summary->description.geometry)),
+        asked_(*question.open),
         open_partition_(asked_.decomposition == kAutomatic),
         open_owners_(open_partition_ || asked_.assignment == kAutomatic),
         open_groups_(asked_.groups == 0 && HasLinks(*question.machine, question.slots)) {
@@ -67,9 +62,7 @@ class Search {
       best_ = *question.now;
       return;
     }
-    FrameRequest fixed = *question.frame;
-    fixed.policy = FixedPolicy(asked_);
-    best_ = ResolvePolicy(fixed, question.summary->description.geometry).value();
+    best_ = ResolvePolicy(FixedPolicy(asked_), question.resolved->summary->description.geometry);
     best_.groups = FewestGroupsOf(best_);
   }
 
@@ -99,7 +92,7 @@ class Search {
         ResolvedPolicy policy = best_;
         policy.decomposition = &entry;
         policy.balance_by = metric;
-        policy.axis = SlabAxis(asked_.axis, entry, question_.summary->description.geometry.size);
+        policy.axis = SlabAxis(asked_.axis, entry, question_.resolved->summary->description.geometry.size);
         const int fewest = FewestGroupsOf(policy);
         for (const int factor : kPartitionGroupFactors) {
           if (factor > 1 && asked_.groups > 0) break;
@@ -176,7 +169,7 @@ class Search {
   const PolicyQuestion& question_;
   LayoutMaker layouts_;
   const FramePredictor& predictor_;
-  const Policy asked_;  // but for the view
+  const Policy& asked_;
   const bool open_partition_, open_owners_, open_groups_;
   ResolvedPolicy best_;
   std::optional<FramePrediction> prediction_;  // of best_; prepared_ is its layout
@@ -212,22 +205,21 @@ Policy FirstPolicy(Policy policy, std::size_t workers) {
   return FixedPolicy(std::move(policy));
 }
 
-Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question) {
-  CHECK(CheckNames(question.frame->policy).ok());
-  const Result<FrameSetup> setup = MakeFrameSetup(*question.frame, kAnyDataset, *question.summary);
-  if (!setup.ok()) return setup.status();
+PolicyChoice ChoosePolicy(const PolicyQuestion& question) {
+  const ClassifiedVolume& volume = question.resolved->volume;
+  const VolumeSummary& summary = *question.resolved->summary;
   std::optional<OccupancyGrid> drawn;
   if (question.known.occupied == nullptr) {
-    drawn = BrickVisibility(*question.summary, setup->renderer->DrawnTable(setup->transfer, *question.summary),
-                            LayerBricks(*question.summary, *setup->renderer, setup->looks))
+    drawn = BrickVisibility(summary, volume.renderer()->DrawnTable(volume.transfer(), summary),
+                            LayerBricks(summary, *volume.renderer(), volume.looks()))
                 .VisibleCells();
-  } else if (!setup->clip.empty()) {
+  } else if (!volume.clip().empty()) {
     drawn = *question.known.occupied;
   }
-  if (drawn) EmptyClippedCells(setup->clip, *drawn);
-  const FramePredictor predictor(*setup, *question.summary, drawn ? *drawn : *question.known.occupied, question.known.cost,
+  if (drawn) EmptyClippedCells(volume.clip(), *drawn);
+  const FramePredictor predictor(*question.setup, summary, drawn ? *drawn : *question.known.occupied, question.known.cost,
                                  *question.machine, question.slots, question.render_scale);
-  return Search(question, *setup, predictor).Run();
+  return Search(question, predictor).Run();
 }
 
 }  // namespace slabstream

@@ -24,14 +24,15 @@
 namespace slabstream {
 
 struct PolicyQuestion {
-  const FrameRequest* frame = nullptr;  // its policy has known names (CheckNames)
-  const VolumeSummary* summary = nullptr;
+  const Policy* open = nullptr;  // settled, with known names (SettledPolicy, CheckNames)
+  const ResolvedRequest* resolved = nullptr;
+  const FrameSetup* setup = nullptr;  // of it (MakeFrameSetup)
   WorkKnowledge known;
   std::uint32_t slots = 1;                // workers, [1, kMaxRanks]
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
   std::int64_t box_bytes_target = kBoxBytesTarget;
   double render_scale = 1;  // measured / predicted time of boxes so far; > 0
-  // The present policy, if any; it fits the frame's policy. It stays unless another one gains the share least_gain.
+  // The present policy, if any; it fits the open one. It stays unless another one gains the share least_gain.
   const ResolvedPolicy* now = nullptr;
   double least_gain = 0;      // [0, 1)
   std::stop_token stop = {};  // once it is told to stop, the choice comes soon, and is of no use but to be dropped
@@ -57,7 +58,6 @@ Policy FixedPolicy(Policy policy);
 // workers, radix-k. Bricks alone tell enough to cut it.
 Policy FirstPolicy(Policy policy, std::size_t workers);
 
-// Errors as of MakeFrameSetup.
-Result<PolicyChoice> ChoosePolicy(const PolicyQuestion& question);
+PolicyChoice ChoosePolicy(const PolicyQuestion& question);
 
 }  // namespace slabstream

@@ -7,7 +7,6 @@
 #include <cstring>
 #include <fstream>
 #include <map>
-#include <optional>
 #include <type_traits>
 
 #include "common/base/aligned_buffer.h"
@@ -161,7 +160,7 @@ DicomSamples SamplesOf(std::span<const DicomFrameNumber> frames) {
   return alike ? DicomSamples{first.image->format.type(), rescale_of(first)} : DicomSamples{SampleType::kFloat32, {}};
 }
 
-Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out) {
+Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out, ReadProgress* progress) {
   // Compressed frames, in the order in which they are needed.
   std::vector<CompressedFrame> compressed;
   std::map<const DicomImage*, FrameFragments> fragments;
@@ -191,7 +190,9 @@ Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& 
       if (image->transfer_syntax == kExplicitBigEndian && image->pixels.words) SwapByteOrder(SampleType::kUint16, pixels);
     }
     ToSamples(pixels, *image, image->frames[frame].rescale, as_values, next);
-    next += image->frame_pixels() * std::int64_t(BytesPerSample(samples.type));
+    const std::int64_t bytes = image->frame_pixels() * std::int64_t(BytesPerSample(samples.type));
+    next += bytes;
+    if (progress != nullptr) progress->Add(bytes);
   }
   return Status::Ok();
 }

@@ -4,10 +4,10 @@
 
 #include <cstddef>
 #include <span>
-#include <vector>
 
 #include "common/base/status.h"
 #include "data/volume_io/dicom_image.h"
+#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 
@@ -33,6 +33,6 @@ DicomSamples SamplesOf(std::span<const DicomFrameNumber> frames);
 
 // Fills `out`, one frame after the other. All have passed CheckFrames, and are of the same size. DataLoss: damaged. Unavailable: no process
 // can be started.
-Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out);
+Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out, ReadProgress* progress);
 
 }  // namespace slabstream

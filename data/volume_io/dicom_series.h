@@ -4,7 +4,6 @@
 // bytes (DICM at byte 128), not by their names. Images belong together by their SeriesInstanceUID.
 #pragma once
 
-#include <span>
 #include <string>
 #include <vector>
 

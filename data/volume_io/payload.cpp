@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <fstream>
 #include <new>
-#include <string>
 #include <vector>
 
 namespace slabstream {
 namespace {
 
 constexpr std::size_t kBlock = std::size_t{1} << 16;  // bytes
+constexpr std::size_t kStep = std::size_t{1} << 22;   // bytes of samples that are read at a time where progress is counted
 
 Status Truncated(const Payload& payload, std::int64_t expected, std::int64_t found) {
   return Status::DataLoss(
@@ -81,7 +81,22 @@ class InflateReader {
   bool ended_ = false, damaged_ = false;
 };
 
-Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std::byte> out, Extent extent) {
+// Reads `out` by `read`, which returns how many bytes there were. Returns how many there were in all.
+template <class Read>
+std::size_t ReadInSteps(std::span<std::byte> out, ReadProgress* progress, Read read) {
+  if (progress == nullptr) return read(out);
+  std::size_t done = 0;
+  while (done < out.size()) {
+    const std::span<std::byte> step = out.subspan(done, std::min(kStep, out.size() - done));
+    const std::size_t found = read(step);
+    done += found;
+    progress->Add(std::int64_t(found));
+    if (found < step.size()) break;
+  }
+  return done;
+}
+
+Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std::byte> out, Extent extent, ReadProgress* progress) {
   InflateReader reader(file, payload.offset);
   std::vector<std::byte> skipped(kBlock);
   for (std::int64_t left = payload.skip; left > 0;) {
@@ -91,7 +106,7 @@ Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std
     }
     left -= std::int64_t(wanted);
   }
-  const std::size_t found = reader.Read(out);
+  const std::size_t found = ReadInSteps(out, progress, [&](std::span<std::byte> step) { return reader.Read(step); });
   if (reader.damaged()) return Damaged(payload);
   if (found != out.size()) return Truncated(payload, std::int64_t(out.size()), std::int64_t(found));
   return extent == Extent::kStart || reader.EndsWell() ? Status::Ok() : Damaged(payload);
@@ -115,13 +130,16 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes) {
                                       payload.file.string(), bytes, data_bytes));
 }
 
-Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent) {
+Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent, ReadProgress* progress) {
   std::ifstream file(payload.file, std::ios::binary);
   if (!file) return Status::NotFound(payload.file.string() + ": cannot be opened for reading");
-  if (payload.compressed) return ReadCompressed(payload, file, out, extent);
+  if (payload.compressed) return ReadCompressed(payload, file, out, extent, progress);
   file.seekg(payload.offset);
-  file.read(reinterpret_cast<char*>(out.data()), std::streamsize(out.size()));
-  return std::size_t(file.gcount()) == out.size() ? Status::Ok() : Truncated(payload, std::int64_t(out.size()), file.gcount());
+  const std::size_t found = ReadInSteps(out, progress, [&](std::span<std::byte> step) {
+    file.read(reinterpret_cast<char*>(step.data()), std::streamsize(step.size()));
+    return std::size_t(file.gcount());
+  });
+  return found == out.size() ? Status::Ok() : Truncated(payload, std::int64_t(out.size()), std::int64_t(found));
 }
 
 }  // namespace slabstream

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "common/base/status.h"
+#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 
@@ -31,6 +32,8 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes);
 enum class Extent { kStart, kWholeStream };
 
 // Fills `out` with the bytes as they are in the file (byte order is not touched). DataLoss: truncated or damaged. NotFound: no such file.
-Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent = Extent::kWholeStream);
+// `progress`, if any, counts what is read.
+Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent = Extent::kWholeStream,
+                   ReadProgress* progress = nullptr);
 
 }  // namespace slabstream

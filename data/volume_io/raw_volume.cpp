@@ -83,6 +83,7 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {
   if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
+  if (options.progress != nullptr) options.progress->Begin(header.sample_bytes());
   return RawVolume{header, AlignedVector<std::byte>(options.headers_only ? 0 : std::size_t(header.sample_bytes())), {}};
 }
 
@@ -100,7 +101,7 @@ Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, 
   if (!raw.ok()) return raw;
   if (payload.file != path) raw->samples_file = payload.file;
   if (options.headers_only) return raw;
-  if (Status status = ReadPayload(chosen, raw->bytes); !status.ok()) return failed(status);
+  if (Status status = ReadPayload(chosen, raw->bytes, Extent::kWholeStream, options.progress); !status.ok()) return failed(status);
   static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
   if (payload.big_endian) SwapByteOrder(header.type, raw->bytes);
   return raw;

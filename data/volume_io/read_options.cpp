@@ -112,6 +112,11 @@ std::size_t OptionEnd(const std::string& source, std::size_t begin) {
   return source.size();
 }
 
+template <auto kMember>
+bool IsGiven(const ReadOptions& options) {
+  return options.*kMember != ReadOptions{}.*kMember;
+}
+
 }  // namespace
 
 Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text) {
@@ -130,26 +135,19 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
 
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
-      {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime,
-       [](const ReadOptions& given) { return given.time.has_value(); }},
+      {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime, IsGiven<&ReadOptions::time>},
       {"channel", "N|luminance", "Which component of a voxel, counted from 0; or the luminance of red, green and blue", SetChannel,
-       [](const ReadOptions& given) { return given.channel.has_value(); }},
-      {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing,
-       [](const ReadOptions& given) { return given.spacing.has_value(); }},
-      {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims,
-       [](const ReadOptions& given) { return given.dims.has_value(); }},
+       IsGiven<&ReadOptions::channel>},
+      {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing, IsGiven<&ReadOptions::spacing>},
+      {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims, IsGiven<&ReadOptions::dims>},
       {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64", SetType,
-       [](const ReadOptions& given) { return given.type.has_value(); }},
-      {"endian", "little|big", "Byte order of raw samples (default: little)", SetEndian,
-       [](const ReadOptions& given) { return given.big_endian.has_value(); }},
-      {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset,
-       [](const ReadOptions& given) { return given.offset.has_value(); }},
-      {"series", "NUMBER|UID", "Which series of a DICOM folder; `slabstream info` lists them", SetSeries,
-       [](const ReadOptions& given) { return !given.series.empty(); }},
-      {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray,
-       [](const ReadOptions& given) { return !given.array.empty(); }},
+       IsGiven<&ReadOptions::type>},
+      {"endian", "little|big", "Byte order of raw samples (default: little)", SetEndian, IsGiven<&ReadOptions::big_endian>},
+      {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset, IsGiven<&ReadOptions::offset>},
+      {"series", "NUMBER|UID", "Which series of a DICOM folder; `slabstream info` lists them", SetSeries, IsGiven<&ReadOptions::series>},
+      {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray, IsGiven<&ReadOptions::array>},
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
-       [](const ReadOptions& given) { return given.lattice.has_value(); }},
+       IsGiven<&ReadOptions::lattice>},
   };
   return options;
 }

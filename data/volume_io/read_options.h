@@ -16,6 +16,7 @@
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "data/volume_io/read_progress.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
@@ -46,7 +47,8 @@ struct ReadOptions {
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
   // What users cannot say.
-  bool headers_only = false;  // check everything that can be checked without the samples, and take no memory for them
+  bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
+  ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };
 
 struct ReadOption {

@@ -5,27 +5,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
-#include <utility>
 
+#include "common/base/natural_order.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {
 namespace {
-
-constexpr const char* kDigits = "0123456789";
-
-// A key that sorts numbers inside names by value, s2 before s10: each becomes a 0, the count of its digits, and its digits.
-std::string NaturalKey(const std::string& name) {
-  std::string key;
-  for (std::size_t i = 0; i < name.size();) {
-    const std::size_t number = std::min(name.find_first_of(kDigits, i), name.size());
-    key.append(name, i, number - i);
-    i = std::min(name.find_first_not_of(kDigits, number), name.size());
-    const std::size_t digits = std::min(name.find_first_not_of('0', number), i);
-    if (number < i) key.append({'0', char(i - digits)}).append(name, digits, i - digits);
-  }
-  return key;
-}
 
 // The name of a file in lower case, without its numbers.
 std::string WithoutNumbers(const std::string& path) {
@@ -44,7 +29,7 @@ std::vector<std::string> SlicesIn(const std::string& folder, const std::vector<s
       paths.push_back(entry.path().string());
     }
   }
-  std::ranges::sort(paths, {}, [](const std::string& path) { return std::pair(NaturalKey(path), path); });
+  std::ranges::sort(paths, {}, InNaturalOrder);
   return paths;
 }
 
@@ -87,7 +72,10 @@ Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number,
   if (kind(*header) != kind(wanted)) {
     return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(*header), kind(wanted)));
   }
-  return options.headers_only ? Status::Ok() : slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+  if (options.headers_only) return Status::Ok();
+  const Status status = slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
+  if (options.progress != nullptr) options.progress->Add(header->sample_bytes());
+  return status;
 }
 
 Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<std::string>& paths, OpenSlice open,

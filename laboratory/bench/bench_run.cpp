@@ -52,7 +52,7 @@ Status WritePictures(Client& client, const BenchCase& c, const BenchOptions& opt
   }
   PictureFormat format;
   format.background = {0, 0, 0, 1};
-  PictureFiles files(format, false, {});
+  PictureFiles files(format, {}, false, {});
   FrameLoopOptions loop;
   loop.pictures = &files;
   const Result<std::vector<FrameRecord>> frames = RenderFrames(client, jobs, loop);

@@ -3,13 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <array>
 #include <iostream>
 #include <limits>
 #include <memory>
-#include <set>
-#include <string_view>
 
 #include "client/cli/option_groups.h"
 #include "client/movie/turntable.h"

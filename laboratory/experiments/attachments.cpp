@@ -3,8 +3,6 @@
 #include <array>
 #include <string_view>
 
-#include "common/planning/placement.h"
-
 namespace slabstream {
 void AttachTimeline(Results& results, const std::string& name, const Timeline& timeline) {
   std::vector<Json> rows;

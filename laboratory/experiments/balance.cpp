@@ -8,8 +8,6 @@
 #include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"
 #include "common/planning/assignment.h"
-#include "common/planning/balance.h"
-#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "common/wire/validate_request.h"
 #include "coordinator/tuning/box_estimator.h"
@@ -245,8 +243,9 @@ void AddBoxes(ExperimentContext& context, const Balance& balance, const BenchCas
     const FrameCase frame = balance.Frame(volume, Combined(named.policy, kCombine), balance.TableWorkers());
     const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
     const FramePlan& plan = repeats.front().plan;
-    const LayoutKnowledge known = KnowLayout(context, frame);
-    const BoxEstimator estimator(plan.setup, *known.volume.summary, *known.occupied, nullptr, 1);
+    const VolumeInUse in_use = context.volumes().Get(frame.volume);
+    const auto occupied = context.volumes().Occupied(frame.volume);
+    const BoxEstimator estimator(plan.setup, *in_use.summary, *occupied, nullptr, 1);
     for (const Placement& placement : PlacementsOf(plan)) {
       Json of = CaseOf("box", frame);
       of["box"] = placement.id;

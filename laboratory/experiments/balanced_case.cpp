@@ -11,17 +11,17 @@ KeyedFrame ForBalanced(ExperimentContext& context, const FrameCase& frame) {
 }
 
 Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
-  MeasuredLayouts layouts = LayoutsOf(KnowLayout(context, frame), frame.workers);
+  MeasuredLayouts layouts(frame.workers);
   Json learnt = Json::array();
   for (int i = 0; i < kBalancedFrames; ++i) {
-    const FramePlan plan = PlanOf(context, frame, layouts.Next(RequestOf(frame)));
+    const FramePlan plan = NextPlan(context, frame, layouts);
     std::vector<std::int64_t> nanoseconds;
     const Json boxes = MeasureBoxes(context, frame, plan);
     for (const Json& seconds : boxes.at("seconds")) nanoseconds.push_back(std::int64_t(seconds.get<double>() * 1e9));
     layouts.Learn(plan, nanoseconds);
     learnt.push_back(nanoseconds);
   }
-  Json boxes = MeasureBoxes(context, frame, PlanOf(context, frame, layouts.Next(RequestOf(frame))));
+  Json boxes = MeasureBoxes(context, frame, NextPlan(context, frame, layouts));
   boxes["learnt"] = std::move(learnt);
   return boxes;
 }
@@ -43,11 +43,11 @@ Trial CostTrial(ExperimentContext& context, const FrameCase& frame) {
 std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const FrameCase& frame) {
   std::vector<MeasuredFrame> frames;
   for (const Json* repeat : context.log().All(BalancedKey(context, frame))) {
-    MeasuredLayouts layouts = LayoutsOf(KnowLayout(context, frame), frame.workers);
+    MeasuredLayouts layouts(frame.workers);
     for (const Json& learnt : repeat->at("learnt")) {
-      layouts.Learn(PlanOf(context, frame, layouts.Next(RequestOf(frame))), learnt.get<std::vector<std::int64_t>>());
+      layouts.Learn(NextPlan(context, frame, layouts), learnt.get<std::vector<std::int64_t>>());
     }
-    frames.push_back(WithBoxCosts(context, frame, PlanOf(context, frame, layouts.Next(RequestOf(frame))), {repeat}));
+    frames.push_back(WithBoxCosts(context, frame, NextPlan(context, frame, layouts), {repeat}));
   }
   return frames;
 }

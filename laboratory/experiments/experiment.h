@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "client/cli/options.h"
-#include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "laboratory/experiments/trials.h"
 #include "laboratory/experiments/volumes.h"

@@ -11,7 +11,6 @@
 #include "common/planning/frame_window.h"
 #include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/resolve_look.h"
 #include "common/planning/team.h"
 #include "common/renderers/registry.h"
 #include "common/wire/validate_request.h"
@@ -173,52 +172,51 @@ double ExpectedEffort(const FrameCase& frame) {
 
 }  // namespace
 
-LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame) {
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
-  return {.volume = volume,
-          .occupied = context.volumes().Occupied(frame.volume),
-          .transfer = OrThrow(ResolveTransfer(frame.volume.transfer, *volume.summary)),
-          .policy = OrThrow(ResolvePolicy(RequestOf(frame), volume.summary->description.geometry)),
-          .renderer = frame.volume.renderer};
-}
-
-ClassifiedVolume ClassifiedOf(const LayoutKnowledge& knowledge) { return {kPlannedDataset, knowledge.transfer, knowledge.renderer}; }
-
-MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers) {
-  return {knowledge.volume.summary, knowledge.occupied, ClassifiedOf(knowledge), workers};
-}
-
-FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
-  const LayoutKnowledge knowledge = KnowLayout(context, frame);
-  LayoutRequest request{.summary = knowledge.volume.summary.get(),
-                        .transfer = &knowledge.transfer,
-                        .policy = &knowledge.policy,
-                        .renderer = knowledge.renderer,
-                        .slots = std::uint32_t(frame.workers)};
-  if (NeedsOccupancy(knowledge.policy)) request.known.occupied = knowledge.occupied.get();
-  return PlanOf(context, frame, std::make_shared<const Layout>(MakeLayout(request)));
-}
-
-FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout) {
+ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame) {
   const FrameRequest request = RequestOf(frame);
   OrThrow(Validate(request));
-  const VolumeInUse volume = context.volumes().Get(frame.volume);
-  return OrThrow(PlanFrame(request, kPlannedDataset, *volume.summary, RosterOf(std::uint32_t(frame.workers)), std::move(layout)));
+  return OrThrow(ResolveRequest(request, kPlannedDataset, context.volumes().Get(frame.volume).summary));
+}
+
+namespace {
+
+FramePlan PlanOf(const ResolvedRequest& resolved, int workers, std::shared_ptr<const Layout> layout) {
+  return OrThrow(
+      PlanFrame(OrThrow(MakeFrameSetup(resolved)), resolved.policy.value(), RosterOf(std::uint32_t(workers)), std::move(layout)));
+}
+
+}  // namespace
+
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame) {
+  const ResolvedRequest resolved = Resolve(context, frame);
+  LayoutRequest request{.summary = resolved.summary.get(),
+                        .volume = &resolved.volume,
+                        .policy = &resolved.policy.value(),
+                        .slots = std::uint32_t(frame.workers)};
+  const bool counts = NeedsOccupancy(resolved.frame.policy);
+  const auto occupied = counts ? context.volumes().Occupied(frame.volume) : nullptr;
+  request.known.occupied = occupied.get();
+  return PlanOf(resolved, frame.workers, std::make_shared<const Layout>(MakeLayout(request)));
+}
+
+FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredLayouts& layouts) {
+  const ResolvedRequest resolved = Resolve(context, frame);
+  return PlanOf(resolved, frame.workers, layouts.Next(resolved, context.volumes().Occupied(frame.volume)));
 }
 
 FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link) {
   const MachineModel machine = ServiceMachine(std::vector<HostedWorker>(std::size_t(frame.workers)), {.link = link});
   if (!LeavesChoice(frame.policy, machine, std::size_t(frame.workers))) return frame;
-  FrameCase fixed = frame;
-  fixed.policy = FixedPolicy(frame.policy);
-  const LayoutKnowledge knowledge = KnowLayout(context, fixed);
-  const FrameRequest request = RequestOf(frame);
-  const PolicyChoice choice = OrThrow(ChoosePolicy({.frame = &request,
-                                                    .summary = knowledge.volume.summary.get(),
-                                                    .known = {.occupied = knowledge.occupied.get()},
-                                                    .slots = std::uint32_t(frame.workers),
-                                                    .machine = &machine}));
-  frame.policy = AskFor(choice.policy);
+  const ResolvedRequest resolved = Resolve(context, frame);
+  const FrameSetup setup = OrThrow(MakeFrameSetup(resolved));
+  const auto occupied = context.volumes().Occupied(frame.volume);
+  frame.policy = AskFor(ChoosePolicy({.open = &resolved.frame.policy,
+                                      .resolved = &resolved,
+                                      .setup = &setup,
+                                      .known = {.occupied = occupied.get()},
+                                      .slots = std::uint32_t(frame.workers),
+                                      .machine = &machine})
+                            .policy);
   return frame;
 }
 

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <array>
-#include <string>
 #include <vector>
 
 #include "common/image/coverage_map.h"
@@ -61,25 +60,16 @@ Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(ExperimentContext& context, const FrameCase& frame, int turns);
 
-// The service's plan for its first frame. Errors of Validate and PlanFrame.
-FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
-// The same with a given layout.
-FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame, std::shared_ptr<const Layout> layout);
+// The frame's request for its volume. Errors of Validate and ResolveRequest.
+ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame);
 
-// All that layouts of a frame's volume depend on.
-struct LayoutKnowledge {
-  VolumeInUse volume;
-  std::shared_ptr<const OccupancyGrid> occupied;
-  TransferFunction transfer;
-  ResolvedPolicy policy;
-  const RendererKind* renderer = nullptr;
-};
-LayoutKnowledge KnowLayout(ExperimentContext& context, const FrameCase& frame);
-ClassifiedVolume ClassifiedOf(const LayoutKnowledge& knowledge);
-MeasuredLayouts LayoutsOf(const LayoutKnowledge& knowledge, int workers);
+// The service's plan for its first frame. Errors of Resolve, MakeFrameSetup and PlanFrame. The policy leaves no choice.
+FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
+// The plan of the next frame with the next of these layouts.
+FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredLayouts& layouts);
 
 // The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
-// before it has seen a frame. Errors as of KnowLayout and ChoosePolicy.
+// before it has seen a frame. Errors of Resolve and MakeFrameSetup.
 FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
 // A planned frame with the measured costs of its boxes: medians over repeats.

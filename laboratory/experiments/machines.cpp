@@ -2,7 +2,6 @@
 
 #include <tbb/task_arena.h>
 
-#include "common/base/check.h"
 #include "laboratory/measure/calibrate.h"
 #include "laboratory/measure/combining_costs.h"
 

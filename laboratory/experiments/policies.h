@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
-#include "simulator/model/timeline.h"
 
 namespace slabstream {
 

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "common/planning/policy_names.h"
-#include "common/renderers/registry.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/experiment.h"
 #include "laboratory/experiments/figures.h"

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <string_view>
 
 #include "laboratory/experiments/attachments.h"
 #include "laboratory/experiments/experiment.h"

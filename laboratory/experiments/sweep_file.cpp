@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -17,7 +16,6 @@
 #include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/base/printable.h"
-#include "common/cli/parse.h"
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"

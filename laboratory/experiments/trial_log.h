@@ -7,7 +7,6 @@
 // line is an error that names it.
 #pragma once
 
-#include <cstdint>
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
-#include <optional>
 #include <random>
 #include <set>
 #include <utility>

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/planning/balance.h"
-#include "common/planning/placement.h"
 #include "common/planning/policy_names.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/frame_keys.h"
@@ -32,15 +31,10 @@ KeyedFrame ForSequence(ExperimentContext& context, const ViewSequence& sequence)
 // PlacementsOf, on workers of one speed.
 template <class Times>
 void Walk(ExperimentContext& context, const ViewSequence& sequence, const Times& times) {
-  const LayoutKnowledge first = KnowLayout(context, sequence.frame);
-  MeasuredLayouts layouts = LayoutsOf(first, sequence.frame.workers);
+  MeasuredLayouts layouts(sequence.frame.workers);
   for (int i = 0; i < sequence.steps; ++i) {
     const FrameCase frame = FrameOf(sequence, i);
-    if (sequence.later && i == sequence.steps / 2) {
-      const LayoutKnowledge then = KnowLayout(context, frame);
-      layouts.Show(then.occupied, ClassifiedOf(then));
-    }
-    const FramePlan plan = PlanOf(context, frame, layouts.Next(RequestOf(frame)));
+    const FramePlan plan = NextPlan(context, frame, layouts);
     std::vector<std::int64_t> nanoseconds;
     const std::vector<Placement> placements = PlacementsOf(plan);
     for (const double seconds : times(i, frame, plan)) {

@@ -10,7 +10,7 @@
 #include "common/mesh/mesh_part.h"
 #include "common/planning/count_drawn.h"
 #include "common/planning/frame_plan.h"
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
 #include "data/volume_io/read_options.h"
 
@@ -100,13 +100,6 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
   const TransferFunction transfer = OrThrow(ResolveTransfer(volume.transfer, summary));
   grid = std::make_shared<const OccupancyGrid>(CountDrawn(*in_use.volume, summary, *volume.renderer, transfer));
   return grid;
-}
-
-std::string TitleOf(const BenchCase& volume) {
-  const auto* sphere = std::get_if<SphereRequest>(&volume.volume);
-  if (sphere == nullptr) return volume.dataset;
-  return fmt::format("class {}, N = {}, {:.3g} % occupied", sphere->sphere_class == SphereClass::kHollow ? "I" : "II", sphere->size,
-                     sphere->occupancy * 100);
 }
 
 Json ColumnsOf(const BenchCase& volume) {

@@ -46,8 +46,6 @@ class VolumeCache {
   std::map<std::pair<std::string, const RendererKind*>, std::shared_ptr<const OccupancyGrid>> occupied_;  // by identity and transfer
 };
 
-// The name in reports: "class I, N = 300, 5 % occupied"; a file by its dataset's name.
-std::string TitleOf(const BenchCase& volume);
 // The columns of results that a volume fills: volume; n and occupancy of spheres.
 Json ColumnsOf(const BenchCase& volume);
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "common/image/coverage_map.h"
-#include "common/image/local_image.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
 

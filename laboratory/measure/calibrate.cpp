@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <thread>
-#include <utility>
 
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"

@@ -1,7 +1,6 @@
 #include "laboratory/measure/combining_costs.h"
 
 #include <algorithm>
-#include <numeric>
 #include <thread>
 #include <vector>
 

@@ -2,8 +2,6 @@
 
 #include <map>
 
-#include "common/volume/summary.h"
-
 namespace slabstream {
 using enum WorkUnit;
 

@@ -14,7 +14,7 @@ Result<std::unique_ptr<LabService>> LabService::Start(int workers, const std::ma
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(lab->context_, std::move(options));
   if (!service.ok()) return service.status();
   lab->service_ = *std::move(service);
-  Result<Client> client = Client::Connect(lab->context_, lab->service_->endpoint());
+  Result<Client> client = lab->service_->Connect();
   if (!client.ok()) return client.status();
   lab->client_ = *std::move(client);
   return lab;

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <memory>
-#include <optional>
 
 #include "common/image/local_image.h"
 #include "common/mesh/mesh_part.h"

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -13,21 +14,12 @@ namespace slabstream {
 
 class MeasuredLayouts {
  public:
-  // Of `volume`, which has this summary; `occupied`: the voxels that it draws.
-  MeasuredLayouts(std::shared_ptr<const VolumeSummary> summary, std::shared_ptr<const OccupancyGrid> occupied, ClassifiedVolume volume,
-                  int workers)
-      : summary_(std::move(summary)), occupied_(std::move(occupied)), volume_(std::move(volume)), slots_(std::uint32_t(workers)) {}
+  explicit MeasuredLayouts(int workers) : slots_(std::uint32_t(workers)) {}
 
-  // From the next frame on, the volume is shown under another transfer function, under which it draws `occupied`.
-  void Show(std::shared_ptr<const OccupancyGrid> occupied, ClassifiedVolume volume) {
-    occupied_ = std::move(occupied);
-    volume_ = std::move(volume);
-  }
-
-  // The layout of the next frame, which may differ from the one before only in its view and what Show said. The request is valid.
-  std::shared_ptr<const Layout> Next(const FrameRequest& request) {
-    policy_ = ResolvePolicy(request, summary_->description.geometry).value();
-    return table_.Find({&policy_, &volume_, summary_.get(), occupied_, slots_});
+  // The layout of the next frame, whose request leaves no choice and draws the voxels `occupied`.
+  std::shared_ptr<const Layout> Next(ResolvedRequest request, std::shared_ptr<const OccupancyGrid> occupied) {
+    last_ = std::move(request);
+    return table_.Find({&last_->policy.value(), &last_->volume, last_->summary.get(), std::move(occupied), slots_});
   }
 
   // Render times of the frame of the last Next, by PlacementsOf(plan).
@@ -38,15 +30,12 @@ class MeasuredLayouts {
       report.box = placement.id;
       report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds[reports.size() - 1];
     }
-    table_.Learn(volume_, plan, policy_, reports);
+    table_.Learn(last_->volume, plan, *last_->policy, reports);
   }
 
  private:
-  std::shared_ptr<const VolumeSummary> summary_;
-  std::shared_ptr<const OccupancyGrid> occupied_;
-  ClassifiedVolume volume_;
   std::uint32_t slots_;
-  ResolvedPolicy policy_;  // of the last Next
+  std::optional<ResolvedRequest> last_;  // of Next
   LayoutTable table_;
 };
 

@@ -6,7 +6,6 @@
 
 #include "common/base/task_thread.h"
 #include "common/base/time.h"
-#include "common/planning/placement.h"
 #include "laboratory/measure/lab_worker.h"
 #include "laboratory/measure/neighbours.h"
 

@@ -8,7 +8,6 @@
 #include <map>
 #include <ostream>
 #include <sstream>
-#include <utility>
 
 #include "common/base/parse_number.h"
 #include "common/combining/schemes.h"

@@ -1,11 +1,9 @@
 #include "laboratory/measure/validate.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <utility>
 
-#include "common/base/check.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/placement.h"
 #include "laboratory/measure/calibrate.h"
@@ -97,14 +95,6 @@ ValidatedView ValidationRow::Mean() const {
     mean.simulated_high += share * view.simulated_high;
   }
   return mean;
-}
-
-double ValidationRow::worst_error() const {
-  double worst = 0;
-  for (const ValidatedView& view : views) {
-    if (std::abs(view.error()) > std::abs(worst)) worst = view.error();
-  }
-  return worst;
 }
 
 Result<ValidationRow> ValidateSimulation(const ValidationCase& what, const ValidationOptions& options) {

@@ -59,7 +59,6 @@ struct ValidationRow {
 
   ValidatedView Mean() const;  // over views, each number separately
   double error() const { return Mean().error(); }
-  double worst_error() const;  // of one view, the largest in magnitude
 };
 
 // InvalidArgument: workers beyond 2. Fails with the service.

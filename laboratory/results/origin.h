@@ -1,7 +1,6 @@
 // The source of a number.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <string_view>
 
@@ -12,7 +11,6 @@ enum class Origin : std::uint8_t {
   kSimulated = 1,  // in virtual time, from costs measured on this machine
   kPaper = 2,      // printed by Yagel and Machiraju
 };
-inline constexpr std::array<Origin, 3> kOrigins = {Origin::kMeasured, Origin::kSimulated, Origin::kPaper};
 
 // "measured", "simulated", "paper".
 std::string_view ToString(Origin origin);

@@ -27,6 +27,7 @@ from .frame import Frame, Progress
 from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render, show
 from .local import shutdown
+from .presets import presets
 from .probe import Histogram, Label, Sample
 from .service import Service, connect
 from .status import Dataset, Status, Worker
@@ -63,6 +64,7 @@ __all__ = [
     "Worker",
     "connect",
     "load",
+    "presets",
     "render",
     "show",
     "shutdown",

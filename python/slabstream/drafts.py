@@ -7,6 +7,7 @@ import functools
 import json
 import os
 import pathlib
+import unicodedata
 from typing import Any, Callable, Iterable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
@@ -219,19 +220,61 @@ def _depth(draft: Draft, option: Option, value: Any) -> None:
     draft.format = dataclasses.replace(draft.format, png_bits=(8, 16)[values.choice(option.name, value, option.choices)])
 
 
+def _annotation(parse: Callable[[Option, Any], Any]) -> Put:
+    def put(draft: Draft, option: Option, value: Any) -> None:
+        annotations = dataclasses.replace(draft.format.annotations, **{option.name: parse(option, value)})
+        draft.format = dataclasses.replace(draft.format, annotations=annotations)
+
+    return put
+
+
+_MOST_TITLE_CHARACTERS = 120
+
+
+def _line(option: Option, value: Any) -> str:
+    if not isinstance(value, str) or len(value) > _MOST_TITLE_CHARACTERS or any(unicodedata.category(c) == "Cc" for c in value):
+        raise InvalidArgument(f"{option.name} {value!r} must be one line of at most {_MOST_TITLE_CHARACTERS} characters")
+    return value
+
+
+def _caption(option: Option, value: Any) -> str | None:
+    """True: a bar without a caption."""
+    return ("" if value else None) if isinstance(value, bool) else _line(option, value)
+
+
+#: Widths and levels of CT windows, in Hounsfield units (client/request/value_window.h).
+WINDOWS = {"bone": (1800, 400), "lung": (1500, -600), "mediastinum": (350, 50), "soft-tissue": (400, 50), "brain": (80, 40),
+           "liver": (150, 30)}
+
+
+def _window(draft: Draft, option: Option, value: Any) -> None:
+    if isinstance(value, str) and value[:1].isalpha():
+        if value not in WINDOWS:
+            raise InvalidArgument(f"{option.name} '{value}' is neither a number nor one of {', '.join(WINDOWS)}")
+        draft.window, level = WINDOWS[value]
+        draft.level = level if draft.level is None else draft.level
+    else:
+        draft.window = values.number(option.name, value, 0, 1e30, above=True)
+
+
 #: Every option of options.json is here, or has a path.
 _PUT: dict[str, Put] = {
     "view": _view,
     "camera": _camera,
     "background": _background,
     "depth": _depth,
+    "title": _annotation(_line),
+    "scale_bar": _annotation(lambda option, value: values.flag(option.name, value)),
+    "orientation_marker": _annotation(lambda option, value: values.flag(option.name, value)),
+    "color_bar": _annotation(_caption),
+    "legend": _annotation(lambda option, value: values.flag(option.name, value)),
     "labels": _layer,
     "overlay": _layer,
     "plane": _slice_field(lambda option, value: option.choices[values.choice(option.name, value, option.choices)]),
     "at": _slice_field(lambda option, value: values.point(option.name, value)),
     "index": _slice_field(lambda option, value: values.integer(option.name, value, 0, 65534)),
     "thickness": _slice_field(lambda option, value: values.number(option.name, value, option.least, option.most)),
-    "window": _slice_field(lambda option, value: values.number(option.name, value, 0, 1e30, above=True)),
+    "window": _window,
     "level": _slice_field(lambda option, value: values.number(option.name, value, -1e30, 1e30)),
 }
 
@@ -321,7 +364,8 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
     for name in names:
         side, normal, of_patient = _PLANES[name]
         draft = draft_of(dataset, {})
-        draft.format = planes.format
+        annotations = dataclasses.replace(planes.format.annotations, sides_only=True)
+        draft.format = dataclasses.replace(planes.format, annotations=annotations)
         frame = draft.frame
         frame.MergeFrom(planes.frame)
         frame.renderer = _renderer_with("labels", "overlay") if layers else _renderer_with("projection-mode")

@@ -2,15 +2,20 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import os
 import pathlib
+import shutil
+import subprocess
+import sys
 import tempfile
-from typing import Any
+from typing import Any, Sequence
 
 import numpy
 import numpy.typing
 
 from . import exr, png, schema
+from .annotations import Annotations, draw
 from .errors import InvalidArgument, Unavailable
 from .runs import Floats, Rectangle
 
@@ -25,6 +30,8 @@ class PictureFormat:
 
     background: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # straight, each in [0, 1]
     png_bits: int = 8  # 8 or 16
+    annotations: Annotations = Annotations()
+    key: dict[str, Any] | None = None  # of colour bar and legend, if they are wanted
 
 
 @dataclasses.dataclass(frozen=True)
@@ -118,17 +125,20 @@ class Image:
     """A picture. Row 0 is the top.
 
     numpy.asarray(image) is height, width, 4: uint8 with straight alpha, the same codes as in the command line's PNG. `rgba` has what the
-    service sent, over the background.
+    service sent, over the background. Annotations are drawn onto what it shows: onto files and arrays, not onto `rgba`.
     """
 
     def __init__(self, rgba: Floats, depth: Floats | None = None, *, format: PictureFormat = PictureFormat(),
-                 geometry: Geometry | None = None, statistics: Statistics | None = None, preview: bool = False):
+                 geometry: Geometry | None = None, statistics: Statistics | None = None, preview: bool = False,
+                 panes: Sequence[Geometry] = ()):
         self.rgba = rgba                #: float32, height, width, 4: premultiplied, linear
         self.depth = depth              #: float32, height, width: camera depth, +infinity where nothing is seen; None: has none
         self.format = format
         self.geometry = geometry        #: how it shows the world; None for pictures put together of several
         self.statistics = statistics    #: None for previews, and pictures put together of several
         self.preview = preview          #: some groups are still missing
+        self._panes = list(panes) or ([geometry] if geometry is not None else [])
+        self._drawn: Floats | None = None  # with annotations
 
     @property
     def size(self) -> tuple[int, int]:
@@ -140,19 +150,28 @@ class Image:
         """That of numpy.asarray(image)."""
         return self.rgba.shape[0], self.rgba.shape[1], 4
 
+    def _shown(self) -> Floats:
+        annotations = self.format.annotations
+        if not annotations.any() or not self._panes:
+            return self.rgba
+        if self._drawn is None:
+            self._drawn = draw(self.rgba, annotations, self._panes, self.format.key)
+        return self._drawn
+
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> numpy.typing.NDArray[Any]:
-        codes = _codes(self.rgba, 8)
+        codes = _codes(self._shown(), 8)
         return codes if dtype is None else codes.astype(dtype)
 
     def png(self, bits: int | None = None) -> bytes:
         """The picture as a PNG file with 8 or 16 bits a channel; None: as the option `depth` said."""
         if bits not in (None, 8, 16):
             raise InvalidArgument(f"bits is {bits}, must be 8 or 16")
-        return png.encode(_codes(self.rgba, bits or self.format.png_bits), {"Software": "slabstream"})
+        return png.encode(_codes(self._shown(), bits or self.format.png_bits), {"Software": "slabstream"})
 
     def exr(self) -> bytes:
         """The picture as an OpenEXR file: `rgba` as the channels R, G, B and A, and `depth`, if there is one, as Z."""
-        channels = {name: self.rgba[..., number] for number, name in enumerate("RGBA")}
+        shown = self._shown()
+        channels = {name: shown[..., number] for number, name in enumerate("RGBA")}
         if self.depth is not None:
             channels["Z"] = self.depth
         return exr.encode(channels, {"software": "slabstream"})
@@ -180,6 +199,21 @@ class Image:
                     raise
         except OSError as error:
             raise Unavailable(f"cannot write '{file}': {error.strerror}") from None
+
+    def show(self) -> None:
+        """Shows the picture: in a notebook below the cell, elsewhere in the desktop's viewer of pictures, from a file that stays until the
+        system clears its temporary files."""
+        ipython = sys.modules.get("IPython")  # a notebook has loaded it
+        if ipython is not None and hasattr(ipython.get_ipython(), "kernel"):
+            importlib.import_module("IPython.display").display(self)
+            return
+        opener = next((found for found in map(shutil.which, ("xdg-open", "open")) if found is not None), None)
+        if opener is None or not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")):
+            raise Unavailable("there is no desktop to show the picture on; save() writes it to a file")
+        with tempfile.NamedTemporaryFile(prefix="slabstream-", suffix=".png", delete=False) as file:
+            file.write(self.png(8))
+        subprocess.Popen([opener, file.name], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                         start_new_session=True)
 
     def _repr_png_(self) -> bytes:
         """For notebooks."""
@@ -212,4 +246,5 @@ def side_by_side(images: list[Image]) -> Image:
     """Pictures of one height, from left to right."""
     if len(images) == 1:
         return images[0]
-    return Image(numpy.concatenate([image.rgba for image in images], axis=1), format=images[0].format)
+    return Image(numpy.concatenate([image.rgba for image in images], axis=1), format=images[0].format,
+                 panes=[image.geometry for image in images if image.geometry is not None])

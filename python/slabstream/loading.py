@@ -1,11 +1,11 @@
 """Arrays and files as volumes of a service on this machine: load() and render()."""
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import pathlib
 import tempfile
-import types
 import weakref
 from typing import Any, Callable, Iterator
 
@@ -22,7 +22,7 @@ from .volumes import Volume as VolumeData
 _TAKE_AWAY_SECONDS = 5.0
 
 
-class Volume:
+class Volume(contextlib.AbstractContextManager["Volume"]):
     """A volume at a service, made by load(). A context manager: leaving it takes the volume away again."""
 
     def __init__(self, service: Service, name: str, shows: dict[str, Any], files: list[pathlib.Path]):
@@ -55,10 +55,7 @@ class Volume:
         """As Service.slice."""
         return self.service.slice(self.name, **self._shows | options)
 
-    def __enter__(self) -> Volume:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -96,7 +93,7 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     """Brings a volume to a service, for any number of pictures.
 
     `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
-    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too; row i of `direction` is where the array's axis i points to,
+    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.

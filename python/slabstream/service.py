@@ -2,14 +2,16 @@
 from __future__ import annotations
 
 import collections
+import contextlib
 import copy
+import dataclasses
 import math
 import os
-import types
 from typing import Any, Callable, Iterator
 
 from . import schema
 from .address import Address, find_service
+from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
 from .drafts import Draft, draft_of, slice_drafts_of
 from .errors import InvalidArgument
@@ -42,7 +44,7 @@ def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
         yield turned
 
 
-class Service:
+class Service(contextlib.AbstractContextManager["Service"]):
     """Made by connect(). A context manager: leaving it closes the connection, which cancels what is open."""
 
     def __init__(self, connection: Connection):
@@ -70,6 +72,7 @@ class Service:
         thread: they must be quick and not wait for anything of the service. `deadline` is in seconds, up to a day.
         """
         draft = draft_of(dataset, options)
+        self._add_keys([draft])
         draft.frame.previews = previews or on_preview is not None
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
@@ -86,6 +89,7 @@ class Service:
             raise InvalidArgument(
                 "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
             )
+        self._add_keys([draft])
         return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
 
     @property
@@ -104,7 +108,9 @@ class Service:
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """Planes or thick slabs of a volume; several are put side by side."""
-        return side_by_side(list(self._pipelined(iter(slice_drafts_of(dataset, options)), 3, deadline)))
+        drafts = slice_drafts_of(dataset, options)
+        self._add_keys(drafts)
+        return side_by_side(list(self._pipelined(iter(drafts), 3, deadline)))
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
         """How often which value occurs in a dataset."""
@@ -170,10 +176,7 @@ class Service:
     def close(self) -> None:
         self._connection.close()
 
-    def __enter__(self) -> Service:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: types.TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -182,6 +185,20 @@ class Service:
     def _summary(self, dataset: str, timeout: float) -> Any:
         transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
         return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout)
+
+    def _add_keys(self, drafts: list[Draft]) -> None:
+        """What colour bar and legend say, to pictures of one dataset that have them."""
+        draft = drafts[0]
+        if not draft.format.annotations.need_key():
+            return
+        query = schema.SummaryQuery(dataset=draft.frame.dataset, transfer=draft.frame.transfer)
+        if query.transfer.WhichOneof("choice") is None:
+            query.transfer.preset = "auto"
+        if not query.transfer.HasField("opacity_distance"):
+            query.transfer.opacity_distance = 1
+        key = key_of(draft.frame, self._connection.ask("summary_query", query, _QUESTION_SECONDS))
+        for each in drafts:
+            each.format = dataclasses.replace(each.format, key=key)
 
     def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
         if len(items) > _MOST_ITEMS:

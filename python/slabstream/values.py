@@ -12,6 +12,7 @@ from typing import Any, Iterable, Sequence
 import numpy
 
 from .errors import InvalidArgument
+from .named_colors import NAMED_COLORS
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the precision of a float32
@@ -22,11 +23,6 @@ MOST_SIDE = 16384      # pixels
 MOST_LABEL = 1 << 24
 MOST_ISOSURFACES = 8
 
-_COLORS = {
-    "black": "#000000", "silver": "#c0c0c0", "gray": "#808080", "grey": "#808080", "white": "#ffffff", "maroon": "#800000",
-    "red": "#ff0000", "purple": "#800080", "fuchsia": "#ff00ff", "green": "#008000", "lime": "#00ff00", "olive": "#808000",
-    "yellow": "#ffff00", "orange": "#ffa500", "navy": "#000080", "blue": "#0000ff", "teal": "#008080", "aqua": "#00ffff",
-}
 # Of isosurfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
 _ISOSURFACE_COLORS: list[Vector] = [
     (0.92, 0.84, 0.72), (0.80, 0.30, 0.26), (0.38, 0.60, 0.86), (0.95, 0.78, 0.35),
@@ -126,13 +122,13 @@ def scalar_range(name: str, value: object) -> tuple[float, float, bool]:
 
 def clip_box(name: str, value: object) -> tuple[Vector, Vector, str]:
     """Low, high and the unit, "" for that of the world, "v" for voxels or "%" of the sides: ((x0, x1), (y0, y1), (z0, z1)), with None for
-    a bound that does not clip, and the unit as a fourth value if it is another; or "X0:X1,Y0:Y1,Z0:Z1%"."""
+    a bound that does not clip, and the unit as a fourth value if it is another; or "X0:X1,Y0:Y1,Z0:Z1%", where a unit behind any bound is that of all."""
     unit = ""
     if isinstance(value, str):
-        text = value
-        if text[-1:] in ("v", "%"):
-            text, unit = text[:-1], text[-1]
-        axes: list[Any] = [[end or None for end in axis.split(":")] for axis in text.split(",")]
+        unit = "".join(mark for mark in "v%" if mark in value)
+        if len(unit) > 1:
+            raise InvalidArgument(f"{name} {value!r} has bounds in voxels (v) and in percent (%): all must have one unit")
+        axes: list[Any] = [[(end[:-1] if end[-1:] in ("v", "%") else end) or None for end in axis.split(":")] for axis in value.split(",")]
     else:
         axes = list(value) if isinstance(value, Iterable) else []
         if len(axes) == 4 and axes[3] in ("", "v", "%"):
@@ -157,7 +153,7 @@ def clip_plane(name: str, value: object) -> tuple[Vector, float]:
 
 def color(name: str, value: object) -> Color:
     """(r, g, b) or (r, g, b, a) from 0 to 1, "R,G,B", "#rrggbb", "#rrggbbaa", or a name such as "white"."""
-    text = _COLORS.get(value, value) if isinstance(value, str) else value
+    text = NAMED_COLORS.get(value, value) if isinstance(value, str) else value
     if isinstance(text, str) and text.startswith("#"):
         try:
             codes = bytes.fromhex(text[1:]) if text.isascii() and " " not in text else b""

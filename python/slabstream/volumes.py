@@ -71,7 +71,8 @@ def _reverse(vector: Vector) -> Vector:
 
 
 def check_spacing(value: Any) -> Vector:
-    spacing = _three("spacing", value)
+    """One number for all three axes, or z, y, x."""
+    spacing = _three("spacing", (value,) * 3 if numpy.ndim(value) == 0 else value)
     if min(spacing) <= 0:
         raise InvalidArgument(f"spacing {value!r} must be above 0 along each axis")
     return spacing

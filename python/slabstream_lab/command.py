@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import pathlib
 import sys
 
@@ -11,6 +12,19 @@ from .results import ResultsError, read
 
 
 def main(arguments: list[str] | None = None) -> int:
+    try:
+        try:
+            return draw(arguments)
+        finally:
+            if sys.stdout:
+                sys.stdout.flush()
+    except OSError as error:
+        print(f"slabstream-lab: standard output cannot be written: {error.strerror}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python writes what is left once more when it ends
+        return 1
+
+
+def draw(arguments: list[str] | None) -> int:
     parser = argparse.ArgumentParser(
         prog="slabstream-lab",
         description="Draw the page of an experiment: FOLDER/report.html and FOLDER/plots, from its results.",

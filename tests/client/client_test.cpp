@@ -7,8 +7,10 @@
 #include <array>
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
@@ -65,6 +67,14 @@ class FakeService {
 
 // Knows every request that it is asked about.
 ClientPong PongTo(const ClientPing& ping) { return {.epoch = 1, .nonce = ping.nonce, .known = ping.open}; }
+
+// Answers pings, and questions and orders by `handler`.
+FakeService::Handler Answering(FakeService::Handler handler) {
+  return [handler = std::move(handler)](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
+    return handler(message);
+  };
+}
 
 FrameRequest SmallRequest() {
   FrameRequest request;
@@ -135,7 +145,7 @@ TEST_F(ClientTest, ProgressPreviewAndPicture) {
 
 TEST_F(ClientTest, SilentServiceEndsEveryOpenRequest) {
   std::atomic<bool> answer = true;
-  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+  FakeService service(context_, "tcp://127.0.0.1:*", [&](const AnyMessage& message) -> std::vector<Answer> {
     const auto* ping = std::get_if<ClientPing>(&message);
     if (ping == nullptr || !answer) return {};
     return {{PongTo(*ping), {}}};
@@ -152,6 +162,38 @@ TEST_F(ClientTest, SilentServiceEndsEveryOpenRequest) {
     EXPECT_THAT(status->message(), HasSubstr(service.endpoint()));
     EXPECT_EQ(open.erase(event->request), 1U);
   }
+}
+
+// However long its threads wait for a processor.
+TEST_F(ClientTest, AServiceOfThisProcessIsNeverTooSlow) {
+  std::atomic<RequestId> request = 0;
+  std::atomic<int> unanswered = 0;
+  FakeService service(context_, "inproc://client-test", [&](const AnyMessage& message) -> std::vector<Answer> {
+    if (const auto* submit = std::get_if<SubmitFrame>(&message)) request = submit->request;
+    const auto* ping = std::get_if<ClientPing>(&message);
+    if (ping == nullptr) return {};
+    if (request == 0) return {{PongTo(*ping), {}}};
+    if (++unanswered < 5) return {};
+    return {ReplyTo(request)};
+  });
+  // No answer to a ping is quick enough.
+  const ClientTiming none = {.ping = milliseconds(20), .silence = Duration::zero()};
+  Client client = Client::Connect(context_, service.endpoint(), seconds(5), none).value();
+  const Result<Picture> picture = client.Render(SmallRequest());
+  EXPECT_TRUE(picture.ok()) << picture.status().message();
+}
+
+TEST_F(ClientTest, AServiceOfThisProcessThatHasEndedEndsEveryRequest) {
+  std::optional<FakeService> service(std::in_place, context_, "inproc://client-test",
+                                     Answering([](const AnyMessage&) -> std::vector<Answer> { return {}; }));
+  Client client = Client::Connect(context_, service->endpoint(), seconds(5), quick_).value();
+  const RequestId request = client.Submit(SmallRequest());
+  service.reset();
+  const std::optional<ClientEvent> event = client.Next(seconds(60));
+  ASSERT_TRUE(event && std::holds_alternative<Status>(event->what));
+  EXPECT_EQ(event->request, request);
+  EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kUnavailable);
+  EXPECT_THAT(std::get<Status>(event->what).message(), HasSubstr("inproc://client-test has ended"));
 }
 
 TEST_F(ClientTest, RequestThatTheServiceForgotIsSubmittedAgain) {
@@ -246,14 +288,6 @@ TEST_F(ClientTest, CancelAsksTheServiceAndItsAnswerEndsTheRequest) {
   EXPECT_EQ(std::get<Status>(event->what).code(), StatusCode::kCancelled);
   EXPECT_TRUE(client.QueryStatus(milliseconds(50)).status().code() == StatusCode::kUnavailable);
   EXPECT_FALSE(client.Next(Duration::zero()).has_value()) << "the late picture of an ended request is dropped";
-}
-
-// Answers pings, and questions and orders by `handler`.
-FakeService::Handler Answering(FakeService::Handler handler) {
-  return [handler = std::move(handler)](const AnyMessage& message) -> std::vector<Answer> {
-    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
-    return handler(message);
-  };
 }
 
 TEST_F(ClientTest, AnAnswerLeavesTheEventsOfOthers) {

@@ -79,10 +79,18 @@ TEST(CoordinatorClients, ProgressTellsPhasesAndPositions) {
   const Actions loading = script.Client(kOther, Frame(1, 1, "other"));
   ASSERT_EQ(ToClients<FrameProgress>(loading).size(), 1U);
   EXPECT_EQ(ToClients<FrameProgress>(loading)[0].message.phase, FramePhase::kLoading);
-  const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", script.loads.back().load, 1, BlockSummary()}));
+  const LoadId load = script.loads.back().load;
+  const auto read = ToClients<FrameProgress>(script.Step(DatasetReading{"other", load, 40}));
+  ASSERT_EQ(read.size(), 1U);
+  EXPECT_EQ(read[0].to, kOther);
+  EXPECT_EQ(read[0].message.phase, FramePhase::kLoading);
+  EXPECT_EQ(read[0].message.read_percent, 40U);
+  EXPECT_THAT(ToClients<FrameProgress>(script.Step(DatasetReading{"other", load + 1, 50})), testing::IsEmpty()) << "of another load";
+  const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", load, 1, BlockSummary()}));
   ASSERT_EQ(loaded.size(), 2U) << "it begins at once";
   EXPECT_EQ(loaded[0].to, kOther);
   EXPECT_EQ(loaded[0].message.phase, FramePhase::kQueued);
+  EXPECT_EQ(loaded[0].message.read_percent, 0U);
   const auto started = ToClients<FrameProgress>(script.Answer(script.own[0]));
   EXPECT_TRUE(std::any_of(started.begin(), started.end(), [](const auto& p) {
     return p.to == kClient &&

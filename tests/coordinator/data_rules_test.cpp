@@ -117,6 +117,20 @@ TEST_F(DataRules, VoxelsThatAreTheSameAgainStay) {
   EXPECT_EQ(script.machine.sizes().retired, 0U);
 }
 
+TEST_F(DataRules, ALookForWhichThereIsNoMemoryRefusesItsRequestsAlone) {
+  for (const GroupAssignment& group : Begin()) script.Answer(group);
+  Actions actions = script.Client(kOther, Frame(1));
+  actions = Seen(LookOf(actions), Status::ResourceExhausted("checking the files of a dataset: not enough memory"));
+  const auto failed = ToClients<FrameFailed>(actions);
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("checking the files of a dataset: not enough memory"));
+  EXPECT_THAT(Of<UnloadDataset>(actions), IsEmpty());
+  EXPECT_EQ(StateOf("block"), DatasetState::kReady) << "its voxels are still good";
+  actions = script.Client(kOther, Frame(2));
+  EXPECT_THAT(HandedOut(Seen(LookOf(actions), false)), SizeIs(1));
+  EXPECT_THAT(script.loads, SizeIs(1));
+}
+
 TEST_F(DataRules, AFileThatCannotBeReadFailsItsRequestsAndIsTriedAgain) {
   for (const GroupAssignment& group : Begin()) script.Answer(group);
   Actions actions = script.Client(kOther, Frame(1));
@@ -224,13 +238,14 @@ TEST_F(DataOrders, WhatIsAddedIsThereAtOnceAndWhatIsRemovedIsNot) {
   EXPECT_EQ(script.QueryStatus().refused.unknown_dataset, 1U);
 }
 
-TEST_F(DataOrders, TimesOfAFileAreOrderedByTheirName) {
+TEST_F(DataOrders, TimesOfAFileAreOrderedByTheirNumbers) {
   FoundData times;
-  for (const char* name : {"beat@0", "beat@1", "beat@10"}) times.datasets[name] = DataSource("/data/beat.npy", "");
+  for (const char* name : {"beat@0", "beat@2", "beat@10"}) times.datasets[name] = DataSource("/data/beat.npy", "");
   EXPECT_THAT(Listed(Found(Order(DataAction::kAdd, {"beat=/data/beat.npy?time=0:2"}), times)),
-              ElementsAre("beat@0", "beat@1", "beat@10", "block", "other"));
-  EXPECT_THAT(Refused(Order(DataAction::kRemove, {"bea"})).message(), HasSubstr("no dataset \"bea\": the catalogue has beat@0, beat@1"));
-  EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat@1"})), ElementsAre("beat@0", "beat@10", "block", "other"));
+              ElementsAre("beat@0", "beat@2", "beat@10", "block", "other"));
+  EXPECT_THAT(Refused(Order(DataAction::kRemove, {"bea"})).message(),
+              HasSubstr("no dataset \"bea\": the catalogue has beat@0, beat@2, beat@10"));
+  EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat@2"})), ElementsAre("beat@0", "beat@10", "block", "other"));
   EXPECT_THAT(Listed(Order(DataAction::kReload, {"beat"})), ElementsAre("beat@0", "beat@10", "block", "other"));
   EXPECT_THAT(Listed(Order(DataAction::kRemove, {"beat", "beat@0"})), ElementsAre("block", "other"));
 }
@@ -316,6 +331,26 @@ class FolderRules : public DataOrders {
   }
   std::vector<std::string> Names() { return NamesOf(script.QueryStatus().datasets); }
 };
+
+TEST_F(FolderRules, WhatIsUnchangedStaysAndOnlyThoseWhoAskHaveItSearched) {
+  Watch({"a.nrrd"});
+  Actions actions = script.Pass(script.config.check_interval);
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
+  EXPECT_FALSE(Of<CheckWatchedFolders>(actions)[0].asked_for);
+  script.Step(FoldersSeen{.folders = {}, .unchanged = {kFolder}});
+  EXPECT_THAT(Names(), ElementsAre("a", "block", "other"));
+  actions = script.Client(kOther, Frame(1, 1, "nonesuch"));
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
+  EXPECT_TRUE(Of<CheckWatchedFolders>(actions)[0].asked_for);
+  SeenFolder(In({"a.nrrd"}));
+  actions = Order(DataAction::kList, {});
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
+  EXPECT_TRUE(Of<CheckWatchedFolders>(actions)[0].asked_for);
+  SeenFolder(In({"a.nrrd"}));
+  actions = script.Pass(script.config.check_interval);
+  ASSERT_THAT(Of<CheckWatchedFolders>(actions), SizeIs(1));
+  EXPECT_FALSE(Of<CheckWatchedFolders>(actions)[0].asked_for);
+}
 
 TEST_F(FolderRules, FilesThatComeAndGoAreDatasetsThatComeAndGo) {
   Watch({"a.nrrd"});

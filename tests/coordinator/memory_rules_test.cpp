@@ -96,25 +96,90 @@ TEST_F(MemoryRules, WhatTheLossOfAWorkerMakesTooLargeFails) {
 
 // ---------------------------------------------------------------- frames that end workers
 
-TEST_F(MemoryRules, AFrameThatLosesTheWorkerOfABoxTwiceFailsAndTheOthersGoOn) {
-  CoordinatorScript script;
-  const FakeWorker first = script.Join(11, 1);
-  script.Join(12, 2);
-  script.Join(13, 3);
-  ASSERT_THAT(HandedOut(script.Submit(kClient, Frame(1))), SizeIs(1));
-  script.Pass(seconds(1));
-  const std::vector<GroupAssignment> again = HandedOut(script.Kill(first));
-  ASSERT_THAT(again, SizeIs(1));
-  // The first worker had box 0. Whoever got it dies too, a while later.
-  script.Pass(seconds(1));
-  const WorkerId heir = std::ranges::find(again[0].group.placements, BoxId{0}, &Placement::id)->worker;
-  const Actions actions = script.Kill(script.WorkerOf(heir));
+// A frame whose box 0 has been lost with two workers, one after the other.
+class SuspectRules : public MemoryRules {
+ protected:
+  void SetUp() override {
+    for (PeerToken token = 11; token < 16; ++token) script_.Join(token, token);
+    const std::vector<GroupAssignment> groups = HandedOut(script_.Submit(kClient, Frame(1)));
+    ASSERT_THAT(groups, SizeIs(1));
+    script_.Pass(seconds(1));
+    const std::vector<GroupAssignment> again = HandedOut(script_.Kill(HolderOf(groups[0])));
+    ASSERT_THAT(again, SizeIs(1));
+    script_.Pass(seconds(1));
+    second_ = HolderOf(again[0]);
+  }
+  FakeWorker HolderOf(const GroupAssignment& group) {
+    return script_.WorkerOf(std::ranges::find(group.group.placements, BoxId{0}, &Placement::id)->worker);
+  }
+  static std::vector<BoxId> BoxesOf(const GroupAssignment& group, WorkerId worker) {
+    std::vector<BoxId> boxes;
+    for (const Placement& placement : group.group.placements) {
+      if (placement.worker == worker) boxes.push_back(placement.id);
+    }
+    return boxes;
+  }
+
+  CoordinatorScript script_;
+  FakeWorker second_;
+};
+
+TEST_F(SuspectRules, TheBoxIsTriedAloneAndItsFrameIsToBlameIfAThirdWorkerDies) {
+  const std::vector<GroupAssignment> trial = HandedOut(script_.Kill(second_));
+  ASSERT_THAT(trial, SizeIs(1));
+  const FakeWorker third = HolderOf(trial[0]);
+  EXPECT_THAT(BoxesOf(trial[0], third.id), ElementsAre(0));
+  EXPECT_NE(trial[0].display, third.id);
+  EXPECT_THAT(HandedOut(script_.Submit(kOther, Frame(1))), IsEmpty()) << "others wait until it is over";
+  script_.Pass(seconds(1));
+  const Actions actions = script_.Kill(third);
   const auto failed = ToClients<FrameFailed>(actions);
   ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].to, kClient);
   EXPECT_EQ(failed[0].message.status.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("box 0 of the frame, as another worker before it"));
+  EXPECT_THAT(failed[0].message.status.message(), HasSubstr("box 0 of the frame, as two workers before it"));
+  EXPECT_THAT(ToClients<FrameReply>(script_.AnswerAll(actions)), SizeIs(1)) << "the other one";
+}
+
+TEST_F(SuspectRules, TwoDeathsByChanceFailNoFrame) {
+  const std::vector<GroupAssignment> trial = HandedOut(script_.Kill(second_));
+  ASSERT_THAT(trial, SizeIs(1));
+  EXPECT_THAT(HandedOut(script_.Submit(kOther, Frame(1))), IsEmpty());
+  const Actions actions = script_.Answer(trial[0]);
+  EXPECT_THAT(ToClients<FrameReply>(actions), SizeIs(1));
+  ASSERT_THAT(HandedOut(actions), SizeIs(1));
+  EXPECT_THAT(WorkersOf(HandedOut(actions)[0]), SizeIs(3)) << "of all workers again";
+  EXPECT_THAT(ToClients<FrameReply>(script_.AnswerAll(actions)), SizeIs(2));
+}
+
+TEST_F(SuspectRules, TheTrialWaitsForWhatIsUnderWay) {
+  const std::vector<GroupAssignment> other = HandedOut(script_.Submit(kOther, Frame(1)));
+  ASSERT_THAT(other, SizeIs(1));
+  ASSERT_NE(other[0].display, second_.id);
+  script_.Done(other[0]);  // its picture is being made
+  Actions actions = script_.Kill(second_);
   EXPECT_THAT(HandedOut(actions), IsEmpty());
-  EXPECT_THAT(ToClients<FrameReply>(script.AnswerAll(script.Submit(kClient, Frame(2)))), SizeIs(1));
+  EXPECT_GT(script_.machine.NextWake(), script_.now);
+  actions = script_.Image(other[0], 1);
+  EXPECT_THAT(ToClients<FrameReply>(actions), SizeIs(1));
+  ASSERT_THAT(HandedOut(actions), SizeIs(1));
+  EXPECT_EQ(HandedOut(actions)[0].key.frame, 1U);
+  EXPECT_THAT(ToClients<FrameReply>(script_.AnswerAll(actions)), SizeIs(2));
+}
+
+TEST_F(SuspectRules, WithOneWorkerLeftItHasEverything) {
+  const std::vector<GroupAssignment> trial = HandedOut(script_.Kill(second_));
+  ASSERT_THAT(trial, SizeIs(1));
+  // Those that leave in order prove nothing.
+  Actions actions;
+  while (script_.workers.size() > 1) {
+    const FakeWorker one = script_.workers.front();
+    script_.Mute(one);
+    actions = script_.Worker(one, Leave{.epoch = 77, .worker = one.id});
+  }
+  ASSERT_THAT(HandedOut(actions), SizeIs(1));
+  EXPECT_THAT(WorkersOf(HandedOut(actions)[0]), SizeIs(1));
+  EXPECT_THAT(ToClients<FrameReply>(script_.AnswerAll(actions)), SizeIs(1));
 }
 
 // A host ends with two of its workers: one is found to be silent a moment before the other, and the other gets its boxes meanwhile.

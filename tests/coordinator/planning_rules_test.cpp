@@ -92,8 +92,10 @@ TEST(CoordinatorPlanning, FailedPlanFailsThatFrameOnly) {
 TEST(CoordinatorPlanning, PlanForOtherWorkersIsMadeAgain) {
   SlowPlanner script;
   script.Submit(kClient, Frame(1));
+  const auto resolved = script.plans.at(0).resolved;
   script.Join(12, 2);
   ASSERT_THAT(script.plans, SizeIs(1)) << "the first one is dropped";
+  EXPECT_EQ(script.plans[0].resolved, resolved) << "a request is resolved once, however often it is planned";
   const auto groups = HandedOut(script.Plan());
   ASSERT_THAT(groups, SizeIs(1));
   EXPECT_THAT(WorkersOf(groups[0]), SizeIs(2));

@@ -272,6 +272,41 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   EXPECT_EQ(ReadFile("q0.png"), ReadFile("r0.png"));
 }
 
+TEST_F(MovieTest, AFrameThatFailsIsToldAndTheOthersAreRendered) {
+  KeepFrames();
+  const std::string endpoint = "ipc://" + Path("s");
+  const std::string series = Path(MakeSeries("series.npy", {50, 100, 150, 200}));
+  MustRun({"up", "--detach", "--workers", "1", "--listen", endpoint, "--data", "series=" + series + "?time=0:3"});
+  MustRun({"data", "remove", "series@2"});
+  const std::vector<std::string> frames = {"turntable",  "series", "--time",         "0:3",   "--turns", "0",  "--renderer",  "mip",
+                                           "--transfer", "window", "--scalar-range", "0:200", "--size",  "32", "--in-flight", "1"};
+  const auto run = [&](const std::string& output) {
+    std::vector<std::string> arguments = frames;
+    arguments.insert(arguments.end(), {"-o", output});
+    return Slabstream(arguments);
+  };
+  ProgramResult result = run("p%d.png");
+  EXPECT_NE(result.exit_status, 0);
+  EXPECT_THAT(result.out, HasSubstr("rendered 3 frames"));
+  ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("slabstream turntable: frame 3 of 4 (p2.png): no dataset \"series@2\""));
+  EXPECT_THAT(Files(), testing::IsSupersetOf({"p0.png", "p1.png", "p3.png"}));
+  EXPECT_THAT(Files(), Not(Contains("p2.png")));
+  // In a movie, the frame before it stays for as long.
+  result = run("movie.mp4");
+  EXPECT_NE(result.exit_status, 0);
+  const std::string movie = ReadFile("movie.mp4");
+  ASSERT_EQ(movie.size(), 4 * kFrameBytes);
+  EXPECT_EQ(movie.substr(2 * kFrameBytes, kFrameBytes), movie.substr(kFrameBytes, kFrameBytes));
+  EXPECT_NE(movie.substr(3 * kFrameBytes, kFrameBytes), movie.substr(kFrameBytes, kFrameBytes));
+  // What fails again and again ends it: it will not get better.
+  MustRun({"data", "remove", "series@1"});
+  MustRun({"data", "remove", "series@3"});
+  result = run("q%d.png");
+  EXPECT_EQ(result.err_lines().size(), 3U) << result.err;
+  EXPECT_EQ(result.out, "");
+}
+
 TEST_F(MovieTest, AColourMeansTheSameValueAtAllTimes) {
   KeepFrames();
   const std::string series = MakeSeries("series.npy", {200, 50});

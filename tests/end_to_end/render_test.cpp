@@ -198,6 +198,22 @@ TEST_F(RenderTest, AFontThatIsNotThereIsToldBeforeTheWorkBegins) {
   EXPECT_THAT(Files(), Not(Contains("x.png")));
 }
 
+// Copied without libslabstream-pictures.so, the program says so before it looks for the service.
+TEST_F(RenderTest, AnEncoderThatIsNotThereIsToldBeforeTheWorkBegins) {
+  std::filesystem::copy_file(Command({}).front(), Path("slabstream"));
+  const std::string endpoint = "ipc://" + Path("none");
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"render", "-o", "a.png"}, {"turntable", "--frames", "2", "-o", "a%d.png"}, {"slice", "-o", "a.png"}}) {
+    std::vector<std::string> command = {Path("slabstream")};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    command.insert(command.end(), {"ball", "--endpoint", endpoint});
+    const ProgramResult result = RunningProgram(command, directory_).Wait();
+    EXPECT_EQ(result.exit_status, 1) << arguments[0];
+    ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("pictures cannot be written: libslabstream-pictures.so: ")) << arguments[0];
+  }
+}
+
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
   const PictureFile picture = Render("ball.png", {"--zoom", "0.001"});
   EXPECT_EQ(picture.width, kPixels);

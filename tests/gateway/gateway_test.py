@@ -227,6 +227,25 @@ class HttpTest(WithService):
         outside = self.ask("value", dataset="b", at="-1,1e9,0")
         self.assertEqual((outside["inside"], outside["voxel"], outside["value"]), (False, None, None))
 
+    def test_profiles_and_boxes(self):
+        profile = self.ask("profile", **{"dataset": "b", "from": "-2.25,9.5,9.5", "to": "9.25,9.5,9.5", "samples": 24})
+        self.assertEqual((profile["length"], profile["from"], profile["to"]), (11.5, [-2.25, 9.5, 9.5], [9.25, 9.5, 9.5]))
+        self.assertEqual(len(profile["values"]), 24)
+        self.assertEqual(profile["values"][:4], [None] * 4, "the volume begins at -0.5")
+        for i, value in list(enumerate(profile["values"]))[4:]:  # every 0.5
+            self.assertAlmostEqual(value, self.ask("value", dataset="b", at=f"{-2.25 + 0.5 * i},9.5,9.5")["interpolated"], 6)
+        between = [self.ask("value", dataset="b", at=f"{x},9,9") for x in (3, 3.5, 4)]
+        self.assertAlmostEqual(between[1]["interpolated"], (between[0]["value"] + between[2]["value"]) / 2, 9)
+
+        values = [self.ask("value", dataset="b", at=f"{x},9,{z}")["value"] for x in range(3, 7) for z in (9, 10)]
+        box = self.ask("statistics", dataset="b", box="2.5:6,8.5:9.4,9:10")
+        mean = sum(values) / len(values)
+        self.assertEqual((box["voxels"], box["non_finite"], box["least"], box["largest"]), (8, 0, min(values), max(values)))
+        self.assertAlmostEqual(box["mean"], mean, 9)
+        self.assertAlmostEqual(box["deviation"], (sum((value - mean) ** 2 for value in values) / len(values)) ** 0.5, 9)
+        empty = self.ask("statistics", dataset="b", box="100:101,0:1,0:1")
+        self.assertEqual(empty, {"voxels": 0, "non_finite": 0, "mean": None, "deviation": None, "least": None, "largest": None})
+
     def test_pixels_show_points(self):
         # The ball's surface, seen along +y: from its geometry by hand.
         options = {"dataset": "b", "renderer": "zbuffer", "size": 100}
@@ -267,6 +286,11 @@ class HttpTest(WithService):
             ("value", {"dataset": "a", "at": "1,2"}, 400, "1,2"),
             ("value", {"dataset": "a", "at": "1,2,nan"}, 400, "nan"),
             ("value", {"dataset": "x" * 300, "at": "1,2,3"}, 400, "300 bytes"),
+            ("profile", {"dataset": "a", "from": "0,0,0"}, 400, "to is missing"),
+            ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
+            ("statistics", {"dataset": "a"}, 400, "box is missing"),
+            ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),
+            ("statistics", {"dataset": "nonesuch", "box": "0:1,0:1,0:1"}, 404, "nonesuch"),
             ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
             ("pick", {"dataset": "a", "x": 33, "y": 1, "size": 32}, 400, "out of range"),
             ("pick", {"dataset": "a", "x": 3, "y": 1, "zoom": -1}, 400, "zoom"),
@@ -336,7 +360,9 @@ class HttpTest(WithService):
         port = own.rsplit(":")[-1]
         for headers, status in [
             ({"Host": own}, 200), ({"Host": "localhost:" + port}, 200), ({"Host": "localhost:1"}, 200), ({"Host": "evil.example"}, 403),
-            ({"Host": "127.0.0.1.evil.example"}, 403), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
+            ({"Host": "127.0.0.1.evil.example"}, 403), ({"Host": f"127.0.0.1:{port}.evil.example"}, 403),
+            ({"Host": "localhost:evil.example"}, 403), ({"Host": f"[::1]:{port}.evil.example"}, 403), ({"Host": "127.0.0.1:65536"}, 403),
+            ({"Host": "[::1]:1"}, 200), ({"Origin": "http://" + own}, 200), ({"Origin": "http://evil.example"}, 403),
             ({"Origin": "null"}, 403), ({"Origin": "https://" + own}, 403)]:
             self.assertEqual(self.gateway.request("/livez", headers=headers)[0], status, headers)
             if status == 200:
@@ -673,6 +699,39 @@ class SlowReaderTest(WithService):
         self.assertEqual(self.get("/api/v1/render.png", dataset="a", size=16)[0], 200)
 
 
+class CrowdTest(WithService):
+    """Those who open connections and send next to nothing."""
+
+    def drip(self, source):
+        connection = self.gateway.connect(source=source)
+        self.addCleanup(connection.close)
+        connection.sendall(f"GET /livez HTTP/1.1\r\nHost: {self.gateway.authority}\r\nX: ".encode())
+        return connection
+
+    def answers(self, connection):
+        connection.sendall(b"x\r\nConnection: close\r\n\r\n")
+        try:
+            return connection.recv(65536).startswith(b"HTTP/1.1 200 ")
+        except OSError:
+            return False
+
+    def test_the_slowest_make_room_for_others(self):
+        page = self.page()
+        first = self.drip("127.0.0.1")
+        many = [self.drip("127.0.0.2") for _ in range(300)]
+        # As many as one address may have, and those are the latest of it: nobody waits for the others.
+        self.assertEqual(self.gateway.request("/livez")[0], 200)
+        self.assertIn(b'refusals_total{reason="connections"} 172\n', self.gateway.request("/metrics")[2])
+        self.assertFalse(self.answers(many[0]))
+        self.assertTrue(self.answers(many[-1]))
+        # Others fill what is left. The next ones take the places of the address that has most.
+        crowd = [self.drip(f"127.0.0.{3 + i % 100}") for i in range(200)]
+        self.assertEqual(self.gateway.request("/livez")[0], 200)
+        self.assertTrue(self.answers(first))
+        self.assertTrue(all(self.answers(connection) for connection in crowd))
+        page.final(page.view({"dataset": "a", "size": 16}))
+
+
 class ServiceLossTest(unittest.TestCase):
     def test_a_session_survives_the_service(self):
         programs = Programs()
@@ -803,6 +862,14 @@ class StartTest(unittest.TestCase):
         self.programs.run("status", "--endpoint", endpoint)  # still there
         refused = self.programs.run("view", "none", "--no-browser", "--endpoint", endpoint, expect=2).stderr
         self.assertEqual(refused, "slabstream view: SOURCE 'none' is neither a file nor a dataset of the service\n")
+
+    def test_view_without_a_display_says_that_it_opened_no_browser(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        child = self.programs.start("slabstream", "view", "a.nrrd")
+        Gateway(child.stdout.readline().split()[-1])
+        self.assertEqual(child.stdout.readline(), "No browser was opened, because there is no display here: open this address in one.\n")
+        self.assertEqual(child.stdout.readline(), "Ctrl-C ends it.\n")
+        self.assertEqual(self.programs.end(child), 0)
 
     def test_view_says_what_is_missing(self):
         refused = self.programs.run("view", "none.nrrd", "--no-browser", "--endpoint", f"ipc://{self.programs.folder}/none", expect=1)

@@ -20,9 +20,11 @@ class Gateway:
         self.host, self.port = host.strip("[]"), int(port)
         self.context = context
 
-    def connect(self, receive_bytes=0):
-        """With `receive_bytes` the system keeps about so many for a reader that is slow."""
+    def connect(self, receive_bytes=0, source=None):
+        """With `receive_bytes` the system keeps about so many for a reader that is slow. `source`: another address of this machine."""
         raw = socket.socket(socket.AF_INET)
+        if source:
+            raw.bind((source, 0))
         raw.settimeout(60)
         if receive_bytes:
             raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)

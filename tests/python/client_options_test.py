@@ -11,6 +11,7 @@ import os
 import shutil
 import sys
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -21,6 +22,7 @@ import slabstream as ss  # noqa: E402
 from slabstream import drafts, schema  # noqa: E402
 from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
 from slabstream.options import COMMANDS  # noqa: E402
+from slabstream.volumes import check_spacing  # noqa: E402
 
 
 def load_update():
@@ -55,6 +57,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"view": "posterior", "clip_box": ((25, None), (None, 18.5), (-5, 12))}, ["--view", "posterior", "--clip-box", "25:,:18.5,-5:12"]),
     ({"view": "superior", "clip_box": ((None, None), (None, None), (None, 50), "%")},
      ["--view", "superior", "--clip-box", ":,:,:50%"]),
+    ({"view": "superior", "clip_box": ":50%,:,:"}, ["--view", "superior", "--clip-box", ":50%,:,:"]),
     ({"view": "inferior", "clip_box": "3:20,:,4:9v"}, ["--view", "inferior", "--clip-box", "3:20,:,4:9v"]),
     ({"view": "left", "clip_plane": (1, 0.5, 0, -40)}, ["--view", "left", "--clip-plane", "1,0.5,0,-40"]),
     ({"view": "right", "clip_plane": [(1, 0.5, 0, -40), "0,0,1,0"]},
@@ -96,6 +99,11 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      [*RAYCAST, "--overlay-transfer", "gray-ramp", "--overlay-weight", "0.2"]),
     ({"renderer": "raycast", "overlay_transfer": "opaque", "overlay_range": (0.2, 0.9), "overlay_weight": 0.5},
      [*RAYCAST, "--overlay-transfer", "opaque", "--overlay-range", "0.2:0.9", "--overlay-weight", "0.5"]),
+    ({"size": 96, "title": "A ball", "scale_bar": True, "orientation_marker": True, "color_bar": "HU"},
+     ["--size", "96", "--title", "A ball", "--scale-bar", "--orientation-marker", "--color-bar=HU"]),
+    ({"renderer": "raycast", "size": 96, "label_mode": "surface", "labels_shown": "1-2", "legend": True, "color_bar": True},
+     [*RAYCAST, "--size", "96", "--label-mode", "surface", "--labels-shown", "1-2", "--legend", "--color-bar"]),
+    ({"background": "rebeccapurple"}, ["--background", "rebeccapurple"]),
     ({"decomposition": "kd-tree", "axis": "x", "balance_by": "voxels"}, ["--decomposition", "kd-tree", "--axis", "x", "--balance-by", "voxels"]),
     ({"assignment": "greedy", "groups": 3}, ["--assignment", "greedy", "--groups", "3"]),
     ({"balance": "static", "teams": 2}, ["--balance", "static", "--teams", "2"]),
@@ -106,6 +114,11 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
     ({"plane": "zyx", "background": "red", "depth": 16}, ["--plane", "zyx", "--background", "red", "--depth", "16"]),
     ({"plane": "axial", "at": (30, 10, 2), "size": (50, 40)}, ["--plane", "axial", "--at", "30,10,2", "--size", "50x40"]),
     ({"plane": "coronal", "index": 9, "interpolation": "nearest"}, ["--plane", "coronal", "--index", "9", "--interpolation", "nearest"]),
+    ({"plane": "anatomical", "scale_bar": True, "orientation_marker": True, "title": "Three"},
+     ["--plane", "anatomical", "--scale-bar", "--orientation-marker", "--title", "Three"]),
+    ({"plane": "coronal", "color_bar": "HU", "legend": True}, ["--plane", "coronal", "--color-bar=HU", "--legend"]),
+    ({"plane": "axial", "window": "brain"}, ["--plane", "axial", "--window", "brain"]),
+    ({"plane": "axial", "window": "soft-tissue", "level": 90}, ["--plane", "axial", "--window", "soft-tissue", "--level", "90"]),
     ({"plane": "sagittal", "window": 150}, ["--plane", "sagittal", "--window", "150"]),
     ({"plane": "y", "window": 150, "level": 60}, ["--plane", "y", "--window", "150", "--level", "60"]),
     ({"plane": "x", "transfer": "gray-ramp", "scalar_range": (0, 99), "opacity_distance": 2},
@@ -314,12 +327,33 @@ class Requests(unittest.TestCase):
             ({"index": 3}, "index 3 is the number of a slice of one plane, but there are 3"),
             ({"plane": "x", "index": 3, "at": (0, 0, 0)}, "index excludes at"),
             ({"level": 3}, "level requires window"),
+            ({"window": "bones"}, "window 'bones' is neither a number nor one of bone, lung"),
+            ({"title": "two\nlines"}, "title 'two\\nlines' must be one line"),
             ({"thickness": 3, "labels": True}, "thickness 3 is no plane"),
             ({"azimuth": 3}, "there is no option 'azimuth'"),
         ):
             with self.subTest(given=given), self.assertRaises(ss.InvalidArgument) as caught:
                 slice_drafts_of("a", given)
             self.assertTrue(str(caught.exception).startswith(sentence), str(caught.exception))
+
+
+class Names(unittest.TestCase):
+    def test_presets_are_those_of_the_command_line(self) -> None:
+        presets = ss.presets()
+        self.assertIn("mri-head", presets)
+        self.assertIn("bones", presets["ct-bone"])
+
+    def test_one_number_is_a_spacing(self) -> None:
+        self.assertEqual(check_spacing(2), check_spacing((2, 2, 2)))
+        self.assertEqual(check_spacing(np.float32(0.5)), (0.5, 0.5, 0.5))
+        self.assertRaises(ss.InvalidArgument, check_spacing, 0)
+        self.assertRaises(ss.InvalidArgument, check_spacing, (1, 2))
+
+    def test_without_a_desktop_show_says_what_to_do(self) -> None:
+        image = ss.Image(np.zeros((2, 2, 4), np.float32))
+        with unittest.mock.patch.dict(os.environ, {"DISPLAY": "", "WAYLAND_DISPLAY": ""}), self.assertRaises(ss.Unavailable) as caught:
+            image.show()
+        self.assertIn("save()", str(caught.exception))
 
 
 class Pictures(unittest.TestCase):

@@ -169,6 +169,15 @@ class Uploads(WithAService):
             self.assertEqual(len(refused.status.message.splitlines()), 1)
         order(50, side=65536)
         self.assertRegex(receive("order_refused").status.message, "AddVolume.description.size")
+        # More than any machine has: refused before a byte is taken.
+        huge = schema.AddVolume(nonce=53, name="huge")
+        huge.description.CopyFrom(schema.VolumeDescription(size=schema.Index3(x=30000, y=30000, z=30000), spacing=schema.Vec3(x=1, y=1, z=1), type=1, scale=1))
+        huge.description.orientation.CopyFrom(schema.Orientation(world=1, origin=schema.Vec3(), x_axis=schema.Vec3(x=1),
+                                                                 y_axis=schema.Vec3(y=1), z_axis=schema.Vec3(z=1)))
+        send(add_volume=huge)
+        self.assertRegex(receive("order_refused").status.message, r'dataset "huge" needs \d+ MiB, limit \d+ MiB')
+        # Voxels before there is a credit, or of a volume that nobody has announced: nothing is taken.
+        send(bytes(16), volume_part=schema.VolumePart(nonce=54, begin=0, bytes=16))
         order(51)
         receive("volume_credit")
         labels = schema.AddVolume(nonce=52, name="bad")

@@ -84,7 +84,8 @@ class Files(InAFolder):
     def test_geometry_is_refused_by_name(self) -> None:
         for given, sentence in (
             ({"spacing": (1, 0, 1)}, "spacing (1, 0, 1) must be above 0 along each axis"),
-            ({"spacing": 2}, "spacing 2 is not three numbers, for z, y and x"),
+            ({"spacing": (1, 2)}, "spacing (1, 2) is not three numbers, for z, y and x"),
+            ({"spacing": 0}, "spacing 0 must be above 0"),
             ({"origin": (1, 2)}, "origin (1, 2) is not three numbers"),
             ({"origin": (1, 2, float("inf"))}, "origin (1, 2, inf) must be finite"),
             ({"direction": ((1, 0, 0), (0, 0, 0), (0, 0, 1))}, "direction ((1, 0, 0), (0, 0, 0), (0, 0, 1)) has a vector without direction"),

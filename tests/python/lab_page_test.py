@@ -6,6 +6,7 @@ import io
 import itertools
 import pathlib
 import re
+import subprocess
 import sys
 import tempfile
 import textwrap
@@ -182,6 +183,15 @@ class Pages(InAFolder):
                 self.assertTrue(plots)
                 for plot in plots:
                     xml.etree.ElementTree.parse(plot)
+
+
+class Program(unittest.TestCase):
+    def test_an_output_that_cannot_be_written_is_told(self) -> None:
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            run = subprocess.run([sys.executable, str(ROOT / "python" / "slabstream-lab"), "--help"], stdout=full, stderr=subprocess.PIPE,
+                                 text=True, check=False)
+        self.assertEqual(run.returncode, 1)
+        self.assertEqual(run.stderr, "slabstream-lab: standard output cannot be written: No space left on device\n")
 
 
 class Documents(InAFolder):

@@ -36,7 +36,7 @@ class EmbeddedServiceTest : public testing::Test {
     service_ = std::move(*started);
   }
   Client Connect() {
-    Result<Client> client = Client::Connect(context_, service_->endpoint());
+    Result<Client> client = service_->Connect();
     CHECK(client.ok()) << client.status().message();
     return std::move(*client);
   }

@@ -218,6 +218,29 @@ TEST_F(MultiProcessTest, KilledCoordinatorEndsClientsAndWorkersComeBackToTheNext
   EXPECT_EQ(LargestDifference(picture->image, expected, request.size), 0);
 }
 
+// Stopped and continued: who waits long enough gets the picture, the others are told.
+TEST_F(MultiProcessTest, AStoppedCoordinatorGoesOnWhereItWas) {
+  StartCoordinator();
+  StartWorker();
+  StartWorker();
+  const FrameRequest request = TestRequest(ZBuffer(), 120, 3);
+  const LocalImage expected = RenderDirectly(request, *volume_);
+  Client patient = Connect({.silence = std::chrono::minutes(10)});
+  Client hasty = Connect({.ping = std::chrono::milliseconds(20), .silence = std::chrono::milliseconds(200)});
+  AwaitWorkers(patient, 2);
+  coordinator_->Stop();
+  const RequestId id = patient.Submit(request);
+  const Status lost = hasty.Render(request, seconds(60)).status();
+  EXPECT_EQ(lost.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(lost.message(), HasSubstr("has not answered for"));
+  coordinator_->Kill(SIGCONT);
+  for (const Result<Picture>& picture : {Await(patient, id, [] {}), hasty.Render(request, seconds(60))}) {
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_EQ(LargestDifference(picture->image, expected, request.size), 0);
+  }
+  EXPECT_EQ(patient.QueryStatus().value().workers_lost, 0U);
+}
+
 TEST_F(MultiProcessTest, SigtermEndsEachInOrderAndShutDownEndsAll) {
   StartCoordinator();
   StartWorker();

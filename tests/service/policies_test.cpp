@@ -48,7 +48,7 @@ class PoliciesTest : public testing::TestWithParam<int> {
     auto service = EmbeddedService::Start(context_, options);
     ASSERT_TRUE(service.ok()) << service.status().message();
     service_ = *std::move(service);
-    client_.emplace(Client::Connect(context_, service_->endpoint()).value());
+    client_.emplace(service_->Connect().value());
   }
 
   const std::shared_ptr<const Volume> volume_ = SparseVolume();
@@ -134,7 +134,7 @@ TEST(PoliciesStatistics, CountTheBytesOfEveryMessage) {
   Context context;
   const auto service = EmbeddedService::Start(context, options);
   ASSERT_TRUE(service.ok()) << service.status().message();
-  Client client = Client::Connect(context, (*service)->endpoint()).value();
+  Client client = (*service)->Connect().value();
   FrameRequest request = TestRequest(Splatting(), 120, 1);
   const auto image_bytes = [&](const char* scheme) {
     request.policy.combine = scheme;

@@ -2,9 +2,11 @@
 // It lies over the picture, so the pixels below stay those of the service.
 import { project } from "./camera";
 import { put, shown as text, svg } from "./dom";
+import { BOX_EDGES, cornersOfBox } from "./measure";
+import type { DrawnMeasure } from "./measuring";
 import type { Shown } from "./pane";
 import type { Geometry } from "./session";
-import { AXES, AXIS_NAMES, dot, type Vec3 } from "./vec";
+import { AXES, AXIS_NAMES, dot, sub, type Vec3 } from "./vec";
 import { unitName } from "./volume";
 
 // The geometry in pixels of the page.
@@ -75,8 +77,45 @@ function crosshair(geometry: Geometry, width: number, height: number, { at, line
   return svg("path", { class: "crosshair", d: `M${x - reach} ${y}H${x - gap}M${x + gap} ${y}H${x + reach}M${x} ${y - reach}V${y - gap}M${x} ${y + gap}V${y + reach}` });
 }
 
+const LETTER = 8; // pixels across, on average
+
+// A slice through this point, half as thick on either side.
+interface Cut { at: Vec3; half: number }
+
+// A measurement, as lines between points of the page. In a slice those that lie beside it are faint.
+function drawnMeasure(geometry: Geometry, width: number, height: number, { measure, label }: DrawnMeasure, slice: Cut | undefined): SVGElement {
+  const { kind, points } = measure, corners = kind === "box" ? cornersOfBox(measure) : points;
+  const at = corners.map(p => project(geometry, width, height, p));
+  let beside = false;
+  if (slice) {
+    const depths = corners.map(p => dot(sub(p, slice.at), geometry.forward));
+    beside = kind === "box" ? Math.min(...depths) > slice.half || Math.max(...depths) < -slice.half : depths.some(depth => Math.abs(depth) > slice.half);
+  }
+  const line = (indices: readonly number[]): string => indices.map((index, i) => `${i === 0 ? "M" : "L"}${(at[index] as number[]).map(c => c.toFixed(1)).join(" ")}`).join("");
+  const path = kind === "box" ? BOX_EDGES.map(line).join("") : line(points.map((_, i) => i));
+  const [x, y] = kind === "angle" ? at[Math.min(1, at.length - 1)] as [number, number] : kind === "box" ? [Math.max(...at.map(p => p[0])), Math.min(...at.map(p => p[1]))] : at[at.length - 1] as [number, number];
+  const fits = x + 8 + LETTER * label.length < width;
+  return svg("g", { class: `measure${beside ? " beside" : ""}` }, svg("path", { d: path, class: "halo" }), svg("path", { d: path }),
+    ...(kind === "box" ? [] : at.map(([cx, cy]) => svg("circle", { cx, cy, r: 3 }))), ...(beside ? [] : [svg("text", { x: fits ? x + 8 : x - 8, y: y - 6, "text-anchor": fits ? "start" : "end" }, label)]));
+}
+
+const LEGEND_ROW = 18, LEGEND_MOST = 14;
+
+function legendOf(labels: readonly LegendEntry[], width: number, height: number): SVGElement {
+  const room = Math.max(1, Math.min(LEGEND_MOST, Math.floor((height - 120) / LEGEND_ROW)));
+  const rows = labels.length > room ? labels.slice(0, room - 1) : labels, left = width - 16;
+  const line = (i: number, name: string, color: string): SVGElement => svg("g", {},
+    ...(color ? [svg("rect", { x: left - 10, y: 16 + i * LEGEND_ROW, width: 10, height: 10, rx: 2, fill: color })] : []), svg("text", { x: left - 16, y: 25 + i * LEGEND_ROW, "text-anchor": "end" }, name));
+  return svg("g", { class: "label-legend" }, ...rows.map(({ name, color }, i) => line(i, name.length > 28 ? `${name.slice(0, 27)}…` : name, color)),
+    ...(rows.length < labels.length ? [line(rows.length, `and ${labels.length - rows.length} more`, "")] : []));
+}
+
+export interface LegendEntry { name: string; color: string }
 interface Crosshair { at: Vec3; lines: boolean }
-export interface Annotations { marker: boolean; scaleBar: boolean; sides: boolean; crosshair: Crosshair | null }
+export interface Annotations {
+  marker: boolean; scaleBar: boolean; sides: boolean; crosshair: Crosshair | null; measures: readonly DrawnMeasure[]; legend: readonly LegendEntry[];
+  slice?: Cut; // measurements beside it are faint
+}
 
 // Lies over a pane. While a view turns, most of it stays; only the parts that change are made anew.
 export class Drawing {
@@ -87,6 +126,9 @@ export class Drawing {
     const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown), { right, up, forward, world, pixel_size, projection, unit } = geometry;
     put(this.element, "viewBox", `0 0 ${width} ${height}`);
     this.part("crosshair", which.crosshair && [project(geometry, width, height, which.crosshair.at), which.crosshair.lines, width, height], () => crosshair(geometry, width, height, which.crosshair as Crosshair));
+    const placed = which.measures.length > 0 && which.measures.map(each => [each, each.measure.points.map(p => project(geometry, width, height, p))]);
+    this.part("measures", placed && [placed, which.slice], () => svg("g", {}, ...which.measures.map(each => drawnMeasure(geometry, width, height, each, which.slice))));
+    this.part("legend", which.legend.length > 0 && width > 320 && [which.legend, width, height], () => legendOf(which.legend, width, height));
     this.part("sides", which.sides && world === "patient" && [sideNames(geometry), width, height], () => patientSides(geometry, width, height));
     this.part("axes", which.marker && height > 160 && [right, up, forward, world, height], () => axesMarker(geometry, height));
     this.part("scale", which.scaleBar && width > 160 && [pixel_size, projection, unit, width, height], () => scaleBar(geometry, width, height));

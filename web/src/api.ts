@@ -1,4 +1,5 @@
 // Requests to the gateway, relative to the page's address, so that it works below any path.
+import type { BoxStatistics, Profile } from "./measure";
 import type { Options } from "./options";
 import type { Vec3 } from "./vec";
 
@@ -49,6 +50,8 @@ export class Api {
   transfer = (dataset: string, transfer: string): Promise<unknown> => this.maybe("transfer", { dataset, transfer });
   labels = (dataset: string): Promise<{ labels: LabelName[] } | null> => this.maybe("labels", { dataset });
   value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);
+  profile = (dataset: string, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { dataset, from: from.join(","), to: to.join(",") });
+  statistics = (dataset: string, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { dataset, box });
   pick = (options: Options, x: number, y: number, signal?: AbortSignal): Promise<Value | null> => this.maybe("pick", {}, { ...options, x, y }, signal);
 
   private async maybe<T>(path: string, fields: Record<string, string>, body?: Options, signal?: AbortSignal): Promise<T | null> {

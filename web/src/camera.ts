@@ -20,6 +20,11 @@ export const OTHER_SIDES: readonly Side[] = [
 ];
 export const sidesOf = (world: string | undefined): readonly Side[] => (world === "patient" ? PATIENT_SIDES : OTHER_SIDES);
 
+// Where a view begins: at a patient's front, else a little beside and above the back, so that three sides show.
+type Start = Pick<State, "azimuth" | "elevation">;
+export const PATIENT_START: Start = { azimuth: 180, elevation: 0 };
+export const startOf = (world: string): Start => (world === "patient" ? PATIENT_START : { azimuth: 150, elevation: 15 });
+
 type View = Pick<State, "azimuth" | "elevation" | "roll" | "zoom" | "lookAt">;
 
 // Directions of the world to the right, upwards and away from the viewer.
@@ -31,7 +36,8 @@ export function axesOf({ azimuth, elevation, roll }: View): { right: Vec3; up: V
   return { right: add(scale(right, Math.cos(r)), scale(up, Math.sin(r))), up: sub(scale(up, Math.cos(r)), scale(right, Math.sin(r))), forward };
 }
 
-const angle = (degrees: number): number => rounded(((((degrees + 180) % 360) + 360) % 360) - 180, 6);
+// In (-180, 180].
+const angle = (degrees: number): number => rounded(180 - ((((180 - degrees) % 360) + 360) % 360), 6);
 
 // Turns by degrees to the right and upwards in the picture, for any roll.
 export function orbited(view: View, rightwards: number, upwards: number): Partial<State> {

@@ -2,6 +2,7 @@
 import { pageGeometry } from "./annotations";
 import { project } from "./camera";
 import { put, svg } from "./dom";
+import { BOX_EDGES } from "./measure";
 import type { Shown } from "./pane";
 import type { Bounds, ClipBox } from "./state";
 import { AXES, type Axis, AXIS_NAMES, clamp, rounded, scale, add, type Vec3, withAxis } from "./vec";
@@ -24,8 +25,6 @@ export function boxWith(box: ClipBox, volume: Volume, axis: Axis, end: 0 | 1, va
   bounds[end] = atSide ? null : rounded(limited);
   return box.map((old, i) => (i === axis ? bounds : old)) as unknown as readonly [Bounds, Bounds, Bounds];
 }
-
-const EDGES = [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]] as const;
 
 export class ClipHandles {
   readonly element = svg("svg", { class: "tools" });
@@ -63,7 +62,7 @@ export class ClipHandles {
     const [low, high] = cornersOf(box, volume);
     const at = (p: Vec3): [number, number] => project(geometry, width, height, p);
     const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(i => at([i & 1 ? high[0] : low[0], i & 2 ? high[1] : low[1], i & 4 ? high[2] : low[2]]));
-    this.edges.setAttribute("d", EDGES.map(([a, b]) => `M${(corners[a] as number[]).join(" ")}L${(corners[b] as number[]).join(" ")}`).join(""));
+    this.edges.setAttribute("d", BOX_EDGES.map(([a, b]) => `M${(corners[a] as number[]).join(" ")}L${(corners[b] as number[]).join(" ")}`).join(""));
     const middle = scale(add(low, high), 0.5);
     for (const axis of AXES) for (const end of [0, 1] as const) {
       const handle = this.handles[2 * axis + end] as SVGCircleElement, value = (end === 0 ? low : high)[axis];

@@ -10,7 +10,7 @@ import { unitName } from "./volume";
 
 const MOST_PLANES = 6;
 
-export function clipSection(context: Context): HTMLElement {
+export function clipSection(context: Context): HTMLDetailsElement {
   const { store } = context;
   const on = toggle("Box", enabled => store.update({ clipBox: enabled ? wholeBox : null }, "box"));
   const fields = AXES.map(axis => ([0, 1] as const).map(end => numberField(`${AXIS_NAMES[axis]} ${end === 0 ? "from" : "to"}`, value => {

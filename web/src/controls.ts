@@ -51,6 +51,22 @@ export function numberField(label: string, change: (value: number) => void, step
   return { element: input, input, set: value => { if (document.activeElement !== input || input.valueAsNumber !== value) input.value = String(rounded(value, 5)); } };
 }
 
+// The same, and null while it is empty.
+export function optionalField(label: string, change: (value: number | null) => void): Control<number | null> & { input: HTMLInputElement } {
+  const field = numberField(label, change);
+  field.input.placeholder = "Automatic";
+  field.input.addEventListener("change", () => { if (field.input.value === "") change(null); });
+  return { ...field, set: value => { if (value !== null) field.set(value); else if (document.activeElement !== field.input) field.input.value = ""; } };
+}
+
+// A number that may be left out; then the field shows what it is without.
+export function parameterField(label: string, standard: string, [low, high]: readonly [number, number], change: (value: string) => void): Control<string> {
+  const id = newId();
+  const bound = (x: number): number | null => (Number.isFinite(x) ? x : null);
+  const input: HTMLInputElement = h("input", { type: "number", id, step: "any", placeholder: standard || " ", min: bound(low), max: bound(high), inputmode: "decimal", onchange: () => { if (input.checkValidity()) change(input.value); } });
+  return { element: row(label, input, id), set: value => { if (document.activeElement !== input || value === "") input.value = value; } };
+}
+
 export function textField(label: string, hint: string, pattern: string, change: (value: string) => void): Control<string> {
   const id = newId();
   const input: HTMLInputElement = h("input", { type: "text", id, placeholder: hint, pattern, spellcheck: "false", autocomplete: "off", onchange: () => { if (input.checkValidity()) change(input.value.trim()); } });
@@ -70,6 +86,11 @@ export function toggle(label: string, change: (on: boolean) => void): Control<bo
 
 export function section(title: string, open: boolean, ...content: HTMLElement[]): HTMLDetailsElement {
   return h("details", { class: "section", open }, h("summary", {}, h("h2", {}, title)), h("div", { class: "section-body" }, ...content));
+}
+
+export function openSection(element: HTMLDetailsElement): void {
+  element.open = true;
+  element.scrollIntoView({ block: "nearest" });
 }
 
 // A menu below a button. It closes with Escape, by a choice, and when the focus goes elsewhere.

@@ -1,9 +1,10 @@
 // Windows over the page: help, the picture as a file, the command, the token.
 import type { Api } from "./api";
-import { button, iconButton, toggle } from "./controls";
+import { button, choice, iconButton, toggle } from "./controls";
 import { copyText, download, h } from "./dom";
 import type { KeyGroup } from "./keys";
-import { type Options, renderOptions } from "./options";
+import { renderOptions } from "./options";
+import { type Part, pictureFile } from "./saving";
 import type { State } from "./state";
 
 export function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLDialogElement {
@@ -38,22 +39,27 @@ export function tokenDialog(reason: string, use: (token: string) => void): void 
 
 const SIZES: readonly (readonly [string, number, number])[] = [["Square", 1024, 1024], ["Full HD", 1920, 1080], ["4K", 3840, 2160]];
 
-export function screenshotDialog(state: State, api: Api, width: number, height: number): void {
+// `parts`: of the panes, the 3-D picture first.
+export function screenshotDialog(state: State, api: Api, parts: readonly Part[], width: number, height: number, paneSize: readonly [number, number]): void {
   const field = (label: string, value: number): HTMLInputElement => h("input", { type: "number", min: 16, max: 8192, step: 1, required: true, value, "aria-label": label });
-  const w = field("Width in pixels", width), t = field("Height in pixels", height);
-  let transparent = false, annotated = state.scaleBar;
-  const clear = toggle("Transparent background", on => { transparent = on; }), notes = toggle("Scale bar and orientation", on => { annotated = on; });
-  notes.set(annotated);
+  const w = field("Width in pixels", paneSize[0]), t = field("Height in pixels", paneSize[1]);
+  let transparent = false, marked = state.scaleBar, chosen: readonly Part[] = parts.slice(0, 1), name = "";
+  const shownSize = (): readonly [number, number] => (chosen.length > 1 ? [width, height] : paneSize);
+  const setSize = (x: number, y: number): void => { w.value = String(x); t.value = String(y); };
+  const what = choice("Picture", [...parts.map(part => [part.name, part.title] as const), ["all", "All panes"]], value => {
+    name = value === parts[0]?.name ? "" : `-${value}`;
+    chosen = value === "all" ? parts : parts.filter(part => part.name === value);
+    setSize(...shownSize());
+  });
+  const clear = toggle("Transparent background", on => { transparent = on; }), notes = toggle("Scale bar, sides, measurements and legend", on => { marked = on; });
+  notes.set(marked);
   const status = h("p", { role: "status", class: "hint" });
   const save = h("button", { type: "submit", class: "button primary" }, "Save PNG");
   const shoot = async (): Promise<void> => {
-    const options: Options = { ...renderOptions(state), size: `${w.value}x${t.value}` };
-    if (transparent) delete options["background"];
-    if (annotated) Object.assign(options, { "scale-bar": true, "orientation-marker": true });
     save.disabled = true;
     status.textContent = "Rendering…";
     try {
-      download(`${state.dataset}-${w.value}x${t.value}.png`, await api.picture(options));
+      download(`${state.dataset}${name}-${w.value}x${t.value}.png`, await pictureFile(api, chosen, { width: Number(w.value), height: Number(t.value), marked, transparent }));
       status.textContent = "Saved.";
     } catch (error) {
       status.textContent = error instanceof Error ? error.message : String(error);
@@ -61,9 +67,9 @@ export function screenshotDialog(state: State, api: Api, width: number, height: 
     save.disabled = false;
   };
   const form = h("form", { onsubmit: (event: Event) => { event.preventDefault(); void shoot(); } },
-    h("p", { class: "hint" }, "The service renders the picture again, at any size, lossless."),
+    h("p", { class: "hint" }, "The service renders the picture again, at any size, lossless."), ...(parts.length > 1 ? [what.element] : []),
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
-    h("div", { class: "button-row" }, button("As shown", null, () => { w.value = String(width); t.value = String(height); }, "quiet"), ...SIZES.map(([name, x, y]) => button(name, null, () => { w.value = String(x); t.value = String(y); }, "quiet"))),
+    h("div", { class: "button-row" }, button("As shown", null, () => setSize(...shownSize()), "quiet"), ...SIZES.map(([size, x, y]) => button(size, null, () => setSize(x, y), "quiet"))),
     clear.element, notes.element, status, h("div", { class: "dialog-actions" }, save));
   dialog("Picture", form);
 }

@@ -11,11 +11,14 @@ export interface GestureTarget {
   hover(x: number, y: number): void;
   leave(): void;
   place(x: number, y: number): void; // a double click
+  click(x: number, y: number): void; // pressed and let go in one place
 }
 
 const DEGREES_A_PIXEL = 0.4;
 const ZOOM_A_WHEEL_PIXEL = 0.0015;
 const MOST_WHEEL_PIXELS = 240;
+
+const CLICK_PIXELS = 4;
 
 type Drag = "orbit" | "pan" | "roll" | "window";
 
@@ -28,6 +31,7 @@ function dragOf(event: PointerEvent): Drag {
 export function listenToGestures(canvas: HTMLCanvasElement, target: GestureTarget): void {
   const pointers = new Map<number, { x: number; y: number }>();
   let drag: Drag = "orbit";
+  let pressed: { x: number; y: number } | null = null; // null: what goes on is no click
 
   const fromCentre = (x: number, y: number): [number, number] => {
     const box = canvas.getBoundingClientRect();
@@ -64,6 +68,7 @@ export function listenToGestures(canvas: HTMLCanvasElement, target: GestureTarge
     canvas.focus({ preventScroll: true });
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+    pressed = pointers.size === 1 && event.button === 0 ? { x: event.clientX, y: event.clientY } : null;
     drag = dragOf(event);
     canvas.dataset["drag"] = drag;
     event.preventDefault();
@@ -75,6 +80,7 @@ export function listenToGestures(canvas: HTMLCanvasElement, target: GestureTarge
       return;
     }
     const now = { x: event.clientX, y: event.clientY };
+    if (pressed && Math.hypot(now.x - pressed.x, now.y - pressed.y) > CLICK_PIXELS) pressed = null;
     if (pointers.size === 1) one(before, event);
     else if (pointers.size === 2) two(event.pointerId, before, event);
     pointers.set(event.pointerId, now);
@@ -83,7 +89,11 @@ export function listenToGestures(canvas: HTMLCanvasElement, target: GestureTarge
     pointers.delete(event.pointerId);
     if (pointers.size === 0) delete canvas.dataset["drag"];
   };
-  canvas.addEventListener("pointerup", up);
+  canvas.addEventListener("pointerup", event => {
+    if (pressed && pointers.has(event.pointerId)) target.click(event.offsetX, event.offsetY);
+    pressed = null;
+    up(event);
+  });
   canvas.addEventListener("pointercancel", up);
   canvas.addEventListener("pointerleave", () => target.leave());
   canvas.addEventListener("contextmenu", event => event.preventDefault());

@@ -4,6 +4,7 @@ import { iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
 import { can, rendererThatCan } from "./offers";
 import { Scale } from "./plot";
+import { editPoints } from "./point_gestures";
 import { LOOK, type SlopePoint } from "./state";
 import { clamp, rounded } from "./vec";
 import { unitName } from "./volume";
@@ -27,7 +28,6 @@ export class GradientEditor {
   private readonly body: HTMLElement;
   private selected = 0;
   private width = 280;
-  private dragging = false;
 
   constructor(private readonly context: Context) {
     this.plot.append(this.area, this.curve, this.ticks, this.points);
@@ -36,11 +36,10 @@ export class GradientEditor {
         h("div", { class: "tools-row" }, iconButton("Add a point to the gradient", "add", () => this.add(), "Insert"), this.removeButton)));
     this.element = h("div", { class: "editor by-gradient" }, this.on.element, this.hint, this.body);
     new ResizeObserver(entries => { const wide = Math.round(entries[0]?.contentRect.width ?? 0); if (wide > 0) { this.width = Math.max(120, wide); this.refresh(); } }).observe(this.plot.parentElement as HTMLElement);
-    this.plot.addEventListener("pointerdown", event => this.press(event));
-    this.plot.addEventListener("pointermove", event => { if (this.dragging) this.moveTo(...this.at(event)); });
-    for (const end of ["pointerup", "pointercancel"]) this.plot.addEventListener(end, () => { this.dragging = false; });
-    this.plot.addEventListener("contextmenu", event => event.preventDefault());
-    this.plot.addEventListener("keydown", event => this.key(event));
+    editPoints(this.plot, {
+      choose: circle => this.choose(Number(circle.dataset["index"])), insertAt: event => this.insert(...this.at(event)), dragTo: event => this.moveTo(...this.at(event)),
+      step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
+    });
     context.onVolume(() => this.refresh());
     context.store.subscribe(() => this.refresh(), LOOK);
     this.refresh();
@@ -138,33 +137,9 @@ export class GradientEditor {
     return [scale.value(((event.clientX - box.left) * this.width) / box.width), scale.opacity(event.clientY - box.top)];
   }
 
-  private press(event: PointerEvent): void {
-    const hit = event.target instanceof SVGElement && event.target.dataset["index"] ? event.target : null;
-    if (hit) {
-      this.choose(Number(hit.dataset["index"]));
-      hit.focus();
-      if (event.button === 2) return this.remove();
-    } else if (event.button === 0) {
-      this.insert(...this.at(event));
-      this.points.querySelector<SVGElement>(".selected")?.focus();
-    }
-    if (event.button !== 0) return;
-    this.dragging = true;
-    this.plot.setPointerCapture(event.pointerId);
-    event.preventDefault();
-  }
-
-  private key(event: KeyboardEvent): void {
-    const point = this.list[this.selected], far = event.shiftKey ? 10 : 1, step = (this.scale().domain[1] / KEY_STEPS) * far;
-    if (!point) return;
-    if (event.key === "ArrowLeft") this.moveTo(point.slope - step, null);
-    else if (event.key === "ArrowRight") this.moveTo(point.slope + step, null);
-    else if (event.key === "ArrowUp") this.moveTo(null, rounded(point.opacity + 0.01 * far, 3));
-    else if (event.key === "ArrowDown") this.moveTo(null, rounded(point.opacity - 0.01 * far, 3));
-    else if (event.key === "Delete" || event.key === "Backspace") this.remove();
-    else if (event.key === "Insert") this.add();
-    else return;
-    event.preventDefault();
-    event.stopPropagation();
+  private step(right: number, up: number): void {
+    const point = this.list[this.selected];
+    if (right !== 0 && point) this.moveTo(point.slope + (right * this.scale().domain[1]) / KEY_STEPS, null);
+    if (up !== 0 && point) this.moveTo(null, rounded(point.opacity + 0.01 * up, 3));
   }
 }

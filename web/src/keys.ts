@@ -4,9 +4,13 @@ import { put } from "./dom";
 export interface Key { keys: readonly string[]; label: string; does: string; run: (far: boolean, at: number) => void }
 export interface KeyGroup { title: string; keys: readonly Key[] }
 
-// Letters act while a picture has the focus, or nothing has; in fields they are text.
-function isForPictures(target: EventTarget | null): boolean {
-  return target === document.body || (target instanceof HTMLElement && target.closest(".pane") !== null && !target.closest("dialog"));
+const TEXT_FIELDS = "input[type=text], input[type=number], textarea";
+// Controls that arrows change.
+const ARROW_CONTROLS = "input[type=range], input[type=radio], select, [role=menuitem]";
+
+// Keys act wherever the focus is, but in text fields, where they are text, and while a dialog is open. A control keeps the arrows that change it.
+function actsOn(target: EventTarget | null, key: string): boolean {
+  return target instanceof Element && !document.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS));
 }
 
 export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo: () => void): void {
@@ -14,12 +18,12 @@ export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo
   document.addEventListener("keydown", () => put(document.body, "data-keys", "used"), true);
   document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
   document.addEventListener("keydown", event => {
-    const field = event.target instanceof HTMLElement && event.target.matches("input[type=text], input[type=number], textarea");
+    const field = event.target instanceof HTMLElement && event.target.matches(TEXT_FIELDS);
     if ((event.ctrlKey || event.metaKey) && !field && /^[zy]$/i.test(event.key)) {
       event.preventDefault();
       return event.key.toLowerCase() === "y" || event.shiftKey ? redo() : undo();
     }
-    if (event.ctrlKey || event.metaKey || event.altKey || !isForPictures(event.target)) return;
+    if (event.ctrlKey || event.metaKey || event.altKey || !actsOn(event.target, event.key)) return;
     const key = groups.flatMap(group => group.keys).find(each => each.keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
     if (!key) return;
     event.preventDefault();

@@ -1,6 +1,7 @@
 // The link: the page's whole state behind the address's '#', in the names of the command line where there are such.
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
-import { limitsOf } from "./offers";
+import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
+import { limitsOf, parametersIn } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -85,46 +86,59 @@ const opacities: Field<Readonly<Record<string, number>>> = {
   },
 };
 
+const measures: Field<readonly Measure[]> = {
+  name: "measure", write: value => value.map(({ kind, points }) => [kind, ...points.map(p => p.join(","))].join(":")).join(";"),
+  read: value => {
+    const read = list(value, ";", (item): Measure | undefined => {
+      const [name, ...texts] = item.split(":"), kind = MEASURE_KINDS.find(each => each.kind === name), points = texts.map(each => numbers(each, 3));
+      return kind && points.length === kind.points && points.every(p => p !== undefined) ? { kind: kind.kind, points: points as unknown as Vec3[] } : undefined;
+    });
+    return read && read.length <= MOST_MEASURES ? read : undefined;
+  },
+};
+
 const NAME = /^[a-z][a-z-]{0,40}$/;
-const FIELDS: { [K in keyof State]: Field<State[K]> } = {
+type Named = Omit<State, "parameters">; // whose own names are those of their fields
+const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   dataset: text("dataset", /^.{0,256}$/),
   azimuth: real("azimuth"), elevation: real("elevation"), roll: real("roll"),
   zoom: real("zoom"), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
-  renderer: text("renderer", NAME), samplingRate: real("sampling-rate"), projectionMode: text("projection-mode", NAME),
+  renderer: text("renderer", NAME), 
   shading: text("shading", NAME), lights: many<Vec3>("light", 3), background: text("background", COLOR),
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),
   labels: oneOf("label-mode", "off", "tint", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^[\d,-]*$/), labelOpacities: opacities,
-  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
+  overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
-  marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
+  measures, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
 };
 
 // Spaces and most marks are legible as they are in a fragment.
 const escaped = (value: string): string => encodeURIComponent(value).replace(/%2C/g, ",").replace(/%3A/g, ":").replace(/%3B/g, ";").replace(/%23/g, "%23").replace(/%7C/g, "|");
 
-// Only what differs from the page's first state.
+// Only what differs from the page's first state, and the direction of the view, whose first one depends on the dataset.
 export function fragmentOf(state: State): string {
   const parts: string[] = [];
-  const add = <K extends keyof State>(key: K): void => {
+  const add = <K extends keyof Named>(key: K): void => {
     const value = FIELDS[key].write(state[key]);
-    if (value !== FIELDS[key].write(INITIAL[key])) parts.push(`${FIELDS[key].name}=${escaped(value)}`);
+    if (key === "azimuth" || key === "elevation" || value !== FIELDS[key].write(INITIAL[key])) parts.push(`${FIELDS[key].name}=${escaped(value)}`);
   };
-  (Object.keys(FIELDS) as (keyof State)[]).forEach(add);
+  (Object.keys(FIELDS) as (keyof Named)[]).forEach(add);
+  for (const [name, value] of Object.entries(state.parameters)) parts.push(`${name}=${value}`);
   return parts.join("&");
 }
 
 // What is wrong or missing has its first value.
 export function stateOf(fragment: string): State {
   const given = new URLSearchParams(fragment.replace(/\+/g, "%2B"));
-  const state: State = { ...INITIAL };
-  const take = <K extends keyof State>(key: K): void => {
+  const state: State = { ...INITIAL, parameters: parametersIn(given) };
+  const take = <K extends keyof Named>(key: K): void => {
     const value = given.get(FIELDS[key].name);
     const read = value === null ? undefined : FIELDS[key].read(value);
     if (read !== undefined) state[key] = read;
   };
-  (Object.keys(FIELDS) as (keyof State)[]).forEach(take);
+  (Object.keys(FIELDS) as (keyof Named)[]).forEach(take);
   return state;
 }
 

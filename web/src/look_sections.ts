@@ -1,13 +1,11 @@
-// Sections of the panel: renderer, isosurfaces, light and background, layers.
-import type { LabelName } from "./api";
+// Sections of the panel: renderer, isosurfaces, light and background.
 import { axesOf } from "./camera";
 import type { Context } from "./context";
-import { button, choice, colorField, iconButton, numberField, row, section, segmented, slider, textField, toggle } from "./controls";
-import { h, shown } from "./dom";
-import { can, rendererThatCan, renderers, titleOf, titlesThatCan } from "./offers";
+import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, toggle } from "./controls";
+import { h } from "./dom";
+import { can, limitsOf, type Offer, parametersOf, rendererThatCan, renderers, titleOf, titlesThatCan, words } from "./offers";
 import { projectionOf } from "./options";
-import { LOOK, type Surface } from "./state";
-import { PRESETS } from "./transfer_editor";
+import { LOOK, type State, type Store, type Surface } from "./state";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
@@ -18,10 +16,33 @@ function rendererChoices(cells: boolean): (readonly [string, string])[] {
   return [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);
 }
 
+// What the chosen renderer has of its own, as the service describes it.
+function parameterRows(store: Store): { element: HTMLElement; set(state: State): void } {
+  const element = h("div", { class: "list" });
+  let renderer = "", made: { name: string; standard: string; set(value: string): void }[] = [];
+  const make = ({ name, help, unit, choices, default: standard = "" }: Offer): typeof made[number] => {
+    const put = (value: string): void => {
+      const { [name]: _, ...others } = store.state.parameters;
+      store.update({ parameters: value === "" || value === standard ? others : { ...others, [name]: value } }, name);
+    };
+    const label = unit ? `${words(name)}, ${unit}` : words(name);
+    const control = choices ? choice(label, choices.map(each => [each, words(each)] as const), put) : parameterField(label, standard, limitsOf(name), put);
+    control.element.title = help.split("; for --renderer")[0] as string;
+    element.append(control.element);
+    return { name, standard: choices ? standard : "", set: control.set };
+  };
+  return {
+    element,
+    set: state => {
+      if (state.renderer !== renderer) { renderer = state.renderer; element.replaceChildren(); made = parametersOf(renderer).map(make); }
+      for (const { name, standard, set } of made) set(state.parameters[name] ?? standard);
+    },
+  };
+}
+
 export function renderingSection({ store, volume, onVolume }: Context): HTMLElement {
   const renderer = choice("Renderer", rendererChoices(false), value => store.update({ renderer: value }, "renderer"));
-  const mode = choice("Show", [["maximum", "Largest value"], ["minimum", "Least value"], ["mean", "Mean value"]], value => store.update({ projectionMode: value }, "mode"));
-  const sampling = slider("Samples a voxel", 0.5, 4, 0.5, v => shown(v, 2), value => store.update({ samplingRate: value }, "sampling"));
+  const parameters = parameterRows(store);
   const shading = segmented("Shading", [["phong", "Lit"], ["none", "Plain"], ["depth-gradient", "By depth"]], value => store.update({ shading: value }, "shading"));
   const shadingRow = row("Shading", shading.element);
   const projection = segmented("Projection", [["orthographic", "Parallel"], ["perspective", "Perspective"]], value => store.update({ projection: value as "orthographic" }));
@@ -30,21 +51,18 @@ export function renderingSection({ store, volume, onVolume }: Context): HTMLElem
     const { state } = store;
     renderer.fill(rendererChoices((volume()?.cells ?? 0) > 0 || can("cells", state.renderer)));
     renderer.set(state.renderer);
-    mode.set(state.projectionMode);
-    sampling.set(state.samplingRate);
+    parameters.set(state);
     shading.set(state.shading);
     shading.enable("depth-gradient", can("depth-shading", state.renderer));
     projection.set(projectionOf(state));
     projection.enable("perspective", can("perspective", state.renderer));
     background.set(state.background);
-    mode.element.hidden = !can("projection-mode", state.renderer);
-    sampling.element.hidden = !can("sampling-rate", state.renderer);
     shadingRow.hidden = !can("lights", state.renderer);
   };
   store.subscribe(update, [...LOOK, "projection"]);
   onVolume(update);
   update();
-  return section("Rendering", true, renderer.element, mode.element, sampling.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
+  return section("Rendering", true, renderer.element, parameters.element, shadingRow, row("Projection", projection.element), row("Background", background.element));
 }
 
 // Rows of a list in the state, made anew only when their number changes, so that the focus stays.
@@ -88,7 +106,7 @@ export function surfacesSection(context: Context): HTMLElement {
   }, "quiet");
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Value"), h("span", {}, "Colour"), h("span", {}, "Opacity"));
   const alone = toggle("Surfaces alone", on => store.update({ surfacesAlone: on }, "alone"));
-  const hint = h("p", { class: "hint" }, "Shown by ray casting and the Z-buffer.");
+  const hint = h("p", { class: "hint" }, `Shown by: ${titlesThatCan("isosurfaces")}.`);
   const update = (): void => {
     const { surfaces, surfacesAlone, renderer } = store.state;
     list.set(surfaces);
@@ -128,8 +146,10 @@ export function lightSection(context: Context): HTMLElement {
   const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay in place when the volume turns; they start at one side of the present view.");
   const adders = h("div", { class: "button-row" }, button("Left", "add", () => at(-50, 35), "quiet"), button("Above", "add", () => at(0, 70), "quiet"), button("Right", "add", () => at(50, 35), "quiet"));
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Towards x"), h("span", {}, "y"), h("span", {}, "z"));
+  const element = section("Light", false, hint, head, list.element, adders);
   const update = (): void => {
-    const { lights } = store.state;
+    const { lights, renderer } = store.state;
+    element.hidden = !can("lights", renderer);
     list.set(lights);
     head.hidden = lights.length === 0;
     hint.hidden = lights.length > 0;
@@ -137,91 +157,5 @@ export function lightSection(context: Context): HTMLElement {
   };
   store.subscribe(update, LOOK);
   update();
-  return section("Light", false, hint, head, list.element, adders);
-}
-
-// ---- labels and the overlay
-
-// "1,5-9" as a set; empty text: all.
-const isShown = (shownText: string, label: number): boolean => shownText === "" || shownText.split(",").some(part => { const [first, last] = part.split("-").map(Number); return label >= (first ?? 0) && label <= (last ?? first ?? 0); });
-
-export class LabelsSection {
-  readonly element: HTMLElement;
-  private names: LabelName[] = []; // all of the dataset if the gateway tells them, else those that were pointed at
-  private readonly list = h("div", { class: "labels", role: "group", "aria-label": "Labels" });
-
-  constructor(private readonly context: Context) {
-    const { store } = context;
-    const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
-    const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
-    const which = textField("Shown", "all, or 1,5-9", "[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*", value => store.update({ labelsShown: value }, "labels shown"));
-    const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: rendererThatCan("overlay") } : {}) }, "overlay"));
-    const overlayPreset = choice("Overlay’s function", PRESETS.map(name => [name, name] as const), value => store.update({ overlayPreset: value }, "overlay preset"));
-    const weight = slider("Weight", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ overlayWeight: value }, "weight"));
-    const hint = h("p", { class: "hint" });
-    this.element = section("Layers", false, row("Labels", mode.element), tint.element, which.element, hint, this.list, overlay.element, overlayPreset.element, weight.element);
-    const update = (): void => {
-      const { state } = store, volume = context.volume(), labels = (volume?.labels ?? 0) > 0, on = labels && state.labels !== "off";
-      this.element.hidden = !labels && !volume?.overlay;
-      mode.set(state.labels);
-      tint.set(state.labelTint);
-      which.set(state.labelsShown);
-      overlay.set(state.overlay);
-      overlayPreset.set(state.overlayPreset);
-      weight.set(state.overlayWeight);
-      (mode.element.parentElement as HTMLElement).hidden = !labels;
-      tint.element.hidden = !labels || state.labels !== "tint";
-      which.element.hidden = this.list.hidden = !on;
-      hint.hidden = !on || (can("labels", state.renderer) && this.names.length > 0);
-      hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;
-      overlay.element.hidden = !volume?.overlay;
-      overlayPreset.element.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
-      this.refresh();
-    };
-    store.subscribe(update, LOOK);
-    context.onVolume(volume => {
-      this.names = [];
-      this.list.replaceChildren();
-      update();
-      if (volume && volume.labels > 0) context.api.labels(volume.name).then(answer => { this.names = answer?.labels ?? []; update(); }).catch(() => undefined);
-    });
-    update();
-  }
-
-  // A label that was pointed at.
-  note(label: LabelName): void {
-    if (this.names.some(known => known.value === label.value)) return;
-    this.names = [...this.names, label].sort((a, b) => a.value - b.value);
-    this.refresh();
-  }
-
-  private refresh(): void {
-    const { store } = this.context, { labelsShown, labelOpacities } = store.state;
-    if (this.list.childElementCount !== this.names.length) {
-      this.list.replaceChildren(...this.names.map(label => {
-        const name = label.name || `Label ${label.value}`;
-        const box: HTMLInputElement = h("input", { type: "checkbox", "aria-label": `Show ${name}`, onchange: () => this.setShown(label.value, box.checked) });
-        const opacity: HTMLInputElement = h("input", { type: "range", min: 0, max: 1, step: 0.05, "aria-label": `Opacity of ${name}`, oninput: () => store.update({ labelOpacities: { ...store.state.labelOpacities, [label.value]: rounded(Number(opacity.value)) } }, `opacity ${label.value}`) });
-        const only = h("button", { type: "button", class: "only", "aria-label": `Show only ${name}`, onclick: () => store.update({ labelsShown: store.state.labelsShown === String(label.value) ? "" : String(label.value) }, "only") }, "only");
-        const swatch = h("span", { class: "swatch", "aria-hidden": "true" });
-        if (label.color) swatch.style.background = label.color;
-        return h("div", { class: "label-row", "data-label": label.value }, box, swatch, h("span", { class: "label-name", title: name }, name), only, opacity);
-      }));
-    }
-    this.names.forEach((label, i) => {
-      const [box, opacity] = (this.list.children[i] as HTMLElement).querySelectorAll("input");
-      if (box) box.checked = isShown(labelsShown, label.value) && labelOpacities[label.value] !== 0;
-      if (opacity) opacity.value = String(labelOpacities[label.value] ?? 1);
-    });
-  }
-
-  // The opacity 0 hides one of all labels; a list of what is shown is changed as such.
-  private setShown(label: number, on: boolean): void {
-    const { store } = this.context, { labelsShown, labelOpacities } = store.state;
-    if (labelsShown === "" || isShown(labelsShown, label)) {
-      const rest = Object.fromEntries(Object.entries(labelOpacities).filter(([key]) => key !== String(label)));
-      return store.update({ labelOpacities: on ? rest : { ...rest, [label]: 0 } }, "label");
-    }
-    store.update({ labelsShown: labelsShown ? `${labelsShown},${label}` : "" }, "label");
-  }
+  return element;
 }

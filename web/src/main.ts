@@ -1,25 +1,31 @@
 // The page: makes the parts and connects them.
 import { Api, type Dataset } from "./api";
-import { orbited, panned, rolled, sidesOf, zoomed } from "./camera";
+import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
+import { wholeBox } from "./clip_handles";
 import { clipSection } from "./clip_section";
 import type { Context } from "./context";
-import { section } from "./controls";
+import { openSection, section } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
 import { GradientEditor } from "./gradient_editor";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
-import { LabelsSection, lightSection, renderingSection, surfacesSection } from "./look_sections";
+import { Labels } from "./labels";
+import { layersSection } from "./layers_section";
+import { lightSection, renderingSection, surfacesSection } from "./look_sections";
 import { Machine } from "./machine";
+import { MEASURE_KINDS, type MeasureKind } from "./measure";
+import { measureSection } from "./measure_section";
+import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { loadOffers, renderers } from "./offers";
+import { can, loadOffers, renderers } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
-import { INITIAL, Store } from "./state";
+import { INITIAL, type State, Store } from "./state";
 import { TransferEditor } from "./transfer_editor";
 import { Viewer } from "./viewer";
 import { centreOf, type Volume, volumeOf } from "./volume";
@@ -38,7 +44,11 @@ class Page {
   private readonly pointed: Pointed;
   private readonly viewer: Viewer;
   private readonly slices: Slices;
+  private readonly clipping: HTMLDetailsElement;
+  private readonly measuring: Measuring;
+  private readonly measures: HTMLDetailsElement;
   private volume: Volume | null = null;
+  private starts = !/(^|&)(azimuth|elevation)=/.test(location.hash.slice(1)); // the view has not been chosen yet
   private asking = ""; // the dataset that is being asked about
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
@@ -48,21 +58,29 @@ class Page {
     const { store, notices, api } = this;
     const context: Context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
     const source: FunctionSource = new FunctionSource(context, () => editor.refresh());
-    const labels = new LabelsSection(context);
+    const labels = new Labels(context), layers = layersSection(context, labels);
+    this.measuring = new Measuring(context);
+    this.measures = measureSection(context, this.measuring);
     this.pointed = new Pointed(context, label => labels.note(label));
     this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
     const editor = new TransferEditor(context, source);
-    this.shell.panel.append(section("Transfer function", true, editor.element, new GradientEditor(context).element), slicesSection(context), renderingSection(context), surfacesSection(context), clipSection(context), labels.element, lightSection(context), this.facts());
-    this.viewer = new Viewer(context, source, this.pointed, {
+    this.clipping = clipSection(context);
+    const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element);
+    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, layers, lightSection(context), this.facts());
+    this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
-    this.slices = new Slices(context, this.shell.panes, at => this.pointed.atPoint(at));
+    this.slices = new Slices(context, this.shell.panes, this.measuring, at => this.pointed.atPoint(at));
+    const showFunctions = (): void => { functions.hidden = !can("transfer", store.state.renderer); };
+    store.subscribe(showFunctions, ["renderer"]);
+    showFunctions();
     listenToKeys(this.keyGroups(), () => store.undo(), () => store.redo());
     store.subscribe((state, before) => {
       if (state.dataset !== before.dataset) this.forgetVolume();
+      else if (state.azimuth !== before.azimuth || state.elevation !== before.elevation) this.starts = false;
       this.show();
       clearTimeout(this.addressTimer);
       this.addressTimer = setTimeout(() => showInAddress(store.state, api.token), ADDRESS_MS);
@@ -114,6 +132,7 @@ class Page {
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
       if (!this.volume) return;
+      if (this.starts) this.store.update(startOf(world));
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();
     }).catch((error: unknown) => this.notices.say(error instanceof Error ? error.message : String(error), "error")).finally(() => { this.asking = ""; });
@@ -142,18 +161,39 @@ class Page {
 
   // ---- what can be done
 
-  private sides(): readonly { name: string; azimuth: number; elevation: number }[] { return sidesOf(this.volume?.world ?? this.viewer.pane.shown?.frame.header.geometry.world); }
+  private world(): string | undefined { return this.volume?.world ?? this.viewer.pane.shown?.frame.header.geometry.world; }
+  private sides(): readonly Side[] { return sidesOf(this.world()); }
 
   private view(index: number): void {
     const side = this.sides()[index];
     if (side) this.viewer.move({ azimuth: side.azimuth, elevation: side.elevation, roll: 0 }, performance.now());
   }
 
-  private reset(): void {
-    const { azimuth, elevation, roll, zoom, lookAt } = INITIAL;
-    this.store.update({ azimuth, elevation, roll, zoom, lookAt });
+  // The first view of the dataset: it frames what shows.
+  private start(): Partial<State> {
+    const { roll, zoom, lookAt } = INITIAL;
+    return { ...startOf(this.world() ?? "patient"), roll, zoom, lookAt };
   }
 
+  private reset(): void { this.store.update(this.start()); }
+
+  // Its section opens with the box, and stays as it is when the box goes.
+  private toggleBox(): void {
+    const { store, clipping } = this, on = store.state.clipBox === null;
+    store.update({ clipBox: on ? wholeBox : null }, "box");
+    if (on) openSection(clipping);
+  }
+
+  // A tool to measure with, or none.
+  private measure(tool: MeasureKind | null): void {
+    this.measuring.take(tool);
+    if (this.measuring.tool) openSection(this.measures);
+  }
+
+  private stageSize(): [number, number] {
+    const { clientWidth, clientHeight } = this.shell.panes;
+    return [Math.round(clientWidth * devicePixelRatio), Math.round(clientHeight * devicePixelRatio)];
+  }
   private pictureSize(): [number, number] { return this.viewer.pane.shown?.frame.header.size ?? [1024, 1024]; }
 
   private copyLink(withToken: boolean): void {
@@ -163,13 +203,13 @@ class Page {
   private actions(): ConstructorParameters<typeof Shell>[0] {
     const { store } = this;
     return {
-      dataset: name => store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }),
+      dataset: name => { this.starts = true; store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }); },
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
       panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
       projection: () => store.update({ projection: store.state.projection === "orthographic" ? "perspective" : "orthographic" }),
       copyLink: withToken => this.copyLink(withToken), command: () => void commandDialog(store.state, this.api, ...this.pictureSize(), (message, kind) => this.notices.say(message, kind)),
-      screenshot: () => screenshotDialog(store.state, this.api, ...this.pictureSize()), movie: () => movieDialog(store.state, this.api, ...this.pictureSize()),
+      screenshot: () => screenshotDialog(store.state, this.api, [this.viewer.part(), ...this.slices.parts()], ...this.stageSize(), this.pictureSize()), movie: () => movieDialog(store.state, this.api, ...this.pictureSize(), this.world() === "patient" ? this.start() : null),
     };
   }
 
@@ -194,9 +234,14 @@ class Page {
         { keys: ["["], label: "[", does: "Narrower window", run: (_, at) => viewer.window(-0.1, 0, at) }, { keys: ["]"], label: "]", does: "Wider window", run: (_, at) => viewer.window(0.1, 0, at) },
         { keys: ["{"], label: "{", does: "Darker", run: (_, at) => viewer.window(0, -0.04, at) }, { keys: ["}"], label: "}", does: "Brighter", run: (_, at) => viewer.window(0, 0.04, at) },
       ] },
+      { title: "Measure", keys: [
+        ...MEASURE_KINDS.map(({ kind, name, key }) => ({ keys: [key], label: key.toUpperCase(), does: name, run: () => this.measure(kind) })),
+        { keys: [], label: "Enter", does: "Point at the cross-hair, in a slice", run: () => undefined },
+        { keys: ["Escape"], label: "Esc", does: "Put the tool away", run: () => this.measuring.take(null) },
+      ] },
       { title: "Page", keys: [
         { keys: ["l"], label: "L", does: "Slices beside the picture", run: () => actions.layout(store.state.layout === "single") }, { keys: ["m"], label: "M", does: "Machine panel", run: actions.machine },
-        { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => store.update({ clipBox: store.state.clipBox ? null : [[null, null], [null, null], [null, null]] }, "box") },
+        { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => this.toggleBox() },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
         { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command", run: actions.command },
         { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },

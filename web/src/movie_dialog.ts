@@ -1,9 +1,10 @@
 // The window for a movie of one turn, which the gateway makes while the page reads it.
 import { type Api, ApiError } from "./api";
-import { button } from "./controls";
+import { annotationFields } from "./annotation_fields";
+import { button, row, segmented } from "./controls";
 import { dialog } from "./dialogs";
 import { bytes, copyText, download, h } from "./dom";
-import { renderOptions } from "./options";
+import { type Options, renderOptions } from "./options";
 import type { State } from "./state";
 
 const FRAMES = { usual: 120, most: 1000 } as const, FPS = { usual: 25, most: 120 } as const;
@@ -33,7 +34,8 @@ class FrameCounter {
   }
 }
 
-export function movieDialog(state: State, api: Api, width: number, height: number): void {
+// `front`: where a movie begins unless it is to begin at the present view; null: the dataset has no front.
+export function movieDialog(state: State, api: Api, width: number, height: number, front: Partial<State> | null): void {
   const field = (label: string, value: number, low: number, high: number): HTMLInputElement => h("input", { type: "number", min: low, max: high, step: 1, required: true, value, "aria-label": label });
   const shrink = Math.min(1, Math.sqrt(MOST_PIXELS / (width * height)));
   const w = field("Width in pixels", even(width * shrink), 16, 4096), t = field("Height in pixels", even(height * shrink), 16, 4096);
@@ -47,7 +49,11 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   const cancel = button("Cancel", null, () => running?.abort(), "quiet");
   cancel.hidden = true;
   const length = (): string => `${frames.value} frames, ${Math.round((10 * Number(frames.value)) / Number(fps.value)) / 10} s`;
-  const options = (): Record<string, unknown> => ({ ...renderOptions(state), size: `${w.value}x${t.value}` });
+  const marks = annotationFields(state);
+  let first: State = front ? { ...state, ...front } : state;
+  const start = segmented("Begin", [["front", "At the front"], ["view", "At this view"]], value => { first = value === "front" ? { ...state, ...front } : state; });
+  start.set("front");
+  const options = (): Options => ({ ...renderOptions(first), ...marks.options(), size: `${w.value}x${t.value}` });
 
   // What to do where the gateway cannot: the same by the command line.
   const offerCommand = async (): Promise<void> => {
@@ -86,9 +92,9 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   };
 
   const form = h("form", { onsubmit: (event: Event) => { event.preventDefault(); void make(); } },
-    h("p", { class: "hint" }, "One full turn of this view, as MP4. The service renders each frame."),
+    h("p", { class: "hint" }, "One full turn, as MP4. The service renders each frame."),
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
     h("div", { class: "size-row" }, frames, h("span", {}, "frames,"), fps, h("span", {}, "a second")),
-    bar, status, help, h("div", { class: "dialog-actions" }, cancel, save));
+    ...(front ? [row("Begin", start.element)] : []), ...marks.elements, bar, status, help, h("div", { class: "dialog-actions" }, cancel, save));
   dialog("Movie", form).addEventListener("close", () => running?.abort());
 }

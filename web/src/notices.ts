@@ -7,7 +7,9 @@ const SLOW_MS = 400;
 
 export class Notices {
   readonly banner = h("div", { class: "banner", role: "alert", hidden: true });
-  readonly progress = h("div", { class: "progress", role: "progressbar", "aria-label": "Loading", hidden: true }, h("div", { class: "progress-bar" }));
+  private readonly bar = h("div", { class: "progress-bar" });
+  private readonly doing = h("span", { class: "progress-text" });
+  readonly progress = h("div", { class: "progress", role: "progressbar", "aria-label": "Loading", hidden: true }, h("div", { class: "progress-track" }, this.bar), this.doing);
   readonly messages = h("div", { class: "messages", role: "status", "aria-live": "polite" });
   readonly status = h("output", { class: "status", "aria-live": "off" });
   private connection: Connection = "connecting";
@@ -38,8 +40,9 @@ export class Notices {
   onError(message: string): void { this.error = message; this.setPhase(""); this.draw(); }
 
   onProgress(progress: Progress): void {
-    this.done = progress.group_count > 0 ? progress.groups_done / progress.group_count : 0;
-    this.setPhase(progress.phase === "loading" ? "Loading" : progress.phase === "queued" && progress.queue_position > 0 ? `Waiting, place ${progress.queue_position}` : progress.phase === "running" ? "Rendering" : "");
+    const read = progress.phase === "loading" ? progress.read_percent ?? 0 : 0;
+    this.done = read > 0 ? read / 100 : progress.group_count > 0 ? progress.groups_done / progress.group_count : 0;
+    this.setPhase(progress.phase === "loading" ? (read > 0 ? `Reading, ${read} %` : "Reading") : progress.phase === "queued" && progress.queue_position > 0 ? `Waiting, place ${progress.queue_position}` : progress.phase === "running" ? "Rendering" : "");
     this.draw();
   }
 
@@ -66,7 +69,10 @@ export class Notices {
     put(this.progress, "hidden", !this.lasts || said !== "");
     if (this.lasts) {
       put(this.progress, "data-measured", this.done > 0);
-      (this.progress.firstElementChild as HTMLElement).style.width = this.done > 0 ? `${100 * this.done}%` : "";
+      if (this.done > 0) put(this.progress, "aria-valuenow", String(Math.round(100 * this.done)));
+      else this.progress.removeAttribute("aria-valuenow");
+      putText(this.doing, this.phase.startsWith("Reading") ? this.phase : "");
+      this.bar.style.width = this.done > 0 ? `${100 * this.done}%` : "";
     }
     const workers = this.service?.workers.length ?? 0;
     put(this.status, "data-state", said ? "bad" : this.connection === "open" && this.service ? "good" : "wait");

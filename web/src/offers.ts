@@ -1,16 +1,22 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
 
-interface Offer { name: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; renderers?: Renderer[] }
+export interface Offer {
+  name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; renderers?: Renderer[];
+}
 export interface Renderer { name: string; title: string; abilities: string[]; parameters: string[] }
 
 const offers = new Map<string, Offer>();
+let ofPictures: readonly Offer[] = []; // not of slices
 
 export async function loadOffers(): Promise<void> {
   const response = await fetch("api/v1/options", { cache: "no-store" });
   const { slice, render } = (await response.json()) as { slice: Offer[]; render: Offer[] };
   for (const offer of [...slice, ...render]) offers.set(offer.name, offer);
+  ofPictures = render;
 }
 
+// Options of pictures under a heading that begins so.
+export const offered = (group: string): readonly Offer[] => ofPictures.filter(each => each.group.startsWith(group));
 export const renderers = (): readonly Renderer[] => offers.get("renderer")?.renderers ?? [];
 export const titleOf = ({ title }: Renderer): string => title.charAt(0).toUpperCase() + title.slice(1);
 
@@ -22,10 +28,33 @@ export function limitsOf(name: string): readonly [number, number] {
 
 export const choicesOf = (name: string): readonly string[] => offers.get(name)?.choices ?? [];
 
+// What the service calls something, as the page writes it: "dark-bone" is "Dark bone".
+export function words(name: string): string {
+  const text = name === "auto" ? "automatic" : name.replace(/-/g, " ").replace(/\b(ct|mri)\b/g, short => short.toUpperCase());
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
+// Presets of transfer functions, but for the one that shows nothing.
+export const presetChoices = (): (readonly [string, string])[] =>
+  (offers.get("transfer")?.presets ?? ["auto"]).filter(name => name !== "none").map(name => [name, words(name)] as const);
+
 const has = (what: string, { abilities, parameters }: Renderer): boolean => abilities.includes(what) || parameters.includes(what);
 
 // An ability ("isosurfaces") or a parameter ("sampling-rate") of a renderer; the service refuses the rest.
 export const can = (what: string, renderer: string): boolean => renderers().some(each => each.name === renderer && has(what, each));
+
+// What a renderer has that others do not.
+export const parametersOf = (renderer: string): readonly Offer[] =>
+  (renderers().find(each => each.name === renderer)?.parameters ?? []).flatMap(name => offers.get(name) ?? []);
+const allParameters = (): ReadonlySet<string> => new Set(renderers().flatMap(each => each.parameters));
+// Those among the texts that `given` has under their names, if the service takes them.
+export function parametersIn(given: { get(name: string): string | null }): Record<string, string> {
+  const isTaken = (name: string, value: string): boolean => {
+    const [low, high] = limitsOf(name), choices = choicesOf(name), number = Number(value);
+    return choices.length > 0 ? choices.includes(value) : value.trim() !== "" && number >= low && number <= high;
+  };
+  return Object.fromEntries([...allParameters()].flatMap(name => { const value = given.get(name); return value !== null && isTaken(name, value) ? [[name, value]] : []; }));
+}
 
 // The one with most abilities.
 export function rendererThatCan(what: string): string {

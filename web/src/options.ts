@@ -1,11 +1,13 @@
 // The state as options of the gateway, which are those of the command line.
 import { boxText, slopeText } from "./link";
-import { can } from "./offers";
-import type { State } from "./state";
-import { toParaView } from "./transfer";
+import { can, parametersOf } from "./offers";
+import { ONE_COLOR, type State } from "./state";
+import { rampTo, toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
 
 export type Options = Record<string, unknown>;
+
+const WHOLE_RANGE = "0%:99.9%"; // a few bright voxels darken nothing
 
 function transferOptions(state: State): Options {
   const options: Options = { transfer: state.map ? toParaView(state.map) : state.preset };
@@ -25,8 +27,10 @@ function labelOptions(state: State, opacities: boolean): Options {
 }
 
 function overlayOptions(state: State): Options {
-  const options: Options = { "overlay-transfer": state.overlayPreset, "overlay-weight": state.overlayWeight };
+  const one = state.overlayPreset === ONE_COLOR;
+  const options: Options = { "overlay-transfer": one ? toParaView(rampTo(state.overlayColor)) : state.overlayPreset, "overlay-weight": state.overlayWeight };
   if (state.overlayRange) options["overlay-range"] = state.overlayRange.join(":");
+  else if (one) options["overlay-range"] = WHOLE_RANGE;
   return options;
 }
 
@@ -43,12 +47,11 @@ export function renderOptions(state: State): Options {
   };
   if (state.lookAt) options["look-at"] = state.lookAt.join(",");
   else options["fit"] = true;
-  if (can("sampling-rate", renderer) && state.samplingRate !== 1) options["sampling-rate"] = state.samplingRate;
-  if (can("projection-mode", renderer)) options["projection-mode"] = state.projectionMode;
+  for (const { name } of parametersOf(renderer)) if (state.parameters[name] !== undefined) options[name] = state.parameters[name];
   if (state.lights.length > 0 && can("lights", renderer)) options["light"] = state.lights.map(light => light.join(","));
   const surfaces = can("isosurfaces", renderer) ? state.surfaces : [];
   if (surfaces.length > 0) options["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
-  if (surfaces.length === 0 || !state.surfacesAlone) Object.assign(options, transferOptions(state));
+  if (can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(options, transferOptions(state));
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;

@@ -1,6 +1,6 @@
 // A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
 import { Drawing } from "./annotations";
-import { h } from "./dom";
+import { h, put } from "./dom";
 import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
 
 export interface Shown { frame: Frame; cssWidth: number; cssHeight: number } // cssWidth: what the picture's width is on the page
@@ -42,7 +42,6 @@ export class Pane {
     try { this.watcher.observe(this.element, { box: "device-pixel-content-box" }); } catch { this.watcher.observe(this.element); }
   }
 
-  get pixelRatio(): number { return this.element.clientWidth > 0 ? this.size[0] / this.element.clientWidth : 1; }
   get isVisible(): boolean { return this.size[0] >= LEAST_SIDE && this.size[1] >= LEAST_SIDE; }
 
   // The view without its size, which is the pane's.
@@ -63,8 +62,15 @@ export class Pane {
       return Math.min(exact !== undefined && Math.abs(exact - side) < 2 ? exact : Math.round(side), MOST_SIDE);
     });
     this.size = sides as [number, number];
+    this.markOld();
     if (this.isVisible) this.events.resized?.();
   };
+
+  // Until a picture of the new size comes, the old one keeps its shape.
+  private markOld(): void {
+    const [width, height] = this.size;
+    put(this.canvas, "data-old", Math.abs(width - this.canvas.width) > 1 || Math.abs(height - this.canvas.height) > 1);
+  }
 
   // The canvas keeps its picture until another is there: resizing a canvas clears it.
   private draw(frame: Frame): void {
@@ -73,11 +79,12 @@ export class Pane {
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
     const [r, g, b] = header.background.map(c => Math.round(c * 255));
-    this.context.fillStyle = `rgb(${r} ${g} ${b})`;
+    this.element.style.background = this.context.fillStyle = `rgb(${r} ${g} ${b})`;
     this.context.fillRect(0, 0, width, height);
     const up = 1 / header.scale, [x, y, w, h] = header.bounds;
     if (picture) this.context.drawImage(picture, x * up, y * up, w * up, h * up);
-    this.shown = { frame, cssWidth: width / this.pixelRatio, cssHeight: height / this.pixelRatio };
+    this.markOld();
+    this.shown = { frame, cssWidth: width / devicePixelRatio, cssHeight: height / devicePixelRatio };
     this.events.drawn?.(this.shown);
     // For whoever embeds or measures the page.
     this.canvas.dispatchEvent(new CustomEvent("slabstream:drawn", {

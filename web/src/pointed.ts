@@ -25,10 +25,14 @@ export class Pointed {
   }
 
   // In the 3-D picture it is picked, at a point of the page's pixels.
-  atPixel(pane: Shown | null, x: number, y: number): void {
+  atPixel(pane: Shown | null, x: number, y: number, found: (at: Vec3) => void): void {
     this.cancel();
     if (!pane || !this.context.volume() || this.context.api.lacks("pick")) return;
-    this.later(signal => this.pick(pane, x, y, signal));
+    this.later(async signal => {
+      const value = await this.pick(pane, x, y, signal);
+      if (value?.at && value.hit !== false) found(value.at);
+      return value;
+    });
   }
 
   pick(pane: Shown, x: number, y: number, signal?: AbortSignal): Promise<Value | null> {

@@ -24,7 +24,7 @@ export interface ServiceStatus {
   service: "ready" | "no-workers" | "gone"; reason: string; workers: WorkerStatus[]; workers_lost: number; queued: number; running: number;
   frames_done: number; datasets: { name: string; state: string; error?: string }[];
 }
-export interface Progress { seq: number; phase: "queued" | "loading" | "running"; queue_position: number; groups_done: number; group_count: number; attempt: number; workers: number }
+export interface Progress { seq: number; phase: "queued" | "loading" | "running"; queue_position: number; groups_done: number; group_count: number; attempt: number; workers: number; read_percent?: number }
 
 export interface View { picture: "render" | "slice"; timeline: boolean; options: Options }
 export interface SentView extends View { seq: number; inputAt: number } // inputAt: of the oldest input that it shows, as performance.now()

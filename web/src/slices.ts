@@ -3,19 +3,22 @@ import { pageGeometry } from "./annotations";
 import { unproject } from "./camera";
 import type { Context } from "./context";
 import { h } from "./dom";
+import type { Measuring } from "./measuring";
 import { sliceOptions } from "./options";
 import { Pane, type Shown } from "./pane";
+import type { Part } from "./saving";
 import { add, clamp, dot, rounded, roundedPoint, scale, type Vec3 } from "./vec";
 import type { Volume } from "./volume";
 
 const PLANES = { patient: [["axial", "Axial"], ["coronal", "Coronal"], ["sagittal", "Sagittal"]], other: [["z", "Across z"], ["y", "Across y"], ["x", "Across x"]] } as const;
 
-interface Slice { pane: Pane; plane: string }
+interface Slice { pane: Pane; plane: string; name: string }
 
 export class Slices {
   private slices: Slice[] = [];
 
-  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly hover: (at: Vec3 | null) => void) {
+  constructor(private readonly context: Context, private readonly stage: HTMLElement, private readonly measuring: Measuring, private readonly hover: (at: Vec3 | null) => void) {
+    measuring.onChange(() => this.slices.forEach(slice => this.annotate(slice)));
     context.store.subscribe(() => this.slices.forEach(slice => this.annotate(slice)), ["crosshair", "scaleBar"]);
   }
 
@@ -33,6 +36,17 @@ export class Slices {
 
   at(): Vec3 { return this.context.store.state.crosshair ?? this.context.volume()?.centre ?? [0, 0, 0]; }
 
+  // What the panes show, for files.
+  parts(): Part[] {
+    const { state } = this.context.store;
+    return this.slices.map(({ pane, plane, name }) => ({
+      name: plane, title: `${name} slice`, view: { picture: "slice", timeline: false, options: sliceOptions(state, plane, this.at()) },
+      marks: { marker: false, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: [], slice: this.plane(pane) },
+    }));
+  }
+
+  private plane({ shown }: Pane): { at: Vec3; half: number } { return { at: this.at(), half: shown ? 0.51 * this.spacingAlong(shown.frame.header.geometry.forward) : 0 }; }
+
   private end(): void {
     for (const { pane } of this.slices) pane.end();
     this.slices = [];
@@ -42,7 +56,7 @@ export class Slices {
     const pane = new Pane(plane, `${name} slice. Arrow keys move the cross-hair, Page Up and Page Down the slice.`, this.context.api.token, {
       drawn: () => this.annotate(slice), resized: () => this.show(slice), error: message => this.context.say(`${name}: ${message}`, "error"),
     });
-    const slice: Slice = { pane, plane };
+    const slice: Slice = { pane, plane, name };
     pane.element.append(h("span", { class: "pane-title" }, name));
     this.stage.append(pane.element);
     this.listen(slice);
@@ -54,7 +68,9 @@ export class Slices {
   }
 
   private annotate({ pane }: Slice): void {
-    if (pane.shown) pane.drawing.draw(pane.shown, { marker: false, scaleBar: this.context.store.state.scaleBar, sides: true, crosshair: { at: this.at(), lines: true } });
+    if (!pane.shown) return;
+    const { scaleBar } = this.context.store.state;
+    pane.drawing.draw(pane.shown, { marker: false, scaleBar, sides: true, crosshair: { at: this.at(), lines: true }, measures: this.measuring.drawn(), legend: [], slice: this.plane(pane) });
   }
 
   // The point below the pointer, in the plane that is shown.
@@ -69,10 +85,13 @@ export class Slices {
     return p.map((c, i) => clamp(c, volume.low[i] as number, volume.high[i] as number)) as unknown as Vec3;
   }
 
+  private spacingAlong(direction: Vec3): number {
+    const spacing = this.context.volume()?.spacing ?? ([0, 0, 0] as const);
+    return direction.reduce((sum, c, i) => sum + Math.abs(c) * (spacing[i] as number), 0);
+  }
+
   private moveBy(direction: Vec3, voxels: number, inputAt: number): void {
-    const volume = this.context.volume() as Volume;
-    const spacing = direction.reduce((sum, c, i) => sum + Math.abs(c) * (volume.spacing[i] as number), 0);
-    this.context.store.update({ crosshair: roundedPoint(this.inVolume(add(this.at(), scale(direction, voxels * spacing)))) });
+    this.context.store.update({ crosshair: roundedPoint(this.inVolume(add(this.at(), scale(direction, voxels * this.spacingAlong(direction))))) });
     this.update(inputAt);
   }
 
@@ -86,14 +105,18 @@ export class Slices {
       last = [event.clientX, event.clientY];
       canvas.focus({ preventScroll: true });
       canvas.setPointerCapture(event.pointerId);
-      if (event.button === 0) place(event);
+      if (event.button === 0 && this.measuring.tool && pane.shown) this.measuring.place(this.pointAt(pane.shown, event.offsetX, event.offsetY));
+      else if (event.button === 0) place(event);
       event.preventDefault();
     });
     canvas.addEventListener("pointermove", event => {
-      if (event.buttons === 1) place(event);
+      if (event.buttons === 1 && !this.measuring.tool) place(event);
       else if (event.buttons === 2) this.window((event.clientX - last[0]) / canvas.clientWidth, (last[1] - event.clientY) / canvas.clientHeight);
       last = [event.clientX, event.clientY];
-      if (pane.shown) this.hover(this.pointAt(pane.shown, event.offsetX, event.offsetY));
+      if (!pane.shown) return;
+      const at = this.pointAt(pane.shown, event.offsetX, event.offsetY);
+      this.hover(at);
+      this.measuring.hover(at);
     });
     canvas.addEventListener("pointerleave", () => this.hover(null));
     canvas.addEventListener("contextmenu", event => event.preventDefault());
@@ -102,6 +125,7 @@ export class Slices {
       if (pane.shown && event.deltaY !== 0) this.moveBy(pane.shown.frame.header.geometry.forward, Math.sign(event.deltaY), event.timeStamp);
     }, { passive: false });
     canvas.addEventListener("keydown", event => {
+      if (event.key === "Enter" && this.measuring.tool) return this.measuring.place(this.at());
       const geometry = pane.shown?.frame.header.geometry, far = event.shiftKey ? 10 : 1;
       if (!geometry) return;
       const move = { ArrowRight: geometry.right, ArrowLeft: scale(geometry.right, -1), ArrowUp: geometry.up, ArrowDown: scale(geometry.up, -1), PageUp: scale(geometry.forward, -1), PageDown: geometry.forward }[event.key];

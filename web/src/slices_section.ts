@@ -1,8 +1,16 @@
-// Section of the panel: the cross-hair and the window of the slices, by numbers.
+// Section of the panel: the cross-hair and the window of the slices, by numbers and by names.
 import type { Context } from "./context";
-import { button, numberField, section } from "./controls";
+import { choice, numberField, optionalField, section } from "./controls";
 import { h } from "./dom";
+import { words } from "./offers";
 import { AXES, AXIS_NAMES, clamp, withAxis } from "./vec";
+
+// The usual ones of radiologists, in Hounsfield units.
+const WINDOWS = [
+  { name: "bone", window: 1800, level: 400 }, { name: "lung", window: 1500, level: -600 }, { name: "soft-tissue", window: 400, level: 40 },
+  { name: "brain", window: 80, level: 40 }, { name: "liver", window: 150, level: 30 },
+] as const;
+const AUTOMATIC = "auto", OWN = "own", NO_WINDOW = { window: null, level: null };
 
 export function slicesSection(context: Context): HTMLElement {
   const { store } = context;
@@ -11,19 +19,26 @@ export function slicesSection(context: Context): HTMLElement {
     if (volume) store.update({ crosshair: withAxis(store.state.crosshair ?? volume.centre, axis, clamp(value, volume.low[axis], volume.high[axis])) });
   }));
   const range = (): readonly [number, number] => context.volume()?.range ?? [0, 1];
-  const window = numberField("Window of the slices", value => { if (value > 0) store.update({ window: value, level: store.state.level ?? (range()[0] + range()[1]) / 2 }, "slice window"); });
-  const level = numberField("Level of the slices", value => store.update({ level: value, window: store.state.window ?? Math.max(range()[1] - range()[0], 1e-6) }, "slice level"));
-  window.input.placeholder = level.input.placeholder = "auto";
+  const window = optionalField("Window of the slices", value => { if (value === null || value > 0) store.update(value === null ? NO_WINDOW : { window: value, level: store.state.level ?? (range()[0] + range()[1]) / 2 }, "slice window"); });
+  const level = optionalField("Level of the slices", value => store.update(value === null ? NO_WINDOW : { level: value, window: store.state.window ?? Math.max(range()[1] - range()[0], 1e-6) }, "slice level"));
+  const preset = choice("Window for", [], value => {
+    const chosen = WINDOWS.find(each => each.name === value);
+    if (value !== OWN) store.update({ window: chosen?.window ?? null, level: chosen?.level ?? null }, "slice preset");
+  });
+  preset.element.title = "Hounsfield units, of CT";
   const field = (name: string, input: HTMLElement): HTMLElement => h("label", {}, h("span", {}, name), input);
   const element = section("Slices", true, h("div", { class: "fields thirds" }, ...at.map((each, axis) => field(AXIS_NAMES[axis] as string, each.input))),
-    h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input), button("Automatic", null, () => store.update({ window: null, level: null }, "automatic"), "quiet")));
+    preset.element, h("div", { class: "fields" }, field("Window", window.input), field("Level", level.input)));
   const update = (): void => {
     const { state } = store, volume = context.volume();
     element.hidden = state.layout !== "quad" || !volume;
     if (!volume) return;
+    const named = WINDOWS.find(each => each.window === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
+    preset.fill([AUTOMATIC, ...WINDOWS.map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
+    preset.set(named);
     at.forEach((each, i) => each.set((state.crosshair ?? volume.centre)[i] as number));
-    if (state.window !== null) window.set(state.window); else window.input.value = "";
-    if (state.level !== null) level.set(state.level); else level.input.value = "";
+    window.set(state.window);
+    level.set(state.level);
   };
   store.subscribe(update, ["layout", "crosshair", "window", "level"]);
   context.onVolume(update);

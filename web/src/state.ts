@@ -1,4 +1,6 @@
 // What the page shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
+import { PATIENT_START } from "./camera";
+import type { Measure } from "./measure";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
 
@@ -7,6 +9,8 @@ export interface SlopePoint { slope: number; opacity: number } // slopes are dat
 export type Bounds = readonly [number | null, number | null]; // null: not clipped
 export type ClipBox = readonly [Bounds, Bounds, Bounds];
 export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
+
+export const ONE_COLOR = "one-color"; // instead of a preset: from clear to this colour
 
 export interface State {
   dataset: string;
@@ -19,8 +23,7 @@ export interface State {
   projection: "orthographic" | "perspective";
   // The look
   renderer: string;
-  samplingRate: number;
-  projectionMode: string;
+  parameters: Readonly<Record<string, string>>; // of renderers, by their names; those that are missing have their standard values
   shading: string;
   lights: readonly Vec3[]; // none: a light at the eye
   background: string;
@@ -39,7 +42,8 @@ export interface State {
   labelsShown: string; // as 1,5-9; empty: all
   labelOpacities: Readonly<Record<string, number>>;
   overlay: boolean;
-  overlayPreset: string;
+  overlayPreset: string; // or ONE_COLOR
+  overlayColor: string;
   overlayRange: readonly [number, number] | null;
   overlayWeight: number;
   // Slices
@@ -47,7 +51,9 @@ export interface State {
   crosshair: Vec3 | null; // null: the volume's centre
   window: number | null;
   level: number | null;
+  measures: readonly Measure[];
   // The page
+  legend: boolean; // of labels
   marker: boolean;
   scaleBar: boolean;
   machine: boolean;
@@ -56,20 +62,20 @@ export interface State {
 // `renderer`: the first one that the gateway offers.
 export const INITIAL: State = {
   dataset: "",
-  azimuth: 150, elevation: 15, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
-  renderer: "", samplingRate: 1, projectionMode: "maximum", shading: "phong", lights: [], background: "#0d1014",
+  ...PATIENT_START, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
+  renderer: "", parameters: {}, shading: "phong", lights: [], background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
-  overlay: false, overlayPreset: "auto", overlayRange: null, overlayWeight: 1,
-  layout: "single", crosshair: null, window: null, level: null,
+  overlay: false, overlayPreset: "auto", overlayColor: "#ff4fd8", overlayRange: null, overlayWeight: 1,
+  layout: "single", crosshair: null, window: null, level: null, measures: [], legend: true,
   marker: true, scaleBar: true, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.
-export const LOOK = ["renderer", "samplingRate", "projectionMode", "shading", "lights", "background", "preset", "map", "range", "opacityDistance", "slopes",
+export const LOOK = ["renderer", "parameters", "shading", "lights", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
-  "overlayPreset", "overlayRange", "overlayWeight", "window", "level"] as const;
+  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "window", "level", "measures"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
 

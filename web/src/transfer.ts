@@ -54,6 +54,12 @@ export function ramp(low: number, high: number): ColorMap {
   };
 }
 
+// From clear and dark to a colour.
+export function rampTo(color: string): ColorMap {
+  const [r, g, b] = rgbOf(color);
+  return { name: color, colors: [{ x: 0, r: 0, g: 0, b: 0 }, { x: 1, r, g, b }], opacities: [{ x: 0, y: 0, mid: 0.5, sharp: 0 }, { x: 1, y: 1, mid: 0.5, sharp: 0 }] };
+}
+
 export function toParaView(map: ColorMap): object[] {
   return [{
     Name: map.name, ColorSpace: "RGB",

@@ -5,15 +5,12 @@ import { button, choice, colorField, iconButton, numberField, slider } from "./c
 import { copyText, download, h, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
+import { presetChoices } from "./offers";
+import { editPoints } from "./point_gestures";
 import { LOOK } from "./state";
 import { type ColorMap, colorAt, hexOf, opacityAt, parseParaView, rangeOf, rgbOf, toParaView } from "./transfer";
 import { clamp, rounded } from "./vec";
 
-export const PRESETS = ["auto", "gray-ramp", "window", "opaque", "ct-bone", "ct-soft-tissue", "ct-skin", "mri-brain", "mri-head", "angiography", "simulation"] as const;
-const PRESET_NAMES: Record<string, string> = {
-  "auto": "Automatic", "gray-ramp": "Grey ramp", "window": "Window", "opaque": "Opaque", "ct-bone": "CT bone", "ct-soft-tissue": "CT soft tissue",
-  "ct-skin": "CT skin", "mri-brain": "MRI brain", "mri-head": "MRI head", "angiography": "Angiography", "simulation": "Simulation",
-};
 const MOST_BYTES = 1 << 20;
 
 interface Selected { kind: "color" | "opacity"; index: number }
@@ -44,7 +41,6 @@ export class TransferEditor {
   private selected: Selected = { kind: "opacity", index: 0 };
   private histogram: Histogram | null = null;
   private width = 280;
-  private dragging = false;
 
   constructor(private readonly context: Context, private readonly source: FunctionSource) {
     this.plot.append(svg("defs", {}, this.gradient), this.bars, this.area, this.curve, this.ticks, this.strip, this.points);
@@ -57,12 +53,10 @@ export class TransferEditor {
       h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet")),
       this.density.element);
     new ResizeObserver(entries => { this.width = Math.max(120, Math.round(entries[0]?.contentRect.width ?? 280)); this.refresh(); }).observe(this.plot.parentElement as HTMLElement);
-    this.plot.addEventListener("pointerdown", event => this.press(event));
-    this.plot.addEventListener("pointermove", event => { if (this.dragging) this.drag(event); });
-    this.plot.addEventListener("pointerup", () => { this.dragging = false; });
-    this.plot.addEventListener("pointercancel", () => { this.dragging = false; });
-    this.plot.addEventListener("contextmenu", event => event.preventDefault());
-    this.plot.addEventListener("keydown", event => this.key(event));
+    editPoints(this.plot, {
+      choose: circle => this.focusOn(circle), insertAt: event => this.insertAt(event), dragTo: event => this.drag(event),
+      step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
+    });
     context.onVolume(volume => {
       this.histogram = null;
       this.refresh();
@@ -84,7 +78,7 @@ export class TransferEditor {
 
   refresh(): void {
     const { state } = this.context.store, map = this.source.current(), scale = this.scale(map), custom = state.map !== null;
-    this.presets.fill([...PRESETS.map(name => [name, PRESET_NAMES[name] ?? name] as const), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
+    this.presets.fill([...presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
     this.presets.set(custom ? "" : state.preset);
     const height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
     this.plot.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
@@ -222,22 +216,9 @@ export class TransferEditor {
     return [((event.clientX - box.left) * this.width) / box.width, event.clientY - box.top];
   }
 
-  private press(event: PointerEvent): void {
-    const [x, y] = this.at(event), map = this.source.current(), scale = this.scale(map);
-    const hit = event.target instanceof SVGElement && event.target.dataset["kind"] ? event.target : null;
-    if (hit) {
-      this.focusOn(hit);
-      hit.focus();
-      if (event.button === 2) return this.remove();
-    } else if (event.button === 0) {
-      const kind: Kind = y > PLOT.height + PLOT.stripGap / 2 ? "color" : "opacity";
-      this.insert(kind, scale.value(x), scale.opacity(y));
-      this.points.querySelector<SVGElement>(".selected")?.focus();
-    }
-    if (event.button !== 0) return;
-    this.dragging = true;
-    this.plot.setPointerCapture(event.pointerId);
-    event.preventDefault();
+  private insertAt(event: PointerEvent): void {
+    const [x, y] = this.at(event), scale = this.scale(this.source.current());
+    this.insert(y > PLOT.height + PLOT.stripGap / 2 ? "color" : "opacity", scale.value(x), scale.opacity(y));
   }
 
   private drag(event: PointerEvent): void {
@@ -245,18 +226,9 @@ export class TransferEditor {
     this.moveTo(scale.value(x), this.selected.kind === "opacity" ? scale.opacity(y) : null);
   }
 
-  private key(event: KeyboardEvent): void {
+  private step(right: number, up: number): void {
     const map = this.source.current(), { kind, index } = this.selected, [low, high] = this.scale(map).domain;
-    const x = this.listOf(map, kind)[index]?.x ?? low, y = map.opacities[index]?.y ?? 0, far = event.shiftKey ? 10 : 1;
-    const step = ((high - low) / 256) * far;
-    if (event.key === "ArrowLeft") this.moveTo(x - step, null);
-    else if (event.key === "ArrowRight") this.moveTo(x + step, null);
-    else if (event.key === "ArrowUp" && kind === "opacity") this.moveTo(null, rounded(y + 0.01 * far, 3));
-    else if (event.key === "ArrowDown" && kind === "opacity") this.moveTo(null, rounded(y - 0.01 * far, 3));
-    else if (event.key === "Delete" || event.key === "Backspace") this.remove();
-    else if (event.key === "Insert") this.add();
-    else return;
-    event.preventDefault();
-    event.stopPropagation();
+    if (right !== 0) this.moveTo((this.listOf(map, kind)[index]?.x ?? low) + (right * (high - low)) / 256, null);
+    if (up !== 0 && kind === "opacity") this.moveTo(null, rounded((map.opacities[index]?.y ?? 0) + 0.01 * up, 3));
   }
 }

@@ -5,11 +5,15 @@ import { ClipHandles } from "./clip_handles";
 import type { Context } from "./context";
 import type { FunctionSource } from "./function_source";
 import { listenToGestures } from "./gestures";
+import type { Labels } from "./labels";
+import type { Measuring } from "./measuring";
+import { can } from "./offers";
 import { projectionOf, renderOptions } from "./options";
 import { Pane, type PaneEvents, type Shown } from "./pane";
 import type { Pointed } from "./pointed";
+import type { Part } from "./saving";
 import type { State } from "./state";
-import { rounded, roundedPoint } from "./vec";
+import { rounded, roundedPoint, type Vec3 } from "./vec";
 
 const LEAST_WINDOW = 1e-3; // as a share of the data's range
 
@@ -20,23 +24,26 @@ export class Viewer {
   private frameAsked = 0;
   private changed = false; // since the last view was sent
 
-  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, events: PaneEvents) {
+  constructor(private readonly context: Context, private readonly source: FunctionSource, private readonly pointed: Pointed, private readonly measuring: Measuring, private readonly labels: Labels, events: PaneEvents) {
     this.pane = new Pane("3d", "Volume. Arrow keys turn it, plus and minus zoom, question mark shows all keys.", context.api.token, {
       ...events, drawn: shown => { this.resolveFit(shown); this.annotate(); events.drawn?.(shown); }, resized: () => this.send(),
     });
     this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
     this.pane.element.append(this.handles.element);
     context.onVolume(() => { if (this.pane.shown) this.resolveFit(this.pane.shown); this.annotate(); });
+    measuring.onChange(() => this.annotate());
+    labels.onChange(() => this.annotate());
     context.store.subscribe(() => this.later());
-    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "layout", "crosshair", "clipBox"]); // else with the next picture
+    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "layout", "crosshair", "clipBox", "legend", "labels", "labelsShown", "labelOpacities"]); // else with the next picture
     listenToGestures(this.pane.canvas, {
       state: () => context.store.state,
       pixelSize: () => this.pixelSize(),
       move: (patch, at) => this.move(patch, at),
       window: (widen, raise, at) => this.window(widen, raise, at),
-      hover: (x, y) => pointed.atPixel(this.pane.shown, x, y),
+      hover: (x, y) => pointed.atPixel(this.pane.shown, x, y, at => measuring.hover(at)),
       leave: () => pointed.clear(),
-      place: (x, y) => void this.place(x, y),
+      place: (x, y) => { if (!measuring.tool) void this.place(x, y, crosshair => context.store.update({ crosshair, layout: "quad" })); },
+      click: (x, y) => { if (measuring.tool) void this.place(x, y, at => measuring.place(at)); },
     });
   }
 
@@ -62,7 +69,7 @@ export class Viewer {
   // To the right widens the range of values, upwards brightens: the range goes down.
   window(widen: number, raise: number, inputAt: number): void {
     const [low, high] = this.source.range(), volume = this.context.volume();
-    if (!volume) return;
+    if (!volume || !can("transfer", this.context.store.state.renderer)) return;
     const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], 1e-9);
     const width = Math.max((high - low) * Math.exp(1.5 * widen), least), middle = (low + high) / 2 - raise * (high - low);
     this.inputAt ??= inputAt;
@@ -102,13 +109,23 @@ export class Viewer {
     const { shown } = this.pane, { state } = this.context.store;
     if (!shown) return;
     const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
-    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair });
+    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.labels.legend() });
     this.handles.update(shown, state.clipBox, this.context.volume());
   }
 
-  private async place(x: number, y: number): Promise<void> {
+  // What the pane shows, for a file.
+  part(): Part {
+    return {
+      name: "3d", title: "3-D picture", view: { picture: "render", timeline: false, options: renderOptions(this.context.store.state) },
+      marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.labels.legend() },
+    };
+  }
+
+  // Uses the point that a pixel shows.
+  private async place(x: number, y: number, use: (at: Vec3) => void): Promise<void> {
     if (!this.pane.shown) return;
     const value = await this.pointed.pick(this.pane.shown, x, y).catch(() => null);
-    if (value?.at && value.hit !== false) this.context.store.update({ crosshair: roundedPoint(value.at), layout: "quad" });
+    if (value?.at && value.hit !== false) use(roundedPoint(value.at));
+    else if (this.measuring.tool) this.context.say("Nothing shows there.");
   }
 }

@@ -27,7 +27,6 @@ inline constexpr std::size_t kRowPadding = 16;  // elements behind the last one 
 // The row's pixels column ... column + count - 1: the depths at which their rays are in the region, [enter, leave]. `enter` is 0 where a
 // ray starts inside; rays that miss the region have kNeverMet and -1.
 void RegionDepths(const RegionRow& row, std::int32_t column, std::size_t count, float* enter, float* leave);
-void RegionDepthsReference(const RegionRow& row, std::int32_t column, std::size_t count, float* enter, float* leave);
 
 // Data space, by axis: origin + depth * direction.
 struct RayRow {
@@ -38,7 +37,5 @@ struct RayRow {
 // behind every volume.
 void VoxelsAt(const RayRow& row, std::int32_t column, std::size_t count, const float* depth, double behind, std::int32_t* x,
               std::int32_t* y, std::int32_t* z);
-void VoxelsAtReference(const RayRow& row, std::int32_t column, std::size_t count, const float* depth, double behind, std::int32_t* x,
-                       std::int32_t* y, std::int32_t* z);
 
 }  // namespace slabstream

@@ -61,8 +61,6 @@ struct FaceProjection {
 // (also by face) of faces that may be visible, because shading comes soon. Returns how many faces may touch pixels of the band.
 std::size_t DrawFaces(Projection projection, const FaceProjection& faces, const FaceSite* sites, const FaceNormals* normals,
                       std::uint32_t first, std::uint32_t count, const KeyBand& band);
-std::size_t DrawFacesReference(Projection projection, const FaceProjection& faces, const FaceSite* sites, std::uint32_t first,
-                               std::uint32_t count, const KeyBand& band);
 
 // True if DrawFaces changes no pixel of `bounds` with faces at `depth` or behind it: all that the limits let through is hidden. `bounds`
 // lie in the band.

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/view/phong.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/power-inl.h"
 
@@ -226,6 +227,43 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace slabstream {
+namespace {
+
+void Copy(const Vec3& from, float (&to)[3]) {
+  for (int i = 0; i < 3; ++i) to[i] = float(from[i]);
+}
+
+}  // namespace
+
+FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const Index3& volume_size) {
+  FaceShading out;
+  const Camera::Ray first = camera.RayAt(0, 0), right = camera.RayAt(camera.width, 0), down = camera.RayAt(0, camera.height);
+  Copy(first.origin, out.origin);
+  Copy((1.0 / camera.width) * (right.origin - first.origin), out.origin_x);
+  Copy((1.0 / camera.height) * (down.origin - first.origin), out.origin_y);
+  Copy(first.direction, out.direction);
+  Copy((1.0 / camera.width) * (right.direction - first.direction), out.direction_x);
+  Copy((1.0 / camera.height) * (down.direction - first.direction), out.direction_y);
+
+  const Vec3 to_viewer = -camera.view_direction;
+  Copy(to_viewer, out.to_viewer);
+  out.phong = shading.model == ShadingModel::kPhong;
+  const Phong phong(shading, camera.view_direction);
+  for (const Vec3& light : phong.lights()) {
+    Copy(light, out.light[out.light_count]);
+    out.light_to_viewer[out.light_count++] = float(Dot(light, to_viewer));
+  }
+  out.ambient = shading.ambient;
+  out.diffuse = shading.diffuse;
+  out.specular = shading.specular;
+  out.shininess = shading.shininess;
+  // |N.L| is 1/2 on average over all directions of N.
+  if (out.phong) out.diffuse_without_normal = shading.ambient + shading.diffuse * 0.5F * float(out.light_count);
+  out.bricks_x = std::uint32_t(volume_size.x + kFaceBrick - 1) / kFaceBrick;
+  out.bricks_y = std::uint32_t(volume_size.y + kFaceBrick - 1) / kFaceBrick;
+  return out;
+}
+
 HWY_EXPORT(ShadeRow);
 
 void ShadeFaceRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count,

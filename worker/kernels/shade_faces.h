@@ -42,7 +42,5 @@ FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const 
 // infinity, 0.
 void ShadeFaceRow(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count,
                   float* rgba, float* depth, std::uint32_t* voxel);
-void ShadeFaceRowReference(const FaceShading& shading, const std::uint64_t* keys, std::int32_t column, std::int32_t row, std::size_t count,
-                           float* rgba, float* depth, std::uint32_t* voxel);
 
 }  // namespace slabstream

@@ -1,7 +1,7 @@
-// MacrocellRanges: least and greatest sample of small cells, so that rays leap over cells that show nothing.
+// MacrocellRanges: least and greatest sample of each macrocell, so that rays leap over macrocells that show nothing.
 //
-// A cell holds the sample positions p whose floor lies in a cube of kCellSide voxels, counted from box.begin - 1. Trilinear interpolation
-// also reads the next voxel, so a cell's range is that of kCellSide + 1 voxels a side.
+// A macrocell holds the sample positions p whose floor lies in a cube of kCellSide voxels, counted from box.begin - 1. Trilinear
+// interpolation also reads the next voxel, so a macrocell's range is that of kCellSide + 1 voxels a side.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct MacrocellRange {
 };
 
 struct MacrocellRanges {
-  Index3 counts;  // of cells, which cover the padded voxels; x fastest
+  Index3 counts;  // of macrocells, which cover the padded voxels; x fastest
   std::vector<MacrocellRange> ranges;
 
   std::size_t bytes() const { return ranges.capacity() * sizeof(MacrocellRange); }

@@ -54,7 +54,4 @@ struct ProjectWork {
 //   null:         the sums over all samples of the bytes of floor(value * 2^24), at most 2^24 - 1, highest first, and their number
 void ProjectTile(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row);
 
-// The definition: one ray and one sample after the other. Gives the same bits.
-void ProjectTileReference(const ProjectWork& work, const PixelBounds& tile, float* pixels, std::size_t floats_a_row);
-
 }  // namespace slabstream

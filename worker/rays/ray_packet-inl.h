@@ -4,7 +4,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdint>
 
@@ -45,7 +44,9 @@ struct RayPacket {
   Mask valid;  // pixels of the tile
 };
 
-// The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid. As RayOf.
+// The packet whose first pixel is (x, y); pixels from x_end or y_end on are not valid.
+// Perspective: the unit vector along the ray is (forward + offset) / length. The first sample is written relative to that of the central
+// ray, so that nothing cancels if the eye is far away: 1 / length - 1 = -square / (length (1 + length)).
 HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t y, std::int32_t x_end, std::int32_t y_end) {
   const FloatTag df;
   const IntTag di;
@@ -145,12 +146,16 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
   return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), hn::Zero(df))};
 }
 
-// As PartsOf, for each ray.
+// A part of each ray that clipping leaves, in numbers of samples.
 struct PacketPart {
-  Floats begin, end, enter, leave, face[3], face_end;
+  Floats begin, end;    // samples [begin, end)
+  Floats enter, leave;  // where the ray is cut, between samples; enter > leave: nothing is left
+  Floats face[3];       // data space: a normal of the face at `enter`, of any length
+  Floats face_end;      // samples before this one lie within face_depth of it
 
   SampleInterval Of(const SampleInterval& samples) const { return {hn::Max(samples.begin, begin), hn::Min(samples.end, end)}; }
 };
+// The parts of the rays, nearest first. A part may have no samples, begin >= end, and yet a length.
 HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart (&parts)[2]) {
   const FloatTag df;
   struct Cut {

@@ -4,7 +4,7 @@
 // The first sample is a whole number of steps away from the eye (perspective) or the eye plane (orthographic). All rays start at the same
 // distance, in front of the volume's bounding sphere. (If clipping leaves a slab that faces an orthographic view, samples lie evenly about
 // its middle instead, so that a thin one is a slice.) So samples depend only on the view and the volume's geometry, never on a box: boxes
-// that ask for the same sample compute the same position, bit for bit (SamplePosition and, lane by lane, ray_packet-inl.h).
+// that ask for the same sample compute the same position, bit for bit (ray_packet-inl.h).
 //
 // Slicing takes OnPlanes instead: the samples k of all rays lie on one plane of equal depth, also under perspective.
 //
@@ -64,24 +64,8 @@ inline ViewRays OnPlanes(ViewRays rays) {
   return rays;
 }
 
-// The ray of a pixel: sample k is at first + k * move in data space, by component.
-struct PixelRay {
-  Float3 first, move;
-};
-PixelRay RayOf(const ViewRays& rays, std::int32_t x, std::int32_t y);
-Float3 SamplePosition(const PixelRay& ray, std::int32_t k);
-
-// A part of a ray that clipping leaves, in numbers of samples.
 inline constexpr float kLeastCrossing = 1e-6F;  // physical distance a sample: a ray that moves less runs along a side
 inline constexpr float kRayEnd = 1e9F;          // beyond every sample, either sign
-struct RayPart {
-  float begin = -kRayEnd, end = kRayEnd;    // samples [begin, end)
-  float enter = -kRayEnd, leave = kRayEnd;  // where the ray is cut, between samples; enter > leave: nothing is left
-  Float3 face{};                            // data space: a normal of the face at `enter`, of any length
-  float face_end = -kRayEnd;                // samples before this one lie within face_depth of it
-};
-// The parts of a ray, nearest first. A part may have no samples, begin >= end, and yet a length.
-std::array<RayPart, 2> PartsOf(const RayClip& clip, const PixelRay& ray);
 
 // Samples [begin, end) and pixels that a data-space box may touch, with some slack. The pixels lie within the camera's image.
 struct RayReach {

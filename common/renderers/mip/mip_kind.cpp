@@ -51,10 +51,7 @@ class MipKind : public ProjectionKind {
                         .title = "intensity projection",
                         .purpose = "the largest, least or mean value along each ray, for vessels",
                         .format = PixelFormat::kMaximum,
-                        .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                         .abilities = {Ability::kPerspective, Ability::kTransfer},
-                        .footprint = 1,
-                        .stages = {Stage::kSample},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",
                                         .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",

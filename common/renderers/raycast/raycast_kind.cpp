@@ -74,12 +74,8 @@ class RaycastKind : public RendererKind {
       : RendererKind({.name = "raycast",
                       .title = "ray casting",
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
-                      .format = PixelFormat::kRgba,
-                      .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
                                     Ability::kOverlay, Ability::kLights, Ability::kTransfer},
-                      .footprint = 1,
-                      .stages = {Stage::kSample},
                       .parameters = {SamplingRate()}}) {}
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {

@@ -1,6 +1,5 @@
 // The planning half of multi-pass shears: the frame is the picture, supersampled where it is minified; images blend front to back.
 #include <algorithm>
-#include <cmath>
 
 #include "common/calibration/calibration.h"
 #include "common/renderers/interpolated_table.h"
@@ -46,11 +45,7 @@ class ShearKind : public RendererKind {
       : RendererKind({.name = "shear",
                       .title = "multi-pass shears",
                       .purpose = "the volume resampled onto the picture's pixels by three one-dimensional passes, with a cubic kernel",
-                      .format = PixelFormat::kRgba,
-                      .reach = kHalo,  // worker/renderers/shear/shear_passes.h says why it suffices
                       .abilities = {Ability::kGradientOpacity, Ability::kLights, Ability::kTransfer},
-                      .footprint = 1,
-                      .stages = {Stage::kSample},
                       .parameters = {SamplingRate(),
                                      {.name = "kernel",
                                       .purpose = "Reconstruction between samples, along one axis at a time",

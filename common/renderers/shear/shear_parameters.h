@@ -12,7 +12,6 @@ enum class Kernel { kCatmullRom = 0, kMitchell = 1, kBSpline = 2, kLinear = 3 };
 inline constexpr std::size_t kKernel = 1, kSupersampling = 2;  // places among the parameters
 
 // Beams, and slices, that are resampled for each one of the volume.
-inline constexpr int kMostSupersampling = 4;
 inline int SupersamplingOf(std::span<const double> parameters) { return 1 + int(parameters[kSupersampling]); }
 
 }  // namespace slabstream::shear

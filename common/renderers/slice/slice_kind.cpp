@@ -53,10 +53,7 @@ class SliceKind : public RendererKind {
       : RendererKind({.name = "slice",
                       .title = "slicing",
                       .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture, without lights",
-                      .format = PixelFormat::kRgba,
-                      .reach = kHalo,  // 0 would do; like the other renderers, so that all use the same cached voxels
                       .abilities = {Ability::kPerspective, Ability::kCells, Ability::kTransfer},
-                      .footprint = 1,
                       .stages = {Stage::kTransform, Stage::kSample},
                       .parameters = {SamplingRate()}}) {}
 

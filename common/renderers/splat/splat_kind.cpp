@@ -22,8 +22,6 @@ class SplatKind : public RendererKind {
       : RendererKind({.name = "splat",
                       .title = "splatting",
                       .purpose = "soft footprints of all visible voxels; for translucent volumes",
-                      .format = PixelFormat::kRgba,
-                      .reach = kHalo,
                       .along_slices = true,
                       .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer},
                       .footprint = 4,

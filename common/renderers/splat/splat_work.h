@@ -7,8 +7,6 @@
 // of the box across the slices says little.
 #pragma once
 
-#include <cstdint>
-
 #include "common/math/vec.h"
 #include "common/volume/occupancy_grid.h"
 

@@ -28,10 +28,7 @@ class XrayKind : public ProjectionKind {
                         .title = "radiography",
                         .purpose = "a radiograph: line integrals of X-ray attenuation, in grey; for CT",
                         .format = PixelFormat::kSum,
-                        .reach = kHalo,  // 2 would do; like the other renderers, so that all use the same cached voxels
                         .abilities = {Ability::kPerspective},
-                        .footprint = 1,
-                        .stages = {Stage::kSample},
                         .parameters = {SamplingRate(),
                                        {.name = "energy",
                                         .purpose = "Energy of the X-rays in keV, which decides how much water attenuates",

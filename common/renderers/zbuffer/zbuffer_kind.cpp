@@ -45,10 +45,8 @@ class ZBufferKind : public RendererKind {
                       .title = "Z-buffer",
                       .purpose = "the surfaces of opaque voxels; for solid objects",
                       .format = PixelFormat::kDepth,
-                      .reach = kHalo,  // 2 would do; as for splatting, so that both use the same cached voxels
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kLabels, Ability::kLights,
                                     Ability::kDepthShading, Ability::kTransfer},
-                      .footprint = 1,
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}
 
   // A voxel is opaque if it has half of the largest opacity in the volume's range of values, or at least an isovalue: then it has the

@@ -3,7 +3,6 @@
 #include <filesystem>
 
 #include "client/image_io/image_writer.h"
-#include "common/renderers/registry.h"
 #include "laboratory/experiments/paper/render_alone.h"
 #include "laboratory/experiments/paper/setup.h"
 

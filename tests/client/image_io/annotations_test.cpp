@@ -52,7 +52,7 @@ struct Drawing {
 };
 
 Drawing Draw(const Annotations& annotations, ImageSize size, const PictureGeometry& geometry = {}, Color background = kBlack) {
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, geometry);
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, {&geometry, 1});
   EXPECT_TRUE(layers.ok()) << layers.status().message();
   Drawing drawing{size, {}, background};
   for (std::int64_t i = 0; i < std::int64_t{size.width} * size.height; ++i)
@@ -305,15 +305,16 @@ TEST(AnnotationsTest, AFontThatIsNotThereIsNamed) {
   const TemporaryDirectory directory;
   const std::string missing = directory / "no.ttf", text = directory / "text.ttf";
   std::ofstream(text) << "this is no font";
+  const PictureGeometry pane;
   EXPECT_EQ(CheckCanDraw(kAll), Status::Ok());
   {
     const Variable variable("SLABSTREAM_FONT", missing);
     EXPECT_EQ(CheckCanDraw({}), Status::Ok()) << "nobody needs it";
     EXPECT_EQ(CheckCanDraw(kAll), Status::NotFound("$SLABSTREAM_FONT names '" + missing + "', which is no file"));
-    EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {}).status().code(), StatusCode::kNotFound);
+    EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {&pane, 1}).status().code(), StatusCode::kNotFound);
   }
   const Variable variable("SLABSTREAM_FONT", text);
-  EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {}).status(), Status::InvalidArgument("the font '" + text + "' cannot be read"));
+  EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {&pane, 1}).status(), Status::InvalidArgument("the font '" + text + "' cannot be read"));
 }
 
 }  // namespace

@@ -94,6 +94,8 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--groups", "3", "--teams", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
     {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
     {"--title=-x"},
+    {"--color-bar", "--legend"},
+    {"--color-bar=velocity (m/s)"},
     {"--previews"},
 };
 

@@ -1,9 +1,11 @@
 #include "client/request/values.h"
+
 #include "client/cli/turntable_values.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "client/request/value_window.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {
@@ -52,10 +54,23 @@ TEST(ParseClipBox, TakesBoundsInThreeUnits) {
   EXPECT_EQ(world, (ClipBox{{-1.5, -1e9, 0}, {2, 1e9, 1e9}, ClipUnit::kWorld}));
   EXPECT_EQ(*ParseClipBox("--clip-box", "0:10,5:6,0:1v"), (ClipBox{{0, 5, 0}, {10, 6, 1}, ClipUnit::kVoxels}));
   EXPECT_EQ(*ParseClipBox("--clip-box", ":50,:,:%"), (ClipBox{{-1e9, -1e9, -1e9}, {50, 1e9, 1e9}, ClipUnit::kPercent}));
-  for (const char* text : {"", ":", ":,:", "0:1,0:1,0:1,0:1", "0:1,0:1,1:0", "0:1,0:1,1:1", "0-1,0:1,0:1", "0:1:2,:,:", "a:1,:,:", ":,:,:x",
-                           "nan:1,:,:", "0:2e9,:,:"}) {
+  EXPECT_EQ(*ParseClipBox("--clip-box", ":50%,:,:"), (ClipBox{{-1e9, -1e9, -1e9}, {50, 1e9, 1e9}, ClipUnit::kPercent}));
+  EXPECT_EQ(ParseClipBox("--clip-box", "10%:50%,2v:,:").status().message(),
+            "--clip-box '10%:50%,2v:,:' has bounds in voxels (v) and in percent (%): all must have one unit");
+  EXPECT_EQ(*ParseClipBox("--clip-box", "1v:5v,:7,2:v"), (ClipBox{{1, -1e9, 2}, {5, 7, 1e9}, ClipUnit::kVoxels}));
+  for (const char* text : {"", ":", ":,:", "0:1,0:1,0:1,0:1", "1%%:,:,:", "0:1,0:1,1:0", "0:1,0:1,1:1", "0-1,0:1,0:1",
+                           "0:1:2,:,:", "a:1,:,:", ":,:,:x", "nan:1,:,:", "0:2e9,:,:"}) {
     EXPECT_EQ(ParseClipBox("--clip-box", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
+}
+
+TEST(ParseValueWindow, TakesAWidthOrAName) {
+  EXPECT_EQ(*ParseValueWindow("--window", "80"), (ValueWindow{80, 40}));
+  EXPECT_EQ(*ParseValueWindow("--window", "lung"), (ValueWindow{1500, -600}));
+  EXPECT_EQ(ParseValueWindow("--window", "lungs").status().message(),
+            "--window 'lungs' is neither a number nor one of bone, lung, mediastinum, soft-tissue, brain, liver");
+  EXPECT_EQ(ParseValueWindow("--window", "0").status().message(), "--window 0 is out of range (0, 1e+30]");
+  for (const char* text : {"", "-5", "1x", "nan"}) EXPECT_FALSE(ParseValueWindow("--window", text).ok()) << text;
 }
 
 TEST(ParseClipPlane, TakesANormalAndAnOffset) {
@@ -118,6 +133,8 @@ TEST(Values, DirectionsAndColors) {
   EXPECT_EQ(*ParseColor("--background", "#ff3300"), (StraightColor{1, 0.2F, 0, 1}));
   EXPECT_EQ(*ParseColor("--background", "#FF330033"), (StraightColor{1, 0.2F, 0, 0.2F}));
   EXPECT_EQ(*ParseColor("--background", "white"), (StraightColor{1, 1, 1, 1}));
+  EXPECT_EQ(*ParseColor("--background", "rebeccapurple"), *ParseColor("--background", "#663399"));
+  EXPECT_EQ(*ParseColor("--background", "steelblue"), *ParseColor("--background", "#4682b4"));
   for (const char* text : {"", "1,2", "0,0,0", "1,2,3,4", "1,,2", "nan,0,0", "inf,0,0"}) {
     EXPECT_EQ(ParseDirection("--light", text).status().code(), StatusCode::kInvalidArgument) << text;
   }

@@ -5,7 +5,11 @@
 #include <atomic>
 #include <latch>
 #include <memory>
+#include <system_error>
+#include <thread>
 #include <vector>
+
+#include "tests/support/no_more_threads.h"
 
 namespace slabstream {
 namespace {
@@ -33,6 +37,24 @@ TEST(BackgroundTasks, RunSideBySideOnAsManyThreadsAsAllowed) {
       done.count_down();
     });
   }
+  done.wait();
+}
+
+TEST(BackgroundTasks, RunOneAfterTheOtherIfThereCanBeNoFurtherThread) {
+  std::latch begun(1), go_on(1), done(2);
+  BackgroundTasks tasks(4);
+  {
+    const NoMoreThreads now;
+    EXPECT_THROW(std::thread([] {}), std::system_error);
+    tasks.Post([&] {
+      begun.count_down();
+      go_on.wait();
+      done.count_down();
+    });
+    begun.wait();
+    tasks.Post([&] { done.count_down(); });
+  }
+  go_on.count_down();
   done.wait();
 }
 

@@ -93,6 +93,13 @@ TEST(MappedArena, OpensNothingElse) {
   ASSERT_EQ(::ftruncate(unsealed, off_t(kArenaBytes)), 0);
   EXPECT_EQ(code({name.id, name.pid, std::uint32_t(unsealed)}), StatusCode::kInvalidArgument);
   ::close(unsealed);
+  // Sealed and as large, but of huge pages: without any left, whoever reads it ends.
+  if (const int huge = ::memfd_create("huge", MFD_CLOEXEC | MFD_ALLOW_SEALING | MFD_HUGETLB); huge >= 0) {
+    if (::ftruncate(huge, off_t(kArenaBytes)) == 0 && ::fcntl(huge, F_ADD_SEALS, F_SEAL_SHRINK) == 0) {
+      EXPECT_EQ(code({name.id, name.pid, std::uint32_t(huge)}), StatusCode::kInvalidArgument);
+    }
+    ::close(huge);
+  }
 }
 
 TEST(MappedArena, FindsNoBlockThatLeavesTheArena) {

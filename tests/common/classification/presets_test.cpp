@@ -1,10 +1,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "common/classification/classification_table.h"
+#include "common/classification/color_maps.h"
 #include "common/classification/histogram_analysis.h"
 #include "common/classification/transfer_function.h"
 #include "common/volume/sphere.h"
@@ -32,6 +35,34 @@ TEST(Presets, AreValidAndNamedOnceEach) {
   }
   EXPECT_GE(names.size(), 7U);
   EXPECT_THAT(names, testing::Contains("auto"));
+}
+
+// Published colours of the maps: their ends and one between.
+TEST(Presets, ColourMapsSpanAllValues) {
+  const VolumeSummary summary = Summarize(MakeSphere({}).value());
+  const double least = double(summary.range.min), most = double(summary.range.max);
+  const struct {
+    const char* name;
+    std::array<std::uint32_t, 3> codes;  // at 0, 1/2 and 1
+  } cases[] = {{"grey", {0x000000, 0x808080, 0xffffff}},     {"viridis", {0x440154, 0x21918c, 0xfde725}},
+               {"magma", {0x000004, 0xb73779, 0xfcfdbf}},    {"plasma", {0x0d0887, 0xcc4778, 0xf0f921}},
+               {"cividis", {0x00224e, 0x7d7c78, 0xfee838}},  {"turbo", {0x30123b, 0xa4fc3c, 0x7a0403}},
+               {"coolwarm", {0x3b4cc0, 0xdddddd, 0xb40426}}, {"jet", {0x000080, 0x80ff80, 0x800000}}};
+  for (const auto& [name, codes] : cases) {
+    const TransferFunction transfer = MakePreset(name, summary).value();
+    for (int i = 0; i < 3; ++i) {
+      const Rgb color = transfer.Color(std::lerp(least, most, 0.5 * i));
+      EXPECT_NEAR(color.r, (codes[std::size_t(i)] >> 16) / 255.0, 0.01) << name << i;
+      EXPECT_NEAR(color.g, (codes[std::size_t(i)] >> 8 & 0xFF) / 255.0, 0.01) << name << i;
+      EXPECT_NEAR(color.b, (codes[std::size_t(i)] & 0xFF) / 255.0, 0.01) << name << i;
+    }
+    EXPECT_EQ(transfer.opacities, MakePreset("auto", summary)->opacities) << name;
+  }
+  for (const ColorMap& map : NamedColorMaps()) {
+    EXPECT_FALSE(map.source.empty()) << map.name;
+    EXPECT_EQ(map.points.front().at, 0);
+    EXPECT_EQ(map.points.back().at, 1);
+  }
 }
 
 TEST(Presets, OfAnUnknownNameListTheNamesThereAre) {

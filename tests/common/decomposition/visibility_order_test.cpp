@@ -10,6 +10,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "tests/common/decomposition/random_partition.h"
+#include "tests/common/view/view_limits.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

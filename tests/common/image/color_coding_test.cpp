@@ -1,4 +1,4 @@
-#include "common/image/color_coding.h"
+#include "tests/common/image/color_coding_reference.h"
 
 #include <gtest/gtest.h>
 
@@ -30,8 +30,8 @@ TEST(ColorCoding, KeepsItsErrorBounds) {
   std::vector<std::uint16_t> codes(values.size());
   std::vector<float> back(values.size());
   for (const ColorCoding coding : kCodings) {
-    ASSERT_TRUE(ToCodesReference(coding, values.data(), codes.data(), values.size()));
-    FromCodesReference(coding, codes.data(), back.data(), codes.size());
+    ASSERT_TRUE(testing::ToCodesReference(coding, values.data(), codes.data(), values.size()));
+    testing::FromCodesReference(coding, codes.data(), back.data(), codes.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       const double value = std::min(values[i], 1.0F);
       const double bound = coding == ColorCoding::kHalf ? std::max(value * 0x1p-11, 0x1p-25) : 0.5 / 65535 + 1e-7;
@@ -47,8 +47,8 @@ TEST(ColorCoding, EveryCodeComesBack) {
       const auto in = std::uint16_t(code);
       float value = -1, before = -1;
       std::uint16_t out = 0;
-      FromCodesReference(coding, &in, &value, 1);
-      ASSERT_TRUE(ToCodesReference(coding, &value, &out, 1)) << code;
+      testing::FromCodesReference(coding, &in, &value, 1);
+      ASSERT_TRUE(testing::ToCodesReference(coding, &value, &out, 1)) << code;
       ASSERT_EQ(out, in);
       ASSERT_GT(value, before) << "order is kept";
       before = value;
@@ -65,12 +65,12 @@ TEST(ColorCoding, EveryInstructionSetGivesTheBitsOfTheReference) {
       for (std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{3}, std::size_t{15}, std::size_t{17}, values.size() - 1}) {
         std::vector<std::uint16_t> expected(count), codes(count + 1, 77);
         std::vector<float> expected_back(count), back(count + 1, -1);
-        ASSERT_TRUE(ToCodesReference(coding, values.data() + 1, expected.data(), count));
+        ASSERT_TRUE(testing::ToCodesReference(coding, values.data() + 1, expected.data(), count));
         ASSERT_TRUE(ToCodes(coding, values.data() + 1, codes.data(), count));
         ASSERT_EQ(codes.back(), 77) << "wrote past the end";
         codes.pop_back();
         ASSERT_EQ(codes, expected);
-        FromCodesReference(coding, codes.data(), expected_back.data(), count);
+        testing::FromCodesReference(coding, codes.data(), expected_back.data(), count);
         FromCodes(coding, codes.data(), back.data(), count);
         ASSERT_EQ(back.back(), -1);
         back.pop_back();

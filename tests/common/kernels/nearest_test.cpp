@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "common/kernels/combine.h"
+#include "tests/common/kernels/nearest_reference.h"
 #include "tests/support/random_image.h"
 #include "tests/support/simd_targets.h"
 
@@ -33,7 +33,7 @@ TEST(NearestRow, EveryInstructionSetGivesTheBitsOfTheReference) {
         }
         LocalImage expected = target;
         const TargetPixels from = PixelsOf(source, shift);
-        NearestRowReference({from.rgba, from.depth, from.voxel}, PixelsOf(expected, shift), std::size_t(count));
+        testing::NearestRowReference({from.rgba, from.depth, from.voxel}, PixelsOf(expected, shift), std::size_t(count));
         NearestRow({from.rgba, from.depth, from.voxel}, PixelsOf(target, shift), std::size_t(count));
         ASSERT_EQ(target.rgba, expected.rgba) << count << " pixels, shift " << shift;
         ASSERT_EQ(target.depth, expected.depth);

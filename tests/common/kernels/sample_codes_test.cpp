@@ -1,6 +1,6 @@
 // Codes of samples: known values, and every instruction set against the reference.
 
-#include "common/kernels/sample_codes.h"
+#include "tests/common/kernels/sample_codes_reference.h"
 
 #include <gtest/gtest.h>
 
@@ -55,9 +55,9 @@ TEST(SampleCodes, AreThoseOfTheReferenceOnEveryInstructionSet) {
     const std::vector<float> rgba = AnyPixels(random, pixels);
     std::vector<std::uint8_t> plain(rgba.size()), straight(rgba.size());
     std::vector<std::uint16_t> deep(rgba.size());
-    SampleCodesReference(rgba.data(), rgba.size(), plain.data());
-    StraightCodesReference(rgba.data(), pixels, straight.data());
-    StraightCodesReference(rgba.data(), pixels, deep.data());
+    testing::SampleCodesReference(rgba.data(), rgba.size(), plain.data());
+    testing::StraightCodesReference(rgba.data(), pixels, straight.data());
+    testing::StraightCodesReference(rgba.data(), pixels, deep.data());
     ForEachTarget([&] {
       std::vector<std::uint8_t> codes(rgba.size());
       SampleCodes(rgba.data(), rgba.size(), codes.data());

@@ -65,7 +65,7 @@ TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
 struct World {
   Index3 size{128, 128, 256};
   VolumeSummary summary = FullSummary(size);
-  TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
+  ClassifiedVolume volume{1, std::get<TransferFunction>(SomeRequest().transfer.choice), FindRenderer(kDefaultRenderer)};
   OccupancyGrid grid{size, std::vector<CellOccupancy>(16 * 16 * 32, FullCell({{0, 0, 0}, {8, 8, 8}}))};
   Policy policy{.decomposition = "kd-tree", .groups = 1, .balance = "dynamic"};
   mutable ResolvedPolicy resolved;  // of the last Request
@@ -83,15 +83,8 @@ struct World {
     return {size, work};
   }
   LayoutRequest Request(const WorkField* cost) const {
-    FrameRequest request;
-    request.policy = policy;
-    resolved = ResolvePolicy(request, summary.description.geometry).value();
-    return {.summary = &summary,
-            .transfer = &transfer,
-            .policy = &resolved,
-            .renderer = FindRenderer(kDefaultRenderer),
-            .slots = kSlots,
-            .known = {.occupied = &grid, .cost = cost}};
+    resolved = ResolvePolicy(policy, summary.description.geometry);
+    return {.summary = &summary, .volume = &volume, .policy = &resolved, .slots = kSlots, .known = {.occupied = &grid, .cost = cost}};
   }
   std::vector<BoxSeconds> Render(const Layout& layout, double noise) {
     const WorkField truth = Truth();

@@ -1,9 +1,13 @@
 // What a plan says about the frame that its workers render.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/combining/travel.h"
+#include "common/view/clip_corners.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/planning/plan_support.h"
+#include "tests/support/random.h"
 #include "tests/support/renderers.h"
 
 namespace slabstream {
@@ -52,11 +56,40 @@ TEST(PlanFrame, RefusesViewsThatCannotBeRendered) {
   FrameRequest request = SomeRequest();
   request.view.elevation_degrees = -50;
   VolumeSummary summary = FullSummary({64, 64, 600});
-  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1), {}).ok());
+  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1)).ok());
   summary.description.geometry.spacing = {1, 1, 3000};
-  const Status status = PlanFrame(request, 7, summary, FullRoster(1), {}).status();
+  const Status status = PlanFrame(request, 7, summary, FullRoster(1)).status();
   EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
   EXPECT_NE(status.message().find("at most 131072 a side"), std::string::npos) << status.message();
+}
+
+// The cut of a volume that lies askew in its world touches two opposite borders of the picture and crosses none, however thick it is.
+TEST(PlanFrame, ASliceIsFramedByItsCut) {
+  Random random(51);
+  FrameRequest request = SomeRequest();
+  request.renderer = "mip";
+  request.size = {300, 200};
+  for (int i = 0; i < 40; ++i) {
+    SCOPED_TRACE(random.trace());
+    VolumeSummary summary = FullSummary({random.Integer(20, 90), random.Integer(20, 90), random.Integer(20, 90)});
+    VolumeGeometry& geometry = summary.description.geometry;
+    geometry.spacing = {random.Real(0.5, 2), random.Real(0.5, 2), random.Real(0.5, 2)};
+    request.view = {.azimuth_degrees = random.Real(0, 360), .elevation_degrees = random.Real(-90, 90), .fit = true};
+    const Vec3 normal = MakeCamera(request.view, request.size, geometry).view_direction;
+    const Vec3 through = geometry.ToWorld(geometry.centre() + Vec3{random.Real(-8, 8), random.Real(-8, 8), random.Real(-8, 8)});
+    request.clipping.slab = ClipSlab{.normal = normal, .through = through, .thickness = i % 2 == 0 ? 0 : random.Real(0, 20)};
+    const FrameSetup setup = Plan(request, summary, FullRoster(1)).setup;
+    double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
+    for (const Vec3& corner : CornersOf(setup.clip, geometry.bounds())) {
+      const Camera::ImagePoint at = setup.camera.Project(corner);
+      left = std::min(left, at.x), right = std::max(right, at.x);
+      top = std::min(top, at.y), bottom = std::max(bottom, at.y);
+    }
+    const int scale = setup.camera.supersample;
+    EXPECT_NEAR(left + right, 300 * scale, 1e-3);
+    EXPECT_NEAR(top + bottom, 200 * scale, 1e-3);
+    EXPECT_NEAR(std::max((right - left) / 300, (bottom - top) / 200), scale, 1e-3);
+  }
 }
 
 TEST(PlanFrame, ResolvesPresets) {

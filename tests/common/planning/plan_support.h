@@ -14,7 +14,7 @@
 namespace slabstream {
 
 inline FramePlan Plan(const FrameRequest& request, const VolumeSummary& summary, const Roster& roster) {
-  Result<FramePlan> plan = PlanFrame(request, 7, summary, roster, {});
+  Result<FramePlan> plan = PlanFrame(request, 7, summary, roster);
   EXPECT_TRUE(plan.ok()) << plan.status().message();
   return *plan;
 }

@@ -92,13 +92,13 @@ TEST(PlanFrame, AutomaticChoicesDoNotDependOnTheView) {
   const VolumeSummary summary = FullSummary({100, 300, 300});
   constexpr std::int64_t kTarget = 1 << 20;
   FrameRequest request = SomeRequest();
-  const Result<FramePlan> first = PlanFrame(request, 7, summary, FullRoster(2), nullptr, {}, kTarget);
+  const Result<FramePlan> first = PlanFrame(request, 7, summary, FullRoster(2), kTarget);
   ASSERT_TRUE(first.ok());
   EXPECT_EQ(first->slab_axis, Axis::kZ);  // about which views turn
   EXPECT_GT(first->groups.size(), 1U);
   for (int i = 0; i < 50; ++i) {
     request.view = RandomView(random);
-    const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), nullptr, {}, kTarget);
+    const Result<FramePlan> plan = PlanFrame(request, 7, summary, FullRoster(2), kTarget);
     ASSERT_TRUE(plan.ok());
     EXPECT_EQ(plan->layout->partition, first->layout->partition);
   }
@@ -108,7 +108,7 @@ TEST(PlanFrame, ChoosesTheFewestGroupsWhoseBoxesStayUnderTheTarget) {
   const VolumeSummary summary = FullSummary({64, 64, 1000});
   const std::int64_t slice_bytes = 64 * 64;
   const auto groups = [&](std::int64_t target_slices, int workers) {
-    return PlanFrame(SomeRequest(), 7, summary, FullRoster(workers), nullptr, {}, target_slices * slice_bytes)->groups.size();
+    return PlanFrame(SomeRequest(), 7, summary, FullRoster(workers), target_slices * slice_bytes)->groups.size();
   };
   EXPECT_EQ(groups(1000, 1), 1U);         // all of it fits
   EXPECT_EQ(groups(999, 1), 2U);          // halves and their halos
@@ -134,7 +134,7 @@ TEST(PlanFrame, ChoosesGroupsByTheLargestBoxThatShowsSomething) {
     FrameRequest request = SomeRequest();
     request.policy.decomposition = entry.name;
     constexpr std::int64_t kTarget = 64 * 64 * 64;
-    const FramePlan plan = *PlanFrame(request, 7, summary, FullRoster(2), nullptr, {}, kTarget);
+    const FramePlan plan = *PlanFrame(request, 7, summary, FullRoster(2), kTarget);
     const std::vector<Placement> placements = PlacementsOf(plan);
     ASSERT_FALSE(placements.empty());
     // Slabs across the whole volume become as thin as their halo allows, and stay too large.

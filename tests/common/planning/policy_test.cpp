@@ -46,13 +46,12 @@ TEST(ResolvePolicy, OfWhatItAskedForIsTheSame) {
                             .axis = axis,
                             .assignment = std::string(assignment.name),
                             .balance = std::string(kDynamicBalance)};
-          const Result<ResolvedPolicy> resolved = ResolvePolicy(request, geometry);
-          ASSERT_TRUE(resolved.ok()) << resolved.status().message();
-          EXPECT_EQ(resolved->decomposition, &decomposition);
-          EXPECT_EQ(resolved->assignment, &assignment);
-          EXPECT_EQ(NeedsOccupancy(*resolved), NeedsOccupancy(request.policy));
-          request.policy = AskFor(*resolved);
-          EXPECT_EQ(*ResolvePolicy(request, geometry), *resolved);
+          const ResolvedPolicy resolved = ResolvePolicy(SettledPolicy(request, geometry), geometry);
+          EXPECT_EQ(resolved.decomposition, &decomposition);
+          EXPECT_EQ(resolved.assignment, &assignment);
+          const Policy asked = AskFor(resolved);
+          EXPECT_EQ(NeedsOccupancy(asked), NeedsOccupancy(request.policy));
+          EXPECT_EQ(ResolvePolicy(asked, geometry), resolved);
         }
       }
     }
@@ -75,7 +74,7 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
   const auto status = [&](auto change, const Roster& roster) {
     FrameRequest request = SomeRequest();
     change(request);
-    return PlanFrame(request, 7, summary, roster, {}).status();
+    return PlanFrame(request, 7, summary, roster).status();
   };
   EXPECT_EQ(status([](auto& r) { r.policy.decomposition = "cake"; }, FullRoster(1)),
             Status::InvalidArgument("policy.decomposition is 'cake', but must be one of: auto, slab, beam, subcube, octree, kd-tree"));

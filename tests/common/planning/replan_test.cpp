@@ -95,6 +95,40 @@ TEST(Replan, SurvivesAllButOne) {
   EXPECT_EQ(Replan(plan, Roster{std::vector<WorkerId>(9)}).status().code(), StatusCode::kUnavailable);
 }
 
+TEST(Replan, SetsBoxesApart) {
+  const VolumeSummary summary = FullSummary({40, 40, 120});
+  FrameRequest request = SomeRequest();
+  request.policy.groups = 3;
+  for (const int workers : {1, 2, 5}) {
+    const FramePlan plan = Plan(request, summary, FullRoster(workers));
+    Roster rest = FullRoster(workers);
+    if (workers > 1) rest.slots[plan.display - 1] = 0;  // another display worker is needed, too
+    const GroupPlan& first = plan.groups.front();
+    const SetApart apart = {{first.placements.front().id, first.placements.back().id},
+                            WorkerId(workers == 1        ? 1
+                                     : plan.display == 1 ? 2
+                                                         : 1)};
+    const Result<FramePlan> again = Replan(plan, rest, apart);
+    ASSERT_TRUE(again.ok());
+    EXPECT_EQ(PlacedBoxes(*again), PlacedBoxes(plan));
+    for (const Placement& placement : again->groups.front().placements) {
+      const bool alone = apart.boxes.contains(placement.id);
+      if (alone || workers > 2) {
+        EXPECT_EQ(placement.worker == apart.worker, alone) << workers;
+      }
+    }
+    if (workers > 2) {
+      EXPECT_NE(again->display, apart.worker);
+    }
+    const Result<FramePlan> as_ever = Replan(plan, rest);
+    for (std::size_t group = 1; group < plan.groups.size(); ++group) {
+      for (std::size_t rank = 0; rank < plan.groups[group].placements.size(); ++rank) {
+        EXPECT_EQ(again->groups[group].placements[rank].worker, as_ever->groups[group].placements[rank].worker);
+      }
+    }
+  }
+}
+
 TEST(OwnersOf, LendsTheBoxesOfVacantSlotsEvenly) {
   for (const AssignmentEntry& assignment : Assignments()) {
     const Roster roster = {{11, 0, 13, 0, 15}};

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <memory>
 
 #include "common/planning/frame_plan.h"
 #include "tests/support/random.h"
@@ -46,6 +47,13 @@ inline FrameRequest SomeRequest() {
   transfer.opacities = {{100, 0}, {200, 1}};
   request.transfer.choice = transfer;
   return request;
+}
+
+inline ResolvedRequest Resolved(const FrameRequest& request, const VolumeSummary& summary) {
+  return ResolveRequest(request, 1, std::make_shared<const VolumeSummary>(summary)).value();
+}
+inline FrameSetup SetupOf(const FrameRequest& request, const VolumeSummary& summary) {
+  return MakeFrameSetup(Resolved(request, summary)).value();
 }
 
 inline ViewParameters RandomView(Random& random) {

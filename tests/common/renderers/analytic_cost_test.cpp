@@ -292,17 +292,12 @@ TEST(MakeLayout, BoxesOfAKdTreeTakeEquallyLong) {
   const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
   for (const RendererKind* renderer : Renderers()) {
     const std::unique_ptr<AnalyticCost> cost = renderer->MakeCost({&grid, &summary, &transfer});
+    const ClassifiedVolume volume(1, transfer, renderer);
     for (const std::uint32_t slots : {2U, 3U, 5U, 8U, 13U}) {
       SCOPED_TRACE(std::to_string(slots) + " slots, renderer " + std::string(renderer->name()));
-      FrameRequest frame;
-      frame.policy = {.decomposition = "kd-tree", .groups = 1};
-      ResolvedPolicy resolved = ResolvePolicy(frame, summary.description.geometry).value();
-      const LayoutRequest request{.summary = &summary,
-                                  .transfer = &transfer,
-                                  .policy = &resolved,
-                                  .renderer = renderer,
-                                  .slots = slots,
-                                  .known = {.occupied = &grid}};
+      ResolvedPolicy resolved = ResolvePolicy({.decomposition = "kd-tree", .groups = 1}, summary.description.geometry);
+      const LayoutRequest request{
+          .summary = &summary, .volume = &volume, .policy = &resolved, .slots = slots, .known = {.occupied = &grid}};
       const Predicted occupied = PredictionOf(MakeLayout(request), *cost);
       if (renderer->along_slices()) {
         EXPECT_LT(occupied.imbalance, 1.12);

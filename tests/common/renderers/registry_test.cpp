@@ -95,7 +95,7 @@ TEST(Renderers, MakeFrames) {
       request.view.projection = projection;
       request.view.azimuth_degrees = 33;
       const VolumeSummary summary = FullGridSummary({40, 41, 42});
-      const FrameSetup setup = MakeFrameSetup(request, 1, summary).value();
+      const FrameSetup setup = SetupOf(request, summary);
       EXPECT_EQ(setup.renderer, kind);
       EXPECT_EQ(setup.format, kind->format());
       EXPECT_EQ(setup.halo, kind->reach());

@@ -31,6 +31,7 @@ class KeyedSocketTest : public testing::Test {
     EXPECT_TRUE(dealer.ok() && dealer->Connect(endpoint).ok());
     return *std::move(dealer);
   }
+  int port() const { return std::stoi(endpoint_.substr(endpoint_.rfind(':') + 1)); }
   Socket ConnectedAs(const KeyPair& own) { return Connected(endpoint_, {.client_keys = KeysOf(own)}); }
 
   std::optional<Incoming> Receive(Duration patience = kPatience) { return slabstream::Receive(*router_, patience); }

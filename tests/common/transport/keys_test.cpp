@@ -4,11 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "tests/common/transport/keyed_socket_test.h"
+#include "tests/common/transport/tcp_relay.h"
 
 namespace slabstream {
 namespace {
@@ -71,6 +74,29 @@ TEST_P(ConnectionsWithKeys, OthersAreNotHeard) {
     for (const std::size_t refused : {3, 4}) EXPECT_TRUE(IsRefused(others[refused])) << refused;
   }
   EXPECT_FALSE(Receive(milliseconds(100)));
+}
+
+// Somebody on the network says once more what the friend has said: in a connection of their own, and then in the friend's.
+TEST_P(ConnectionsWithKeys, WhatWasRecordedIsNotHeardAgain) {
+  context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
+  TcpRelay network(port());
+  Socket dealer = Connected(network.endpoint(), {.client_keys = KeysOf(friend_)});
+  ExpectHeard(dealer, "once");
+  const std::vector<std::string> once = network.Pieces();
+  std::atomic<bool> over = false;
+  std::jthread again([&] {
+    EXPECT_TRUE(network.Replay(once)) << "the connection does not end";
+    over = true;
+  });
+  while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
+  again.join();
+  network.RepeatNext();
+  ExpectHeard(dealer, "and this");
+  EXPECT_TRUE(Until(*router_, [&] {
+    EXPECT_FALSE(router_->TryReceive()) << "it was heard twice";
+    return network.connections() >= 2;
+  })) << "the connection does not end";
+  ExpectHeard(dealer, "later");
 }
 
 TEST_P(ConnectionsWithKeys, NobodyIsAdmittedToAPlaneThatNamesNobody) {

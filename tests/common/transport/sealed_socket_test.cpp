@@ -25,7 +25,6 @@ class SealedSocketTest : public KeyedSocketTest {
     context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
   }
   Socket ConnectedTo(const TcpRelay& network) { return Connected(network.endpoint(), {.client_keys = KeysOf(friend_)}); }
-  int port() const { return std::stoi(endpoint_.substr(endpoint_.rfind(':') + 1)); }
 };
 
 TEST_F(SealedSocketTest, MessagesArriveInOrderWithTheirSendersKey) {

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <utility>
 
 #include "common/base/check.h"
 
@@ -86,6 +87,11 @@ void TcpRelay::AlterAfter(std::size_t bytes) {
   alter_after_ = bytes + 1;
 }
 
+void TcpRelay::RepeatNext() {
+  const std::lock_guard lock(mutex_);
+  repeat_next_ = true;
+}
+
 bool TcpRelay::Replay(const std::vector<std::string>& pieces) const {
   const int socket = ConnectTo(port_);
   std::array<char, 4096> taken{};
@@ -130,8 +136,10 @@ void TcpRelay::Pass(int from, int to, const std::stop_token& stop) {
     if (items[0].revents == 0) continue;
     const ssize_t count = ::recv(from, bytes.data(), bytes.size(), 0);
     if (count <= 0) return;
+    bool twice = false;
     {
       const std::lock_guard lock(mutex_);
+      twice = std::exchange(repeat_next_, false);
       pieces_.emplace_back(bytes.data(), std::size_t(count));
       if (alter_after_ > std::size_t(count)) {
         alter_after_ -= std::size_t(count);
@@ -141,6 +149,7 @@ void TcpRelay::Pass(int from, int to, const std::stop_token& stop) {
       }
     }
     SendAll(to, bytes.data(), std::size_t(count));
+    if (twice) SendAll(to, bytes.data(), std::size_t(count));
   }
 }
 

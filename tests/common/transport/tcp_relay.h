@@ -1,5 +1,5 @@
-// TcpRelay: somebody on the network between a dealer and a router: reads and records all that the dealer sends, can alter it, and can
-// connect to the router and say it again.
+// TcpRelay: somebody on the network between a dealer and a router: reads and records all that the dealer sends, can alter or repeat it, and
+// can connect to the router and say it again.
 #pragma once
 
 #include <cstddef>
@@ -26,6 +26,9 @@ class TcpRelay {
   // Alters the next byte that comes once `bytes` more have passed.
   void AlterAfter(std::size_t bytes);
 
+  // The next piece passes twice.
+  void RepeatNext();
+
   // The same in pieces. Between two of them the other end had a moment to answer, as a handshake needs.
   std::vector<std::string> Pieces() const;
 
@@ -39,10 +42,11 @@ class TcpRelay {
   const int port_;
   int listener_ = -1, listening_port_ = 0;
   mutable std::mutex mutex_;
-  std::vector<std::string> pieces_;  // guarded by mutex_, as are the next two
+  std::vector<std::string> pieces_;  // guarded by mutex_, as are the next three
   int connections_ = 0;
   std::size_t alter_after_ = 0;  // 0: nothing is altered
-  std::jthread thread_;          // last member
+  bool repeat_next_ = false;
+  std::jthread thread_;  // last member
 };
 
 }  // namespace slabstream

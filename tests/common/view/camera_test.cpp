@@ -8,6 +8,7 @@
 
 #include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
+#include "tests/common/view/view_limits.h"
 #include "tests/support/expect_near.h"
 #include "tests/support/random.h"
 

@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "common/view/camera.h"
+#include "common/view/clip_corners.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/support/random.h"
@@ -59,6 +62,13 @@ bool Keeps(const Clipping& clipping, const VolumeGeometry& geometry, const Vec3&
   return inside == (clipping.mode == ClipMode::kKeep);
 }
 
+// Whether a sample at p is drawn.
+bool Keeps(const ClipRegion& region, const Vec3& p) {
+  if (region.empty()) return true;
+  const bool inside = std::ranges::all_of(region.sides, [&](const HalfSpace& side) { return side.Distance(p) >= 0; });
+  return inside == (region.mode == ClipMode::kKeep);
+}
+
 TEST(Clip, KeepsWhatTheBoxAndAllPlanesLeave) {
   Random random(21);
   int kept = 0, points = 0;
@@ -71,8 +81,8 @@ TEST(Clip, KeepsWhatTheBoxAndAllPlanesLeave) {
     for (int n = 0; n < 50; ++n) {
       Vec3 p;
       for (const Axis axis : kAxes) p[axis] = random.Real(-0.499, geometry.size[axis] - 0.501);
-      ASSERT_EQ(region.Keeps(p), Keeps(clipping, geometry, p));
-      kept += region.Keeps(p) ? 1 : 0;
+      ASSERT_EQ(Keeps(region, p), Keeps(clipping, geometry, p));
+      kept += Keeps(region, p) ? 1 : 0;
       ++points;
     }
   }
@@ -92,7 +102,7 @@ TEST(Clip, DropsNoBoxThatHoldsAPointWhichIsKept) {
     for (int n = 0; n < 50; ++n) {
       Vec3 p;
       for (const Axis axis : kAxes) p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
-      any = any || region.Keeps(p);
+      any = any || Keeps(region, p);
     }
     if (region.MayKeep(box)) continue;
     ++dropped;
@@ -119,10 +129,42 @@ TEST(Clip, KeepsAllOfABoxOnlyIfItKeepsEveryPointRoundIt) {
       for (const Axis axis : kAxes) p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
       const int axis = n % 3;
       p[axis] += random.Real(-0.99, 0.99) * margin / geometry.spacing[axis];
-      EXPECT_TRUE(region.Keeps(p));
+      EXPECT_TRUE(Keeps(region, p));
     }
   }
   EXPECT_GT(whole, 50);
+}
+
+// In every direction no kept point lies beyond the corners, and the corners themselves are kept.
+TEST(Clip, CornersAreThoseOfWhatIsLeftOfABox) {
+  Random random(25);
+  int with_points = 0;
+  for (int i = 0; i < 1000; ++i) {
+    SCOPED_TRACE(random.trace());
+    const VolumeGeometry geometry = RandomGeometry(random, World::kScene);
+    Clipping clipping = RandomClipping(random, geometry);
+    clipping.mode = ClipMode::kKeep;
+    const ClipRegion region = MakeClipRegion(clipping, geometry).value();
+    const Box box = RandomBox(random, geometry.bounds());
+    const std::vector<Vec3> corners = CornersOf(region, box);
+    for (const Vec3& corner : corners) {
+      for (const HalfSpace& side : region.sides) EXPECT_GE(side.Distance(corner), -1e-6);
+    }
+    bool any = false;
+    for (int n = 0; n < 50; ++n) {
+      Vec3 p, direction;
+      for (const Axis axis : kAxes) {
+        p[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
+        direction[axis] = random.Real(-1, 1);
+      }
+      if (!Keeps(region, p)) continue;
+      any = true;
+      EXPECT_TRUE(std::ranges::any_of(corners, [&](const Vec3& corner) { return Dot(direction, corner) >= Dot(direction, p) - 1e-6; }));
+    }
+    with_points += any && !region.empty() ? 1 : 0;
+  }
+  EXPECT_GT(with_points, 100);
+  EXPECT_EQ(CornersOf({}, {{1, 2, 3}, {4, 5, 6}}).size(), 8U);
 }
 
 TEST(Clip, DistancesArePhysical) {
@@ -140,7 +182,7 @@ TEST(Clip, ABoxAroundTheVolumeLeavesNothingToDo) {
   EXPECT_EQ(MakeClipRegion({.box = ClipBox{{0, -1e9, 0}, {9, 1e9, 30}, ClipUnit::kVoxels}}, geometry).value().sides.size(), 1U);
   const ClipRegion all_gone =
       MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}, .mode = ClipMode::kCutAway}, geometry).value();
-  EXPECT_FALSE(all_gone.Keeps({5, 5, 5}));
+  EXPECT_FALSE(Keeps(all_gone, {5, 5, 5}));
 }
 
 TEST(Clip, InvalidOnesAreErrorsThatNameTheField) {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "common/view/camera.h"
+#include "tests/common/view/view_limits.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/common/view/view_limits.h"
 #include "tests/support/random.h"
 
 namespace slabstream {

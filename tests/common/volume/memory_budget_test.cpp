@@ -25,13 +25,15 @@ TEST(MemoryBudget, LimitsAreWholeNumbersWithUnits) {
   EXPECT_EQ(*ParseMemoryLimit("--memory", "512MiB"), std::uint64_t{512} << 20);
   EXPECT_EQ(*ParseMemoryLimit("--memory", "4GiB"), std::uint64_t{4} << 30);
   EXPECT_EQ(*ParseMemoryLimit("--memory", "2TiB"), std::uint64_t{2} << 40);
-  for (const char* text : {"", "4", "4GB", "4 GiB", "GiB", "-4GiB", "1.5GiB", "4gib", "4GiBx"}) {
+  EXPECT_EQ(*ParseMemoryLimit("--memory", "512M"), std::uint64_t{512} << 20);
+  EXPECT_EQ(*ParseMemoryLimit("--memory", "2G"), std::uint64_t{2} << 30);
+  EXPECT_EQ(*ParseMemoryLimit("--memory", "1T"), std::uint64_t{1} << 40);
+  for (const char* text : {"", "4", "4GB", "4 GiB", "GiB", "-4GiB", "1.5GiB", "4gib", "4GiBx", "2g", "iB", "G"}) {
     EXPECT_EQ(ParseMemoryLimit("--memory", text).status().message(),
-              "--memory '" + std::string(text) + "' is not a size such as 512MiB or 4GiB");
+              "--memory '" + std::string(text) + "' is not a size such as 512M or 4G");
   }
   for (const char* text : {"0GiB", "255MiB", "1025TiB", "18014398509481985MiB"}) {
-    EXPECT_EQ(ParseMemoryLimit("--memory", text).status().message(),
-              "--memory " + std::string(text) + " is out of range [256MiB, 1024TiB]");
+    EXPECT_EQ(ParseMemoryLimit("--memory", text).status().message(), "--memory " + std::string(text) + " is out of range [256M, 1024T]");
   }
 }
 

@@ -161,6 +161,12 @@ TEST(AnyMessage, RefusedSubmitsCanBeAnswered) {
   EXPECT_THAT(decoded.status().message(), HasSubstr("zoom"));
   EXPECT_EQ(RefusalOf(header, decoded.status()), CoordinatorToClient(FrameFailed{.request = 77, .status = decoded.status()}));
   EXPECT_EQ(RefusalOf(Encode(SampleQuery{.nonce = 7}), decoded.status()), CoordinatorToClient(OrderRefused{7, decoded.status()}));
+  // Also orders and questions about the service, whether a field or the payload is wrong.
+  const CoordinatorToClient refused = OrderRefused{7, decoded.status()};
+  EXPECT_EQ(RefusalOf(Encode(KeysOrder{.nonce = 7}), decoded.status()), refused);
+  EXPECT_EQ(RefusalOf(Encode(DataOrder{.nonce = 7}), decoded.status()), refused);
+  EXPECT_EQ(RefusalOf(Encode(StatusQuery{.nonce = 7}), decoded.status()), refused);
+  EXPECT_EQ(RefusalOf(Encode(ShutDown{.nonce = 7}), decoded.status()), refused);
   EXPECT_FALSE(RefusalOf(Encode(CancelFrame{1}), decoded.status()));
   EXPECT_FALSE(RefusalOf({}, decoded.status()));
 }

@@ -43,6 +43,19 @@ void Check(const std::vector<Case>& cases) {
   }
 }
 
+TEST(FieldChecks, OnlyANewKeyNeedsARole) {
+  Check<KeysOrder>({
+      {[](auto& e) { e.mutable_keys_order()->clear_role(); }, ""},
+      {[](auto& e) {
+         e.mutable_keys_order()->clear_role();
+         e.mutable_keys_order()->set_action(v1::KEYS_ACTION_REVOKE);
+       },
+       ""},
+      {[](auto& e) { e.mutable_keys_order()->set_action(v1::KEYS_ACTION_ROTATE); }, "KeysOrder.role: not set"},
+      {[](auto& e) { e.mutable_keys_order()->clear_action(); }, "KeysOrder.action: not set"},
+  });
+}
+
 TEST(FieldChecks, Workers) {
   Check<Register>({
       {[](auto& e) { e.mutable_register_worker()->set_threads(0); }, "Register.threads: 0 is not in [1, 1024]"},

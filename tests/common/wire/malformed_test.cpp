@@ -128,6 +128,8 @@ TEST(Malformed, NoEnumMayHaveAnUnknownValue) {
     AlterEachField(
         [&](const Place& place) {
           if (place.field->cpp_type() != FieldDescriptor::CPPTYPE_ENUM) return false;
+          const auto* const order = dynamic_cast<const v1::KeysOrder*>(place.message);
+          if (order != nullptr && place.field->name() == "role" && order->action() != v1::KEYS_ACTION_ROTATE) return false;  // ignored
           place.message->GetReflection()->SetEnumValue(place.message, place.field, bad);
           return true;
         },

@@ -1,4 +1,5 @@
 #include "tests/common/wire/samples.h"
+#include "tests/common/view/view_limits.h"
 #include "tests/support/renderers.h"
 
 #include <limits>
@@ -292,7 +293,7 @@ std::vector<SubmitFrame> SamplesOf() {
 
 template <>
 std::vector<FrameProgress> SamplesOf() {
-  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2}};
+  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2, 100}};
 }
 
 template <>
@@ -431,9 +432,19 @@ std::vector<SampleQuery> SamplesOf() {
 
 template <>
 std::vector<SampleReply> SamplesOf() {
-  const VolumeSample full{{-1e9, 0, 1}, true, {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
-                          -2.5};
+  const VolumeSample full{{-1e9, 0, 1}, true,  {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
+                          -2.5,         1e-300};
   return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .label = LabelAt{}}}}};
+}
+
+template <>
+std::vector<StatisticsQuery> SamplesOf() {
+  return {{.dataset = "a", .box = {{}, {1, 1, 1}}}, {kMax64, kLongName, {{-1e9, 0, 1}, {1e9, 0.5, 2}, ClipUnit::kPercent}}};
+}
+
+template <>
+std::vector<StatisticsReply> SamplesOf() {
+  return {{}, {kMax64, {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300}}};
 }
 
 template <>

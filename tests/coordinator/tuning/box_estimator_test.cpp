@@ -31,7 +31,7 @@ FrameSetup SetupOf(const Index3& size, const RendererKind* renderer, const ViewP
   request.renderer = renderer->name();
   request.view = view;
   request.size = {side, side};
-  return MakeFrameSetup(request, 1, FullGridSummary(size)).value();
+  return SetupOf(request, FullGridSummary(size));
 }
 
 TEST(BoxEstimator, AnOpaqueBlockSeenFromTheFrontCoversItsRectangle) {

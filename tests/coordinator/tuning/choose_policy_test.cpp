@@ -11,7 +11,6 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/policy_names.h"
-#include "common/planning/resolve_look.h"
 #include "coordinator/tuning/service_machine.h"
 #include "tests/common/planning/support.h"
 #include "tests/support/renderers.h"
@@ -57,12 +56,17 @@ struct Question {
   std::int64_t box_bytes_target = kBoxBytesTarget;
   std::uint32_t slots = 1;
 
-  PolicyChoice Choose(const Policy& policy) {
-    request.policy = policy;
-    Result<PolicyChoice> choice =
-        ChoosePolicy({.frame = &request, .summary = &summary, .slots = slots, .machine = &machine, .box_bytes_target = box_bytes_target});
-    EXPECT_TRUE(choice.ok()) << choice.status().message();
-    return *choice;
+  PolicyChoice Choose(const Policy& policy, const ResolvedPolicy* now = nullptr, double least_gain = 0) const {
+    const ResolvedRequest resolved = Resolved(request, summary);
+    const FrameSetup setup = MakeFrameSetup(resolved).value();
+    return ChoosePolicy({.open = &policy,
+                         .resolved = &resolved,
+                         .setup = &setup,
+                         .slots = slots,
+                         .machine = &machine,
+                         .box_bytes_target = box_bytes_target,
+                         .now = now,
+                         .least_gain = least_gain});
   }
 };
 
@@ -193,20 +197,9 @@ TEST(ChoosePolicy, TakesMoreGroupsWhereLinksMakeThemPay) {
 
 TEST(ChoosePolicy, KeepsWhatHoldsUnlessEnoughIsGained) {
   Question question{.summary = SummaryWith({192, 192, 192}, [](const Index3& b) { return b.z < 3 && b.x < 6; }), .slots = 8};
-  question.request.policy = Automatic();
-  FrameRequest holding = question.request;
-  holding.policy = {.balance_by = "voxels", .groups = 1};
-  const ResolvedPolicy now = ResolvePolicy(holding, question.summary.description.geometry).value();
-  PolicyQuestion asked{.frame = &question.request,
-                       .summary = &question.summary,
-                       .slots = question.slots,
-                       .machine = &question.machine,
-                       .box_bytes_target = question.box_bytes_target,
-                       .now = &now,
-                       .least_gain = 0.95};
-  EXPECT_EQ(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
-  asked.least_gain = 0.05;
-  EXPECT_NE(ChoosePolicy(asked)->policy.decomposition, now.decomposition);
+  const ResolvedPolicy now = ResolvePolicy({.balance_by = "voxels", .groups = 1}, question.summary.description.geometry);
+  EXPECT_EQ(question.Choose(Automatic(), &now, 0.95).policy.decomposition, now.decomposition);
+  EXPECT_NE(question.Choose(Automatic(), &now, 0.05).policy.decomposition, now.decomposition);
 }
 
 TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
@@ -216,9 +209,9 @@ TEST(ChoosePolicy, SlabsOfAllCandidatesFitTheBudget) {
     Policy asked = Automatic();
     asked.decomposition = entry.name;
     const PolicyChoice choice = question.Choose(asked);
-    const TransferFunction transfer = ResolveTransfer(question.request.transfer, question.summary).value();
-    const Layout layout = MakeLayout(
-        {.summary = &question.summary, .transfer = &transfer, .policy = &choice.policy, .renderer = Splatting(), .slots = question.slots});
+    const ResolvedRequest resolved = Resolved(question.request, question.summary);
+    const Layout layout =
+        MakeLayout({.summary = &question.summary, .volume = &resolved.volume, .policy = &choice.policy, .slots = question.slots});
     for (const Box& box : layout.partition.boxes()) {
       EXPECT_LE(Grown(box, kHalo, layout.partition.bounds()).voxel_count(), question.box_bytes_target)
           << entry.name << ", " << choice.policy.groups << " groups";
@@ -250,19 +243,6 @@ TEST(ChoosePolicy, ASchemeOfTooManyStepsIsNotTriedAndNotPredicted) {
   asked.combine = "direct-send";
   const PolicyChoice choice = question.Choose(asked);
   EXPECT_EQ(choice.policy.combine, "direct-send");
-}
-
-TEST(ChoosePolicy, TellsWhatIsWrongWithARequest) {
-  Question question{.summary = FullSummary({64, 64, 64})};
-  question.request.policy = Automatic();
-  question.request.transfer.choice = std::string("no such preset");
-  EXPECT_EQ(ChoosePolicy({.frame = &question.request,
-                          .summary = &question.summary,
-                          .machine = &question.machine,
-                          .box_bytes_target = question.box_bytes_target})
-                .status()
-                .code(),
-            StatusCode::kNotFound);
 }
 
 }  // namespace

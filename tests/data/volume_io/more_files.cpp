@@ -99,7 +99,7 @@ FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool for
 
 FileBytes NpyHeader(const FileSpec& spec) {
   constexpr const char* kTypes[] = {"i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"};
-  return NpyHeader((spec.big_endian ? ">" : "<") + std::string(kTypes[int(spec.type)]),
+  return NpyHeader(std::string(spec.big_endian ? ">" : "<") + kTypes[int(spec.type)],
                    fmt::format("({}, {}, {})", spec.size.z, spec.size.y, spec.size.x));
 }
 

@@ -72,6 +72,27 @@ const std::vector<double> kHalfValues = {0, 0x1p-24, 0.333251953125, 1, -2, 6550
 
 // --- MRC
 
+// What is told while a file is read.
+std::vector<int> PercentsOf(const std::string& path, ReadOptions options = {}) {
+  std::vector<int> told;
+  ReadProgress progress([&](int percent) { told.push_back(percent); });
+  options.progress = &progress;
+  EXPECT_TRUE(ReadVolume(path, options).ok());
+  return told;
+}
+
+TEST_F(ReadersTest, ReadingTellsHowFarItIs) {
+  const FileBytes samples(std::size_t{16} << 20, '\0');
+  const auto header = [](const std::string& encoding) {
+    return "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 256 256 256\nencoding: " + encoding + "\n\n";
+  };
+  WriteFile(directory_ / "raw.nrrd", header("raw") + samples);
+  EXPECT_THAT(PercentsOf(directory_ / "raw.nrrd"), testing::ElementsAre(25, 50, 75, 100));
+  WriteFile(directory_ / "packed.nrrd", header("gzip") + Gzip(samples));
+  EXPECT_THAT(PercentsOf(directory_ / "packed.nrrd"), testing::ElementsAre(25, 50, 75, 100));
+  EXPECT_THAT(PercentsOf(directory_ / "raw.nrrd", {.headers_only = true}), testing::IsEmpty());
+}
+
 TEST_F(ReadersTest, MrcHasItsModesInBothByteOrders) {
   const struct {
     int mode;

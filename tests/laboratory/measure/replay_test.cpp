@@ -115,7 +115,7 @@ TEST(Replay, FramesOfTheServiceCanBeReplayed) {
   options.workers = 3;
   options.coordinator.catalogue["sphere"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
   const std::unique_ptr<EmbeddedService> service = EmbeddedService::Start(context, std::move(options)).value();
-  Client client = Client::Connect(context, service->endpoint()).value();
+  Client client = service->Connect().value();
   std::vector<RecordedFrame> frames;
   for (int i = 0; i < 3; ++i) {
     FrameRequest request;

@@ -1,7 +1,6 @@
 #include "worker/renderers/raycast/empty_distance.h"
 
 #include <algorithm>
-#include <utility>
 
 namespace slabstream {
 namespace {

@@ -35,8 +35,4 @@ struct MarchWork {
 // a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded.
 std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
 
-// The definition: one ray and one sample after the other, without leaps. Within 1e-5 of MarchTile where `termination` is 0; with
-// isosurfaces within 1e-3, except where a ray merely touches one.
-void MarchTileReference(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
-
 }  // namespace slabstream

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 
 #include "common/base/aligned_buffer.h"
 #include "common/frame/layer_look.h"

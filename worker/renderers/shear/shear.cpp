@@ -11,7 +11,6 @@
 #include <cmath>
 #include <optional>
 #include <tuple>
-#include <utility>
 
 #include "worker/rays/ray_box.h"
 #include "worker/rays/render_tiles.h"

@@ -1,7 +1,6 @@
 #include "worker/renderers/shear/shear_passes.h"
 
 #include <cmath>
-#include <utility>
 
 namespace slabstream::shear {
 

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <memory>
 
 #include "worker/renderers/shear/composer-inl.h"
 #include "worker/renderers/shear/resampler-inl.h"

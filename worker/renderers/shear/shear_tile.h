@@ -16,7 +16,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "common/base/aligned_buffer.h"
 #include "common/image/occlusion_mask.h"
 #include "worker/rays/ray_look.h"
 #include "worker/rays/view_rays.h"

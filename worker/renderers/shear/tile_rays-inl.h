@@ -32,7 +32,7 @@ class TileRays : TileContext {
         RayPacket packet;
         const auto u = Columns(U(column)), v = Set(V(row));
         const auto &from_x = passes_.turned ? v : u, &from_y = passes_.turned ? u : v;
-        for (std::size_t i = 0; i < 3; ++i) {  // as RayOf
+        for (std::size_t i = 0; i < 3; ++i) {  // as PacketAt
           const auto offset = hn::Add(hn::Mul(from_x, Set(rays_.right[i])), hn::Mul(from_y, Set(rays_.down[i])));
           packet.first[i] = hn::Add(Set(rays_.start[i]), offset);
           packet.move[i] = hn::Mul(Set(rays_.step), Set(rays_.forward[i]));

@@ -9,7 +9,6 @@
 
 #include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
-#include "common/mesh/mesh.h"
 #include "worker/renderers/slice/frame_space.h"
 
 namespace slabstream::slice {

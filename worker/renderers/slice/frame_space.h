@@ -10,7 +10,6 @@
 // where the rounding of different faces decides. Near a single face two cells compute the same bits, so nothing else depends on this.
 #pragma once
 
-#include <cstdint>
 #include <span>
 
 #include "common/base/aligned_buffer.h"

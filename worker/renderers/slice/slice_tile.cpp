@@ -10,7 +10,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <utility>
 #include <vector>
 
 #include "worker/kernels/power-inl.h"

@@ -8,7 +8,6 @@
 //   4. cells that end in the chunk leave the list
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>

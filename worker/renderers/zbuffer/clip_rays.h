@@ -13,7 +13,6 @@
 // outline smaller.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>

@@ -6,8 +6,8 @@
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"
 #include "tests/support/simd_targets.h"
+#include "tests/worker/rays/project_reference.h"
 #include "tests/worker/renderers/render_support.h"
-#include "worker/rays/project.h"
 
 namespace slabstream {
 namespace {

@@ -10,10 +10,10 @@
 #include "tests/support/random_box.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
+#include "tests/worker/renderers/raycast/march_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/layer_volume.h"
-#include "worker/renderers/raycast/march.h"
 
 namespace slabstream {
 namespace {

@@ -7,9 +7,9 @@
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"
 #include "tests/support/simd_targets.h"
+#include "tests/worker/renderers/raycast/march_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
-#include "worker/renderers/raycast/march.h"
 
 namespace slabstream {
 namespace {

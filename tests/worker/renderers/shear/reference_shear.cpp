@@ -6,8 +6,8 @@
 
 #include "common/renderers/shear/shear_parameters.h"
 #include "common/view/phong.h"
+#include "tests/worker/rays/pixel_ray.h"
 #include "worker/rays/ray_look.h"
-#include "worker/rays/view_rays.h"
 #include "worker/renderers/shear/shear_passes.h"
 
 namespace slabstream::testing {

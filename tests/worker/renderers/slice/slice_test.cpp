@@ -11,6 +11,7 @@
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
 #include "tests/support/simd_targets.h"
+#include "tests/worker/rays/pixel_ray.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/rays/ray_look.h"
 #include "worker/renderers/slice/cell_bins.h"

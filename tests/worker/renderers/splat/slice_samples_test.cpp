@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/common/view/view_limits.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/splat/slice_samples.h"
 

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tests/support/simd_targets.h"
+#include "tests/worker/kernels/clip_rows_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/zbuffer/clip_rays.h"
 

@@ -9,9 +9,9 @@
 
 #include "common/view/phong.h"
 #include "tests/support/simd_targets.h"
+#include "tests/worker/kernels/draw_faces_reference.h"
+#include "tests/worker/kernels/shade_faces_reference.h"
 #include "tests/worker/renderers/render_support.h"
-#include "worker/kernels/draw_faces.h"
-#include "worker/kernels/shade_faces.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
 #include "worker/renderers/zbuffer/vertex_normals.h"
 

@@ -1,12 +1,14 @@
+#include "tests/worker/rays/project_reference.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
-#include "worker/rays/project.h"
+#include "tests/worker/rays/pixel_ray.h"
 
-namespace slabstream {
+namespace slabstream::testing {
 namespace {
 
 float Lerp(float t, float a, float b) { return a + t * (b - a); }
@@ -75,4 +77,4 @@ void ProjectTileReference(const ProjectWork& work, const PixelBounds& tile, floa
   });
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

@@ -1,10 +1,10 @@
+#include "tests/worker/kernels/draw_faces_reference.h"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
-#include "worker/kernels/draw_faces.h"
-
-namespace slabstream {
+namespace slabstream::testing {
 
 std::size_t DrawFacesReference(Projection projection, const FaceProjection& faces, const FaceSite* sites, std::uint32_t first,
                                std::uint32_t count, const KeyBand& band) {
@@ -60,4 +60,4 @@ std::size_t DrawFacesReference(Projection projection, const FaceProjection& face
   return drawn;
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

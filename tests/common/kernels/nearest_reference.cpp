@@ -1,8 +1,8 @@
+#include "tests/common/kernels/nearest_reference.h"
+
 #include <cstring>
 
-#include "common/kernels/combine.h"
-
-namespace slabstream {
+namespace slabstream::testing {
 
 void NearestRowReference(const SourcePixels& source, const TargetPixels& target, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -13,4 +13,4 @@ void NearestRowReference(const SourcePixels& source, const TargetPixels& target,
   }
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

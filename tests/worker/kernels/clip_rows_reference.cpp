@@ -1,10 +1,11 @@
+#include "tests/worker/kernels/clip_rows_reference.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "common/volume/volume.h"
-#include "worker/kernels/clip_rows.h"
 
-namespace slabstream {
+namespace slabstream::testing {
 
 void RegionDepthsReference(const RegionRow& row, std::int32_t column, std::size_t count, float* enter, float* leave) {
   const auto depth = [&](double g) { return float(row.perspective ? -1 / g : g); };
@@ -34,4 +35,4 @@ void VoxelsAtReference(const RayRow& row, std::int32_t column, std::size_t count
   }
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

@@ -1,12 +1,14 @@
+#include "tests/worker/renderers/raycast/march_reference.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <deque>
 #include <vector>
 
-#include "worker/renderers/raycast/march.h"
+#include "tests/worker/rays/pixel_ray.h"
 
-namespace slabstream {
+namespace slabstream::testing {
 namespace {
 
 float Lerp(float t, float a, float b) { return a + t * (b - a); }
@@ -339,4 +341,4 @@ void MarchTileReference(const MarchWork& work, const PixelBounds& tile, float* r
   });
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

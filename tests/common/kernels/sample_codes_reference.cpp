@@ -1,10 +1,10 @@
+#include "tests/common/kernels/sample_codes_reference.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "common/kernels/sample_codes.h"
-
-namespace slabstream {
+namespace slabstream::testing {
 namespace {
 
 template <class Code>
@@ -35,4 +35,4 @@ void StraightCodesReference(const float* premultiplied, std::size_t pixels, std:
   StraightCodesOf(premultiplied, pixels, codes);
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

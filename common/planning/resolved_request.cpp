@@ -1,4 +1,4 @@
-#include "common/planning/resolve_look.h"
+#include "common/planning/resolved_request.h"
 
 #include <fmt/format.h>
 
@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "common/base/find_named.h"
+#include "common/classification/color_maps.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {
@@ -86,16 +88,29 @@ void Brighten(double factor, TransferFunction& transfer) {
 
 }  // namespace
 
-Result<VolumeLook> ResolveLook(const FrameRequest& request, const VolumeSummary& summary) {
-  if (Status status = CheckHasWhatIsDrawn(*FindRenderer(request.renderer), request.dataset, summary); !status.ok()) return status;
-  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, summary);
+Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
+  const VolumeGeometry& geometry = summary->description.geometry;
+  const RendererKind* const renderer = FindRenderer(request.renderer);
+  if (Status status = CheckNames(request.policy); !status.ok()) return status;
+  if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
+  Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
+  const auto* const preset = std::get_if<std::string>(&request.transfer.choice);
+  if (request.clipping.slab && preset != nullptr && FindNamed(NamedColorMaps(), *preset) != nullptr) {
+    transfer->opacities = {{double(summary->range.min), 1}};
+  }
   Brighten(request.brightness, *transfer);
-  Result<ClipRegion> clip = MakeClipRegion(request.clipping, summary.description.geometry);
+  Result<ClipRegion> clip = MakeClipRegion(request.clipping, geometry);
   if (!clip.ok()) return clip.status();
-  Result<LayerLooks> layers = ResolveLayers(request, summary);
+  Result<LayerLooks> layers = ResolveLayers(request, *summary);
   if (!layers.ok()) return layers.status();
-  return VolumeLook{*std::move(transfer), *std::move(clip), *std::move(layers)};
+  request.policy = SettledPolicy(request, geometry);
+  std::optional<ResolvedPolicy> policy;
+  if (!LeavesChoice(request.policy)) policy = ResolvePolicy(request.policy, geometry);
+  return ResolvedRequest{.frame = std::move(request),
+                         .volume = {dataset, *std::move(transfer), renderer, *std::move(clip), *std::move(layers)},
+                         .summary = std::move(summary),
+                         .policy = std::move(policy)};
 }
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {

@@ -1,9 +1,9 @@
+#include "tests/common/image/color_coding_reference.h"
+
 #include <bit>
 #include <cmath>
 
-#include "common/image/color_coding.h"
-
-namespace slabstream {
+namespace slabstream::testing {
 namespace {
 
 constexpr float kSmallestNormal = 0x1p-14F;  // of binary16
@@ -35,4 +35,4 @@ void FromCodesReference(ColorCoding coding, const std::uint16_t* codes, float* v
   for (std::size_t i = 0; i < count; ++i) values[i] = coding == ColorCoding::kHalf ? FromHalf(codes[i]) : float(codes[i]) / 65535;
 }
 
-}  // namespace slabstream
+}  // namespace slabstream::testing

@@ -1,0 +1,154 @@
+#include "client/cli/annotate.h"
+
+#include <array>
+#include <cstddef>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/image_io/annotations.h"
+#include "client/request/json_value.h"
+#include "common/view/camera.h"
+
+namespace slabstream {
+namespace {
+
+constexpr double kMost = 1e300;
+
+struct Order {
+  ImageSize size;
+  std::vector<PictureGeometry> panes;
+  Annotations annotations;
+  PictureKey key;
+};
+
+std::vector<double> Numbers(const JsonValue& value, std::size_t count) {
+  std::vector<double> numbers;
+  value.Each([&](const JsonValue& number) { numbers.push_back(number.Number({-kMost, kMost})); }, count);
+  if (numbers.size() > count) value.Complain(value.Shown() + " has too many numbers");
+  numbers.resize(count);
+  return numbers;
+}
+
+Vec3 Vector(const JsonValue& value) {
+  const std::vector<double> v = Numbers(value, 3);
+  return {v[0], v[1], v[2]};
+}
+
+// As GeometryJson writes it.
+PictureGeometry Geometry(const JsonValue& value) {
+  static constexpr std::array<World, 3> kWorlds = {World::kVoxels, World::kScene, World::kPatient};
+  static constexpr std::array<std::string_view, 3> kWorldNames = {NameOf(kWorlds[0]), NameOf(kWorlds[1]), NameOf(kWorlds[2])};
+  PictureGeometry geometry;
+  value.Fields({{"world", [&](const JsonValue& v) { geometry.world = kWorlds.at(v.OneOf(kWorldNames)); }},
+                {"unit",
+                 [&](const JsonValue& v) {
+                   static constexpr std::array<std::string_view, 3> kNames = {"voxel", "unknown", "mm"};
+                   geometry.unit = LengthUnit(v.OneOf(kNames) + 1);
+                 }},
+                {"projection",
+                 [&](const JsonValue& v) {
+                   static constexpr std::array<std::string_view, 2> kNames = {"orthographic", "perspective"};
+                   geometry.projection = v.OneOf(kNames) == 1 ? Projection::kPerspective : Projection::kOrthographic;
+                 }},
+                {"right", [&](const JsonValue& v) { geometry.right = Vector(v); }},
+                {"up", [&](const JsonValue& v) { geometry.up = Vector(v); }},
+                {"forward", [&](const JsonValue& v) { geometry.forward = Vector(v); }},
+                {"target", [&](const JsonValue& v) { geometry.target = Vector(v); }},
+                {"target_depth",
+                 [&](const JsonValue& v) {
+                   geometry.target_depth = v.Number({-kMost, kMost});
+                 }},
+                {"pixel_size", [&](const JsonValue& v) {
+                   geometry.pixel_size = v.Number({0, kMost, true});
+                 }}});
+  return geometry;
+}
+
+Rgb Color(const std::vector<double>& numbers, std::size_t first) {
+  return {float(numbers[first]), float(numbers[first + 1]), float(numbers[first + 2])};
+}
+
+void ReadKey(const JsonValue& value, PictureKey& key) {
+  const auto bar = [&](const JsonValue& v) {
+    PictureKey::Bar& read = key.bar.emplace();
+    const auto color = [&](const JsonValue& point) {
+      const std::vector<double> numbers = Numbers(point, 4);
+      read.colors.push_back({numbers[0], Color(numbers, 1)});
+    };
+    v.Fields({{"colors", [&](const JsonValue& colors) { colors.Each(color, 1); }},
+              {"low",
+               [&](const JsonValue& end) {
+                 read.low = end.Number({-kMost, kMost});
+               }},
+              {"high", [&](const JsonValue& end) {
+                 read.high = end.Number({-kMost, kMost});
+               }}});
+    if (read.colors.empty() || !(read.low < read.high)) v.Complain("has no colours, or its ends do not rise");
+  };
+  const auto entry = [&](const JsonValue& v) {
+    PictureKey::Entry& read = key.entries.emplace_back();
+    v.Fields({{"name", [&](const JsonValue& name) { read.name = name.Text(); }},
+              {"color", [&](const JsonValue& color) { read.color = Color(Numbers(color, 3), 0); }}});
+    if (const Status status = CheckTitle("the name", read.name); !status.ok()) v.Complain(status.message());
+  };
+  value.Fields({{"bar", bar}, {"entries", [&](const JsonValue& v) { v.Each(entry); }}});
+}
+
+Result<Order> ParseOrder(const std::string& text) {
+  const Result<Json> json = ParseJson(text);
+  if (!json.ok()) return json.status();
+  Order order;
+  Annotations& annotations = order.annotations;
+  std::optional<std::string> mistake;
+  const auto line = [](const JsonValue& v) {
+    std::string read = v.Text();
+    if (const Status status = CheckTitle("the text", read); !status.ok()) v.Complain(status.message());
+    return read;
+  };
+  const auto size = [&](const JsonValue& v) {
+    const std::vector<double> sides = Numbers(v, 2);
+    for (const double side : sides) {
+      if (!(side >= 1 && side <= kMaxImageSide)) return v.Complain("is no size");
+    }
+    order.size = {int(sides[0]), int(sides[1])};
+  };
+  JsonValue(*json, "", mistake)
+      .Fields({{"size", size},
+               {"panes", [&](const JsonValue& v) { v.Each([&](const JsonValue& pane) { order.panes.push_back(Geometry(pane)); }, 1); }},
+               {"title", [&](const JsonValue& v) { annotations.title = line(v); }},
+               {"scale_bar", [&](const JsonValue& v) { annotations.scale_bar = v.Boolean(); }},
+               {"orientation_marker", [&](const JsonValue& v) { annotations.orientation_marker = v.Boolean(); }},
+               {"sides_only", [&](const JsonValue& v) { annotations.sides_only = v.Boolean(); }},
+               {"color_bar", [&](const JsonValue& v) { annotations.color_bar = line(v); }},
+               {"legend", [&](const JsonValue& v) { annotations.legend = v.Boolean(); }},
+               {"key", [&](const JsonValue& v) { ReadKey(v, order.key); }}});
+  if (mistake) return Status::InvalidArgument(*mistake);
+  if (order.size.width == 0 || order.panes.empty()) return Status::InvalidArgument("size or panes are missing");
+  return order;
+}
+
+}  // namespace
+
+Status RunAnnotate() {
+  std::string text;
+  std::getline(std::cin, text);
+  const Result<Order> order = ParseOrder(text);
+  if (!order.ok()) return order.status();
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(order->annotations, order->size, order->panes, order->key);
+  if (!layers.ok()) return layers.status();
+  std::vector<float> row(4 * std::size_t(order->size.width));
+  const auto bytes = std::streamsize(row.size() * sizeof(float));
+  for (int y = 0; y < order->size.height; ++y) {
+    if (!std::cin.read(reinterpret_cast<char*>(row.data()), bytes))
+      return Status::InvalidArgument("there are fewer pixels than the size says");
+    layers->PutOver(y, row);
+    std::cout.write(reinterpret_cast<const char*>(row.data()), bytes);
+  }
+  std::cout.flush();
+  return std::cout.good() ? Status::Ok() : Status::Unavailable("cannot write the pixels");
+}
+
+}  // namespace slabstream

@@ -1,0 +1,17 @@
+// `annotate`, for the Python package: draws annotations onto pixels, so that its pictures have those of the command line.
+//
+// stdin: a line of JSON, and behind it the pixels: width * height * 4 floats of this machine, premultiplied, row 0 first.
+//   {"size": [W, H], "panes": [the "geometry" of a picture's record, ...], "title", "scale_bar", "orientation_marker", "sides_only",
+//    "color_bar", "legend",
+//    "key": {"bar": {"colors": [[value, r, g, b], ...], "low", "high"}, "entries": [{"name", "color": [r, g, b]}, ...]}}
+// Only size and panes must be there. stdout: the pixels with the annotations on them.
+#pragma once
+
+#include "common/base/status.h"
+
+namespace slabstream {
+
+inline constexpr const char* kAnnotateCommand = "annotate";  // not shown in help texts
+Status RunAnnotate();
+
+}  // namespace slabstream

@@ -1,0 +1,185 @@
+#include "client/cli/measure.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <string_view>
+#include <utility>
+
+#include "client/cli/service_connection.h"
+#include "client/report/volume_text.h"
+#include "client/request/json_value.h"
+#include "client/request/values.h"
+#include "common/math/points_along.h"
+#include "common/wire/client_messages.h"
+
+namespace slabstream {
+namespace {
+
+using Points = std::vector<Vec3>;
+
+// So many points, separated by ':'.
+Result<Points> ParsePoints(const std::string& option, const std::string& text, std::size_t count) {
+  const std::vector<std::string_view> parts = Split(text, ':');
+  if (parts.size() != count) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is not {}", option, text, count == 2 ? "X,Y,Z:X,Y,Z" : "X,Y,Z:X,Y,Z:X,Y,Z"));
+  }
+  Points points;
+  for (const std::string_view part : parts) {
+    const Result<Vec3> point = ParsePoint(option, part);
+    if (!point.ok()) return point.status();
+    points.push_back(*point);
+  }
+  return points;
+}
+
+// In [0, 180]; nothing if two points are the same.
+std::optional<double> AngleDegrees(const Vec3& a, const Vec3& vertex, const Vec3& b) {
+  const Vec3 u = a - vertex, v = b - vertex;
+  if (Length(u) == 0 || Length(v) == 0) return std::nullopt;
+  return std::atan2(Length(Cross(u, v)), Dot(u, v)) * 180 / std::numbers::pi;
+}
+
+// What is measured in one dataset, as JSON.
+class Measurer {
+ public:
+  Measurer(Client& client, std::string dataset, const VolumeGeometry& geometry)
+      : client_(client),
+        dataset_(std::move(dataset)),
+        spacing_(geometry.spacing),
+        unit_(geometry.orientation.world == World::kPatient ? "mm" : "units") {}
+
+  Json Distance(const Points& p) const {
+    return {
+        {"measure", "distance"}, {"from", VectorJson(p[0])}, {"to", VectorJson(p[1])}, {"length", Length(p[1] - p[0])}, {"unit", unit_}};
+  }
+
+  static Json Angle(const Points& p) {
+    return {{"measure", "angle"},
+            {"points", {VectorJson(p[0]), VectorJson(p[1]), VectorJson(p[2])}},
+            {"degrees", *AngleDegrees(p[0], p[1], p[2])}};
+  }
+
+  // `samples` as in MeasureOptions.
+  Result<Json> Profile(const Points& p, int samples) {
+    const double voxels = Length(p[1] - p[0]) / std::min({spacing_.x, spacing_.y, spacing_.z});
+    if (samples == 0) samples = int(std::clamp(std::ceil(voxels) + 1, 2.0, double(kMaxSamplePoints)));
+    const Result<std::vector<VolumeSample>> found = client_.SampleAt(dataset_, PointsAlong(p[0], p[1], samples));
+    if (!found.ok()) return found.status();
+    Json profile = {{"measure", "profile"}, {"unit", unit_}};
+    profile.update(ProfileJson(*found));
+    return profile;
+  }
+
+  Result<Json> Box(const ClipBox& box, const std::string& text) {
+    const Result<BoxStatistics> found = client_.StatisticsIn(dataset_, box);
+    if (!found.ok()) return found.status();
+    Json statistics = {{"measure", "box"}, {"box", text}};
+    statistics.update(BoxStatisticsJson(*found));
+    statistics["volume"] = double(found->voxels + found->non_finite) * spacing_.x * spacing_.y * spacing_.z;
+    statistics["unit"] = fmt::format("{}^3", unit_);
+    return statistics;
+  }
+
+ private:
+  Client& client_;
+  const std::string dataset_;
+  const Vec3 spacing_;
+  const std::string_view unit_;
+};
+
+std::string NumberText(const Json& value) { return value.is_null() ? "none" : fmt::format("{:.6g}", value.get<double>()); }
+
+void Print(const Json& measures) {
+  for (const Json& m : measures) {
+    const std::string measure = m["measure"], unit = m.value("unit", std::string());
+    if (measure == "distance") {
+      std::cout << fmt::format("distance {:.6g} {}\n", m["length"].get<double>(), unit);
+    } else if (measure == "angle") {
+      std::cout << fmt::format("angle {:.6g} degrees\n", m["degrees"].get<double>());
+    } else if (measure == "profile") {
+      std::cout << fmt::format("profile: distance in {}, value\n", unit);
+      const double step = m["length"].get<double>() / double(m["values"].size() - 1);
+      for (std::size_t i = 0; i < m["values"].size(); ++i) {
+        std::cout << fmt::format("{:>12.6g} {:>12}\n", step * double(i), NumberText(m["values"][i]));
+      }
+    } else {
+      std::cout << fmt::format("box {}: mean {}, deviation {}, least {}, largest {}, {} voxels, {:.6g} {}\n", m["box"].get<std::string>(),
+                               NumberText(m["mean"]), NumberText(m["deviation"]), NumberText(m["least"]), NumberText(m["largest"]),
+                               m["voxels"].get<std::uint64_t>(), m["volume"].get<double>(), unit);
+    }
+  }
+}
+
+// What the texts say, before anything is connected.
+struct Measures {
+  std::vector<Points> distances, angles, profiles;
+  std::vector<ClipBox> boxes;
+};
+
+Result<Measures> Parse(const MeasureOptions& options) {
+  Measures measures;
+  Status status;
+  const auto take = [&](const char* option, const std::vector<std::string>& texts, std::size_t count, std::vector<Points>& into) {
+    for (const std::string& text : texts) {
+      Result<Points> points = ParsePoints(option, text, count);
+      if (!points.ok()) return void(status = points.status());
+      into.push_back(*std::move(points));
+    }
+  };
+  take("--distance", options.distances, 2, measures.distances);
+  if (status.ok()) take("--angle", options.angles, 3, measures.angles);
+  if (status.ok()) take("--profile", options.profiles, 2, measures.profiles);
+  if (!status.ok()) return status;
+  for (const Points& p : measures.angles) {
+    if (!AngleDegrees(p[0], p[1], p[2])) return Status::InvalidArgument("--angle: two of its points are the same, so there is no angle");
+  }
+  for (const std::string& text : options.boxes) {
+    const Result<ClipBox> box = ParseClipBox("--box", text);
+    if (!box.ok()) return box.status();
+    measures.boxes.push_back(*box);
+  }
+  if (measures.distances.empty() && measures.angles.empty() && measures.profiles.empty() && measures.boxes.empty()) {
+    return Status::InvalidArgument("--distance, --angle, --profile or --box must say what to measure");
+  }
+  return measures;
+}
+
+}  // namespace
+
+Status RunMeasure(const MeasureOptions& options) {
+  const Result<Measures> measures = Parse(options);
+  if (!measures.ok()) return measures.status();
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source);
+  if (!connection.ok()) return connection.status();
+  const Result<SummaryReply> summary = connection->client().Summarize(connection->dataset());
+  if (!summary.ok()) return summary.status();
+  Measurer measurer(connection->client(), connection->dataset(), summary->description.geometry);
+  Json found = Json::array();
+  for (const Points& p : measures->distances) found.push_back(measurer.Distance(p));
+  for (const Points& p : measures->angles) found.push_back(Measurer::Angle(p));
+  for (const Points& p : measures->profiles) {
+    Result<Json> profile = measurer.Profile(p, options.samples);
+    if (!profile.ok()) return profile.status();
+    found.push_back(*std::move(profile));
+  }
+  for (std::size_t i = 0; i < measures->boxes.size(); ++i) {
+    Result<Json> box = measurer.Box(measures->boxes[i], options.boxes[i]);
+    if (!box.ok()) return box.status();
+    found.push_back(*std::move(box));
+  }
+  if (options.json) {
+    std::cout << found.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  } else {
+    Print(found);
+  }
+  return Status::Ok();
+}
+
+}  // namespace slabstream

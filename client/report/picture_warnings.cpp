@@ -1,0 +1,89 @@
+#include "client/report/picture_warnings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+
+namespace slabstream {
+namespace {
+
+// Where the volume lies, as --clip-box takes it.
+std::string ExtentText(const VolumeGeometry& geometry, ClipUnit unit) {
+  if (unit == ClipUnit::kPercent) return "0:100,0:100,0:100%";
+  if (unit == ClipUnit::kVoxels) return fmt::format("0:{},0:{},0:{}v", geometry.size.x, geometry.size.y, geometry.size.z);
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  Vec3 low = {kInfinite, kInfinite, kInfinite}, high = -low;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p = {-0.5, -0.5, -0.5};
+    for (const Axis axis : kAxes) p[axis] += (corner >> Number(axis) & 1) != 0 ? geometry.size[axis] : 0;
+    const Vec3 world = geometry.ToWorld(p);
+    for (const Axis axis : kAxes) {
+      low[axis] = std::min(low[axis], world[axis]);
+      high[axis] = std::max(high[axis], world[axis]);
+    }
+  }
+  return fmt::format("{:.6g}:{:.6g},{:.6g}:{:.6g},{:.6g}:{:.6g}", low.x, high.x, low.y, high.y, low.z, high.z);
+}
+
+bool LeavesSomething(const Clipping& clipping, const VolumeGeometry& geometry) {
+  const Result<ClipRegion> region = MakeClipRegion(clipping, geometry);
+  return !region.ok() || region->MayKeep(geometry.bounds());
+}
+
+// The values that have some opacity, as the curve's points say.
+std::string VisibleText(const TransferFunction& transfer) {
+  const auto visible = [](const OpacityPoint& point) { return point.opacity > 0; };
+  const auto& points = transfer.opacities;
+  const auto first = std::ranges::find_if(points, visible);
+  if (first == points.end()) return "shows no value at all";
+  const auto last = std::find_if(points.rbegin(), points.rend(), visible);
+  if (first == points.begin() && last == points.rbegin()) return "shows all values";  // its ends hold outside of them
+  if (last == points.rbegin()) return fmt::format("shows values above {:g}", (first - 1)->value);
+  if (first == points.begin()) return fmt::format("shows values below {:g}", (last - 1)->value);
+  return fmt::format("shows values from {:g} to {:g}", (first - 1)->value, (last - 1)->value);
+}
+
+}  // namespace
+
+bool IsEmpty(const LocalImage& image) {
+  for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
+    if (image.rgba[i] > 0) return false;
+  }
+  return true;
+}
+
+std::optional<std::string> RangeWarning(std::string_view option, double low, double high, const ValueRange& values) {
+  if (high > double(values.min) && low < double(values.max)) return std::nullopt;
+  if (values.min == values.max && low <= double(values.min) && double(values.max) <= high) return std::nullopt;
+  return fmt::format("{} shows values from {:g} to {:g}, but those of the volume run from {:g} to {:g}", option, low, high, values.min,
+                     values.max);
+}
+
+std::string EmptyWarning(const FrameRequest& frame, const SummaryReply& summary) {
+  const VolumeGeometry& geometry = summary.description.geometry;
+  if (!LeavesSomething(frame.clipping, geometry)) {
+    Clipping without_slab = frame.clipping;
+    without_slab.slab.reset();
+    const bool slab = LeavesSomething(without_slab, geometry);
+    const ClipUnit unit = frame.clipping.box && !slab ? frame.clipping.box->unit : ClipUnit::kWorld;
+    return fmt::format("the picture is empty: {} leaves nothing of the volume, which lies in {}",
+                       slab                 ? "the plane of --at"
+                       : frame.clipping.box ? "--clip-box"
+                                            : "--clip-plane",
+                       ExtentText(geometry, unit));
+  }
+  const auto [least, most] = summary.range;
+  const bool surfaces = std::ranges::any_of(summary.transfer.isosurfaces, [&](const Isosurface& surface) {
+    return surface.value >= double(least) && surface.value <= double(most);
+  });
+  const std::string run = fmt::format("the volume's values run from {:g} to {:g}", least, most);
+  if (!surfaces && MaxOpacity(summary.transfer, double(least), double(most)) == 0) {
+    if (!summary.transfer.isosurfaces.empty()) return "the picture is empty: no surface of --isovalue lies in the volume; " + run;
+    return fmt::format("the picture is empty: the transfer function {}, but {}", VisibleText(summary.transfer), run);
+  }
+  return "the picture is empty: nothing that the transfer function shows lies in it; --fit frames what is shown, and " + run;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,46 @@
+#include "client/request/key_of_picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/printable.h"
+
+namespace slabstream {
+namespace {
+
+bool IsShown(const Label& label, const LabelChoice& choice) {
+  return choice.shown.empty() || std::ranges::any_of(choice.shown, [&](const LabelRange& range) {
+           return range.first <= label.value && label.value <= range.last;
+         });
+}
+
+// As the picture has it (FrameRequest::brightness).
+Rgb Brightened(Rgb color, double factor) {
+  for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
+  return color;
+}
+
+}  // namespace
+
+PictureKey KeyOf(const FrameRequest& request, const SummaryReply& summary) {
+  PictureKey key;
+  const TransferFunction& transfer = summary.transfer;
+  const double low = transfer.colors.front().value, high = transfer.colors.back().value;
+  const bool visible = std::ranges::any_of(transfer.opacities, [](const OpacityPoint& point) { return point.opacity > 0; });
+  if (visible && low < high) {
+    key.bar = PictureKey::Bar{.colors = transfer.colors, .low = low, .high = high};
+    for (ColorPoint& point : key.bar->colors) point.color = Brightened(point.color, request.brightness);
+  }
+  for (const Label& label : request.labels ? summary.labels : std::vector<Label>()) {
+    if (!IsShown(label, *request.labels)) continue;
+    const std::string name = label.name.empty() ? fmt::format("{}", label.value) : Printable(label.name);
+    key.entries.push_back({name, {label.color[0], label.color[1], label.color[2]}});
+  }
+  for (const Isosurface& surface : request.transfer.isosurfaces) {
+    key.entries.push_back({fmt::format("{:g}", surface.value), Brightened(surface.color, request.brightness)});
+  }
+  return key;
+}
+
+}  // namespace slabstream

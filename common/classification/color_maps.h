@@ -1,0 +1,30 @@
+// Colour maps that people know by name. Each is a small table of ours, made from a published formula or from colours that are published
+// for everybody's use, as `source` says.
+//
+// As presets of transfer functions they span all values of a volume and have the opacities of "auto". In slices, where nothing lies behind,
+// they are opaque (ResolveLook).
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include "common/classification/transfer_function.h"
+
+namespace slabstream {
+
+struct ColorMap {
+  struct Point {
+    double at = 0;  // [0, 1]: from the least value to the greatest; points ascend from 0 to 1
+    Rgb color;
+  };
+  std::string_view name;     // what --transfer takes
+  std::string_view purpose;  // one line for --help
+  std::string_view source;   // and its terms
+  std::vector<Point> points;
+};
+// The only list.
+inline constexpr std::size_t kColorMapCount = 10;
+const std::vector<ColorMap>& NamedColorMaps();
+
+}  // namespace slabstream

@@ -1,0 +1,35 @@
+// ResolvedRequest: a request in which all that it says about its dataset has been looked up: transfer function, clip region, labels and
+// policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they meet no unknown
+// name.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/planning/classified_volume.h"
+#include "common/planning/resolved_policy.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+struct ResolvedRequest {
+  FrameRequest frame;                            // with a settled policy (SettledPolicy)
+  ClassifiedVolume volume;                       // how it shows the dataset, whatever its view
+  std::shared_ptr<const VolumeSummary> summary;  // of the dataset; never null
+  std::optional<ResolvedPolicy> policy;          // none: a choice is left (LeavesChoice)
+};
+
+// Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the
+// volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such preset.
+Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
+
+// The function that a request names or holds, for this volume. NotFound: no such preset.
+Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary);
+
+// InvalidArgument: the renderer draws cells, and the dataset has none.
+Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& dataset, const VolumeSummary& summary);
+
+}  // namespace slabstream

@@ -1,0 +1,90 @@
+"""Annotations of pictures: title, scale bar, sides of a patient, colour bar and legend, drawn by the program `slabstream`, so that they are
+those of the command line."""
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+from typing import Any, Sequence
+
+import numpy
+
+from .errors import InvalidArgument, NotFound, Unavailable
+from .programs import find_program
+from .runs import Floats
+
+
+@dataclasses.dataclass(frozen=True)
+class Annotations:
+    """As the options of these names."""
+
+    title: str = ""
+    scale_bar: bool = False
+    orientation_marker: bool = False
+    sides_only: bool = False       # of a patient the letters without the axes, as in slices
+    color_bar: str | None = None   # its caption; "": none
+    legend: bool = False
+
+    def any(self) -> bool:
+        return bool(self.title) or self.scale_bar or self.orientation_marker or self.color_bar is not None or self.legend
+
+    def need_key(self) -> bool:
+        return self.color_bar is not None or self.legend
+
+
+def key_of(frame: Any, summary: Any) -> dict[str, Any]:
+    """What colour bar and legend say, from the frame's request and the dataset's summary under its transfer function, as
+    client/request/key_of_picture.h has it."""
+    brightness = frame.brightness if frame.HasField("brightness") else 1.0
+
+    def bright(color: Any) -> list[float]:
+        return [min(channel * brightness, 1.0) for channel in (color.r, color.g, color.b)]
+
+    key: dict[str, Any] = {}
+    colors = summary.transfer.colors
+    if colors[0].value < colors[-1].value and any(point.opacity > 0 for point in summary.transfer.opacities):
+        key["bar"] = {"colors": [[point.value, *bright(point)] for point in colors], "low": colors[0].value, "high": colors[-1].value}
+    entries = []
+    if frame.HasField("labels"):
+        shown = frame.labels.shown
+        for label in summary.labels:
+            if not shown or any(each.first <= label.value <= each.last for each in shown):
+                entries.append({"name": label.name or str(label.value), "color": [label.red, label.green, label.blue]})
+    entries += [{"name": f"{surface.value:g}", "color": bright(surface)} for surface in frame.transfer.isosurfaces]
+    if entries:
+        key["entries"] = entries
+    return key
+
+
+def _geometry_fields(geometry: Any) -> dict[str, Any]:
+    """As records of pictures have it."""
+    units = {"file": "unknown", "millimetre": "mm"}
+    return {
+        "world": geometry.world, "unit": units.get(geometry.unit, "voxel"),
+        "projection": "perspective" if geometry.perspective else "orthographic",
+        "right": geometry.right, "up": geometry.up, "forward": geometry.forward, "target": geometry.target,
+        "target_depth": geometry.target_depth, "pixel_size": geometry.pixel_size,
+    }
+
+
+def draw(rgba: Floats, annotations: Annotations, panes: Sequence[Any], key: dict[str, Any] | None) -> Floats:
+    """The pixels with annotations on them. `panes`: the geometries of pictures of equal widths, from left to right."""
+    height, width = rgba.shape[:2]
+    order = {"size": [width, height], "panes": [_geometry_fields(pane) for pane in panes], **dataclasses.asdict(annotations)}
+    if annotations.color_bar is None:
+        del order["color_bar"]
+    if key:
+        order["key"] = key
+    try:
+        program = find_program()
+    except NotFound:
+        raise NotFound("annotations are drawn by the program slabstream, which is not here: put it on the path, or name its folder in "
+                       "$SLABSTREAM_PROGRAMS") from None
+    pixels = numpy.ascontiguousarray(rgba, numpy.float32)
+    done = subprocess.run([program, "annotate"], input=json.dumps(order).encode() + b"\n" + pixels.tobytes(), capture_output=True)
+    if done.returncode != 0:
+        sentence = done.stderr.decode(errors="replace").strip().removeprefix("slabstream annotate: ")
+        raise (InvalidArgument if done.returncode == 2 else Unavailable)(sentence or "slabstream annotate failed")
+    if len(done.stdout) != pixels.nbytes:
+        raise Unavailable(f"slabstream annotate gave {len(done.stdout)} bytes of {pixels.nbytes}")
+    return numpy.frombuffer(done.stdout, numpy.float32).reshape(pixels.shape)

@@ -1,0 +1,86 @@
+// `measure`: figures of balls and of a patient's grid that are known without it.
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+class MeasureTest : public EndToEndTest {
+ protected:
+  // 4 x 3 x 2 voxels of a patient with the value x + 10 y + 100 z, spaced 2, 3 and 5 mm; voxel 0 0 0 is at 10, 20, 30.
+  MeasureTest() {
+    std::ofstream file(Path("ramp.nrrd"), std::ios::binary);
+    file << "NRRD0004\ntype: uint8\ndimension: 3\nspace: right-anterior-superior\nsizes: 4 3 2\n"
+            "space directions: (2,0,0) (0,3,0) (0,0,5)\nspace origin: (10,20,30)\nencoding: raw\n\n";
+    for (int z = 0; z < 2; ++z) {
+      for (int y = 0; y < 3; ++y) {
+        for (int x = 0; x < 4; ++x) file.put(char(x + 10 * y + 100 * z));
+      }
+    }
+  }
+
+  json Measure(std::vector<std::string> more) const {
+    more.insert(more.begin(), {"measure", "ramp.nrrd", "--local=1", "--json"});
+    return json::parse(MustRun(more).out);
+  }
+};
+
+TEST_F(MeasureTest, DistancesAndAnglesAreThoseOfTheWorld) {
+  const json found = Measure({"--distance", "1,2,3:4,6,15", "--angle", "1,0,0:0,0,0:0,2,0", "--angle", "1,0,0:0,0,0:-1,0,0"});
+  ASSERT_EQ(found.size(), 3U);
+  EXPECT_EQ(found[0]["length"], 13);
+  EXPECT_EQ(found[0]["unit"], "mm");
+  EXPECT_NEAR(found[1]["degrees"], 90, 1e-9);
+  EXPECT_NEAR(found[2]["degrees"], 180, 1e-9);
+  EXPECT_THAT(MustRun({"measure", "ramp.nrrd", "--local=1", "--distance", "0,0,0:0,3,4"}).out, HasSubstr("distance 5 mm\n"));
+}
+
+TEST_F(MeasureTest, ProfilesInterpolateBetweenVoxels) {
+  const json found = Measure({"--profile", "10,20,30:16,26,35", "--samples", "5"});
+  const json& values = found[0]["values"];
+  ASSERT_EQ(values.size(), 5U);
+  for (int i = 0; i < 5; ++i) EXPECT_NEAR(values[std::size_t(i)], (3 + 20 + 100) * i / 4.0, 1e-9) << i;
+  EXPECT_NEAR(found[0]["length"], std::sqrt(36 + 36 + 25), 1e-12);
+  const json beyond = Measure({"--profile", "0,20,30:10,20,30", "--samples", "2"})[0]["values"];
+  EXPECT_TRUE(beyond[0].is_null());
+  EXPECT_EQ(beyond[1], 0);
+}
+
+TEST_F(MeasureTest, BoxesHaveTheMeanAndDeviationOfTheirVoxels) {
+  const json all = Measure({"--box", ":,:,:"})[0];
+  EXPECT_EQ(all["voxels"], 24);
+  EXPECT_EQ(all["volume"], 24 * 2 * 3 * 5);
+  EXPECT_EQ(all["unit"], "mm^3");
+  EXPECT_NEAR(all["mean"], 1.5 + 10 + 50, 1e-9);
+  EXPECT_NEAR(all["deviation"], std::sqrt(1.25 + 200 / 3.0 + 2500), 1e-9);
+  EXPECT_EQ(all["least"], 0);
+  EXPECT_EQ(all["largest"], 123);
+  for (const char* box : {"1:3,:,0:1v", "11:15,:,:31", "25:75,:,:50%"}) {
+    const json part = Measure({"--box", box})[0];
+    EXPECT_EQ(part["voxels"], 6) << box;
+    EXPECT_NEAR(part["mean"], 11.5, 1e-9) << box;
+  }
+  const json none = Measure({"--box", "100:200,:,:"})[0];
+  EXPECT_EQ(none["voxels"], 0);
+  EXPECT_TRUE(none["mean"].is_null());
+}
+
+TEST_F(MeasureTest, RefusesWhatIsNoMeasure) {
+  ExpectEachRefused({"measure", "ramp.nrrd", "--local=1"}, {{{}, "--distance, --angle, --profile or --box must say what to measure"},
+                                                            {{"--distance", "1,2,3"}, "--distance '1,2,3' is not X,Y,Z:X,Y,Z"},
+                                                            {{"--angle", "1,2,3:1,2,3"}, "is not X,Y,Z:X,Y,Z:X,Y,Z"},
+                                                            {{"--angle", "1,2,3:1,2,3:4,5,6"}, "two of its points are the same"},
+                                                            {{"--profile", "1,2:3,4,5"}, "--profile '1,2' is not X,Y,Z"},
+                                                            {{"--box", "1:2,3:4"}, "--box '1:2,3:4' is not X0:X1,Y0:Y1,Z0:Z1"}});
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,104 @@
+// What commands say beside their results: one line on stderr, and the result is there all the same.
+#include <gmock/gmock.h>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+class NotesTest : public EndToEndTest {
+ protected:
+  NotesTest() { MakeSphere("ball.nrrd", 2, 24); }
+
+  // A picture of the ball in this process, with these options. Returns what was said on stderr.
+  std::vector<std::string> SaidBy(const std::string& command, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {command, "ball.nrrd", "--local=1", "--size", "32", "-o", "x.png"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return MustRun(arguments).err_lines();
+  }
+};
+
+TEST_F(NotesTest, AFileIsRenderedHereWhereNoServiceRuns) {
+  const ProgramResult here = MustRun({"render", "ball.nrrd", "-o", "here.png", "--size", "32"});
+  EXPECT_THAT(here.err_lines(), ElementsAre(AllOf(StartsWith("slabstream: note: no service is named and none runs here"),
+                                                  HasSubstr("ball.nrrd"), HasSubstr("--local"))));
+  EXPECT_THAT(MustRun({"render", "ball.nrrd", "-o", "asked.png", "--size", "32", "--local"}).err_lines(), IsEmpty());
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("here.png")), ReadPicture(Path("asked.png"))), 0);
+  EXPECT_THAT(MustRun({"slice", "ball.nrrd:opaque", "-o", "slice.png", "--size", "32"}).err, HasSubstr("no service"));
+  EXPECT_THAT(MustRun({"value", "ball.nrrd", "--at", "1,1,1", "--json"}).err, HasSubstr("no service"));
+  EXPECT_THAT(MustRun({"turntable", "ball.nrrd", "--frames", "2", "--size", "32", "-o", "f%d.png"}).err, HasSubstr("no service"));
+  // A service that is named is meant, and so is a name that is no file.
+  EXPECT_EQ(Slabstream({"render", "ball.nrrd", "-o", "no.png", "--endpoint", "ipc://" + Path("nobody")}).exit_status, 1);
+  EXPECT_EQ(Slabstream({"render", "ball", "-o", "no.png"}).exit_status, 1);
+  EXPECT_EQ(Slabstream({"render", "ball", "--memory", "1G", "-o", "no.png"}).err,
+            "slabstream render: --memory needs --local: the processes of "
+            "a service have limits of their own\n");
+}
+
+TEST_F(NotesTest, LocalRenderingKeepsToItsMemory) {
+  EXPECT_THAT(SaidBy("render", {"--memory", "1G"}), IsEmpty());
+  const ProgramResult large =
+      Slabstream({"render", "ball.nrrd", "--local=1", "--memory", "800M", "--size", "8000x8000", "-o", "large.png"});
+  EXPECT_EQ(large.exit_status, 1);
+  EXPECT_THAT(large.err, HasSubstr("MiB"));
+  EXPECT_THAT(Slabstream({"render", "ball.nrrd", "--local=4", "--memory", "512M", "-o", "x.png"}).err,
+              HasSubstr("--memory 512 MiB is too little for a coordinator and 4 workers, which need 1536 MiB"));
+}
+
+TEST_F(NotesTest, AnEmptyPictureSaysWhatWouldShowSomething) {
+  EXPECT_THAT(SaidBy("render", {}), IsEmpty());
+  EXPECT_THAT(SaidBy("render", {"--clip-box", "100:200,:,:"}),
+              ElementsAre("slabstream: warning: the picture is empty: --clip-box leaves nothing of the volume, which lies in "
+                          "-0.5:23.5,-0.5:23.5,-0.5:23.5"));
+  EXPECT_THAT(SaidBy("render", {"--clip-box", "25:30,:,:v"}), ElementsAre(HasSubstr("which lies in 0:24,0:24,0:24v")));
+  EXPECT_THAT(SaidBy("render", {"--clip-plane", "1,0,0,-99"}), ElementsAre(HasSubstr("--clip-plane leaves nothing")));
+  EXPECT_THAT(SaidBy("render", {"--transfer", R"({"RGBPoints": [300, 1, 1, 1], "Points": [300, 0, 0.5, 0, 400, 1, 0.5, 0]})"}),
+              ElementsAre(AllOf(HasSubstr("the transfer function shows values above 300"), HasSubstr("values run from 0 to "))));
+  EXPECT_THAT(SaidBy("render", {"--renderer", "raycast", "--isovalue", "999"}), ElementsAre(HasSubstr("no surface of --isovalue")));
+  EXPECT_THAT(SaidBy("render", {"--look-at", "900,900,900"}), ElementsAre(HasSubstr("--fit frames what is shown")));
+  EXPECT_THAT(SaidBy("slice", {"--plane", "z", "--at", "0,0,99"}), ElementsAre(HasSubstr("the plane of --at leaves nothing")));
+}
+
+TEST_F(NotesTest, PresetsAreListed) {
+  const std::string list = MustRun({"transfer", "--list", "--preview", "maps.png"}).out;
+  for (const char* name : {"auto  ", "ct-bone  ", "viridis  ", "magma  ", "cividis  ", "turbo  ", "coolwarm  ", "grey  "}) {
+    EXPECT_THAT(list, HasSubstr(name));
+  }
+  const PictureFile maps = ReadPicture(Path("maps.png"));
+  EXPECT_EQ(maps.width, 500);
+  // Viridis is the second line, and its last colour the published one.
+  EXPECT_NEAR(maps.At(499, 42, 0), 0.993, 0.02);
+  EXPECT_NEAR(maps.At(499, 42, 2), 0.144, 0.02);
+  EXPECT_EQ(Slabstream({"transfer"}).exit_status, 2);
+}
+
+TEST_F(NotesTest, ColourMapsAreOpaqueInSlices) {
+  EXPECT_THAT(SaidBy("slice", {"--plane", "z", "--transfer", "viridis"}), IsEmpty());
+  const PictureFile slice = ReadPicture(Path("x.png"));
+  for (int i = 4; i < 28; ++i) EXPECT_EQ(slice.At(i, i, 3), 1) << i;
+}
+
+TEST_F(NotesTest, SlicesHaveLettersAndScaleBarsOfTheirOwn) {
+  EXPECT_THAT(SaidBy("slice", {"--scale-bar", "--orientation-marker", "--title", "A ball", "--color-bar=value"}), IsEmpty());
+  EXPECT_EQ(ReadPicture(Path("x.png")).width, 3 * 32);
+  EXPECT_THAT(SaidBy("slice", {"--plane", "z", "--window", "bone"}), IsEmpty());
+  EXPECT_THAT(Slabstream({"slice", "ball.nrrd", "--local=1", "-o", "y.png", "--window", "bones"}).err, HasSubstr("one of bone, lung"));
+}
+
+TEST_F(NotesTest, ARangeWithoutValuesIsTold) {
+  EXPECT_THAT(SaidBy("slice", {"--window", "80", "--level", "5000"}),
+              ElementsAre(AllOf(StartsWith("slabstream: warning: --window shows values from 4960 to 5040"), HasSubstr("run from 0 to "))));
+  EXPECT_THAT(SaidBy("slice", {"--window", "80", "--level", "100"}), IsEmpty());
+  EXPECT_THAT(SaidBy("render", {"--scalar-range", "-900:-100"}), ElementsAre(HasSubstr("--scalar-range shows values from -900 to -100")));
+  EXPECT_THAT(SaidBy("render", {"--scalar-range", "2%:98%"}), IsEmpty());
+}
+
+}  // namespace
+}  // namespace slabstream

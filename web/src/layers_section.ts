@@ -1,0 +1,94 @@
+// Section of the panel: labels and the overlay.
+import type { LabelName } from "./api";
+import type { Context } from "./context";
+import { choice, colorField, optionalField, row, section, segmented, slider, textField, toggle } from "./controls";
+import { h } from "./dom";
+import { isListed, type Labels, labelText } from "./labels";
+import { can, presetChoices, rendererThatCan, titlesThatCan } from "./offers";
+import { LOOK, ONE_COLOR } from "./state";
+import { rounded } from "./vec";
+
+// A row for each label: whether it shows, its colour, its name, its opacity.
+function labelList({ store }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
+  const element = h("div", { class: "labels", role: "group", "aria-label": "Labels" });
+  let made: readonly LabelName[] = [];
+  // The opacity 0 hides one of all labels; a list of what is shown is changed as such.
+  const setShown = (label: number, on: boolean): void => {
+    const { labelsShown, labelOpacities } = store.state;
+    if (!isListed(labelsShown, label)) return store.update({ labelsShown: `${labelsShown},${label}` }, "label");
+    const rest = Object.fromEntries(Object.entries(labelOpacities).filter(([key]) => key !== String(label)));
+    store.update({ labelOpacities: on ? rest : { ...rest, [label]: 0 } }, "label");
+  };
+  const make = (label: LabelName): HTMLElement => {
+    const name = labelText(label);
+    const box: HTMLInputElement = h("input", { type: "checkbox", "aria-label": `Show ${name}`, onchange: () => setShown(label.value, box.checked) });
+    const opacity: HTMLInputElement = h("input", { type: "range", min: 0, max: 1, step: 0.05, "aria-label": `Opacity of ${name}`, oninput: () => store.update({ labelOpacities: { ...store.state.labelOpacities, [label.value]: rounded(Number(opacity.value)) } }, `opacity ${label.value}`) });
+    const only = h("button", { type: "button", class: "only", "aria-label": `Show only ${name}`, onclick: () => store.update({ labelsShown: store.state.labelsShown === String(label.value) ? "" : String(label.value) }, "only") }, "only");
+    const swatch = h("span", { class: "swatch", "aria-hidden": "true" });
+    if (label.color) swatch.style.background = label.color;
+    return h("div", { class: "label-row", "data-label": label.value }, box, swatch, h("span", { class: "label-name", title: name }, name), only, opacity);
+  };
+  return {
+    element,
+    refresh: () => {
+      if (made !== labels.names) { made = labels.names; element.replaceChildren(...made.map(make)); }
+      made.forEach((label, i) => {
+        const [box, opacity] = (element.children[i] as HTMLElement).querySelectorAll("input");
+        if (box) box.checked = labels.shows(label);
+        if (opacity) opacity.value = String(store.state.labelOpacities[label.value] ?? 1);
+      });
+    },
+  };
+}
+
+export function layersSection(context: Context, labels: Labels): HTMLElement {
+  const { store } = context, list = labelList(context, labels);
+  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
+  const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
+  const which = textField("Shown", "all, or 1,5-9", "[0-9]+(-[0-9]+)?(,[0-9]+(-[0-9]+)?)*", value => store.update({ labelsShown: value }, "labels shown"));
+  const legend = toggle("Legend", on => store.update({ legend: on }));
+  const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: rendererThatCan("overlay") } : {}) }, "overlay"));
+  const overlayPreset = choice("Overlay’s function", [...presetChoices(), [ONE_COLOR, "One colour"]], value => store.update({ overlayPreset: value }, "overlay preset"));
+  const overlayColor = colorField("Colour of the overlay", value => store.update({ overlayColor: value }, "overlay colour"));
+  const colorRow = row("Colour", overlayColor.input);
+  const ends = [0, 1].map(end => optionalField(`Overlay ${end === 0 ? "from" : "to"}`, value => {
+    const given = [...typed];
+    given[end] = value;
+    typed = given;
+    const [low, high] = given;
+    store.update({ overlayRange: low !== null && high !== null && low !== undefined && high !== undefined && low < high ? [low, high] : null }, "overlay range");
+  }));
+  let typed: (number | null)[] = [null, null]; // of a range, both count
+  const rangeRow = row("Values", h("span", { class: "pair" }, ...ends.map(end => end.input)));
+  const weight = slider("Weight", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ overlayWeight: value }, "weight"));
+  const hint = h("p", { class: "hint" });
+  const element = section("Layers", false, row("Labels", mode.element), tint.element, which.element, legend.element, hint, list.element, overlay.element, overlayPreset.element, colorRow, rangeRow, weight.element);
+  const update = (): void => {
+    const { state } = store, volume = context.volume(), any = (volume?.labels ?? 0) > 0, on = any && state.labels !== "off";
+    element.hidden = !any && !volume?.overlay;
+    mode.set(state.labels);
+    tint.set(state.labelTint);
+    which.set(state.labelsShown);
+    legend.set(state.legend);
+    overlay.set(state.overlay);
+    overlayPreset.set(state.overlayPreset);
+    overlayColor.set(state.overlayColor);
+    if (state.overlayRange) typed = [...state.overlayRange];
+    ends.forEach((end, i) => end.set(typed[i] ?? null));
+    weight.set(state.overlayWeight);
+    (mode.element.parentElement as HTMLElement).hidden = !any;
+    tint.element.hidden = !any || state.labels !== "tint";
+    which.element.hidden = list.element.hidden = legend.element.hidden = !on;
+    hint.hidden = !on || (can("labels", state.renderer) && labels.names.length > 0);
+    hint.textContent = !can("labels", state.renderer) ? `Labels are shown by: ${titlesThatCan("labels")}.` : `${volume?.labels ?? 0} labels. Point at one in the picture to list it here.`;
+    overlay.element.hidden = !volume?.overlay;
+    overlayPreset.element.hidden = rangeRow.hidden = weight.element.hidden = !volume?.overlay || !state.overlay;
+    colorRow.hidden = overlayPreset.element.hidden || state.overlayPreset !== ONE_COLOR;
+    list.refresh();
+  };
+  store.subscribe(update, [...LOOK, "legend"]);
+  context.onVolume(update);
+  labels.onChange(update);
+  update();
+  return element;
+}
