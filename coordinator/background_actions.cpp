@@ -113,7 +113,7 @@ BackgroundActions::AtOnce BackgroundActions::Post(auto&& tasks, const char* what
   return failed(begun);
 }
 
-BackgroundActions::AtOnce BackgroundActions::PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end) {
+BackgroundActions::AtOnce BackgroundActions::PostResult(auto&& tasks, const char* what, auto find, auto end) {
   return Post(
       tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
 }

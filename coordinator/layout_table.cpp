@@ -40,7 +40,7 @@ std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volu
 }
 
 LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots, bool counted) {
-  Key key{volume, policy, slots, NeedsOccupancy(policy) && !counted};
+  Key key{volume, policy, slots, !counted && NeedsOccupancy(AskFor(policy))};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;

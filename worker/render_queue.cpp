@@ -151,7 +151,7 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   return report;
 }
 
-std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::SlabsInTurn() const {
+std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::BoxesInTurn() const {
   std::vector<ClientId> clients;
   std::map<ClientId, std::vector<BoxFetcher::Generation>> boxes;
   for (const auto& [name, job] : waiting_) boxes[std::get<ClientId>(name)].push_back(job.padded);

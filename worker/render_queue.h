@@ -42,7 +42,7 @@ class RenderQueue {
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions);
 
   // Of waiting jobs, by client, the next one in turn first.
-  std::vector<std::vector<BoxFetcher::Generation>> SlabsInTurn() const;
+  std::vector<std::vector<BoxFetcher::Generation>> BoxesInTurn() const;
   std::set<GroupKey> GroupsOn(BoxFetcher::Generation padded) const;
   bool AnyPaused() const { return begun_.size() > (turn_ ? 1U : 0U); }
   std::size_t size() const { return waiting_.size() + begun_.size(); }

@@ -467,7 +467,7 @@ void WorkerMachine::State::Tend() {
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
-    boxes.RequestChunks(renders.SlabsInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
+    boxes.RequestChunks(renders.BoxesInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
     renders.StartNext(now, actions);
   }
   boxes.Trim(actions);
