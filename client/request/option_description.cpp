@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/request/request_options.h"
+#include "client/request/value_window.h"
 #include "common/classification/transfer_function.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
@@ -48,6 +49,14 @@ Json DescribePresets() {
   return presets;
 }
 
+Json DescribeWindows() {
+  Json windows = Json::array();
+  for (const auto& [name, purpose, window] : kNamedWindows) {
+    windows.push_back({{"name", name}, {"width", window.width}, {"level", window.level}});
+  }
+  return windows;
+}
+
 Json Describe(CLI::Option& option) {
   Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
   if (option.get_items_expected_max() > 0) json["type"] = option.get_type_name();
@@ -71,6 +80,7 @@ Json Describe(CLI::Option& option) {
     if (field->path == "renderer") json["renderers"] = DescribeRenderers();
     if (option.get_type_name() == "TRANSFER") json["presets"] = DescribePresets();
   }
+  if (NameOf(option) == "window") json["windows"] = DescribeWindows();
   json["help"] = option.get_description();
   return json;
 }
