@@ -108,17 +108,6 @@ void BoxFetcher::SetBytes(Generation padded, std::uint64_t bytes) {
   cached_bytes_ += of_box.bytes;
 }
 
-// While a padded box has not been rendered from, its voxels are still copied from its sources.
-bool BoxFetcher::Share(Generation a, Generation b) const {
-  const auto touched = [this](Generation padded) {
-    std::vector<Generation> all = boxes_.at(padded).sources;
-    all.push_back(padded);
-    return all;
-  };
-  const std::vector<Generation> of_a = touched(a), of_b = touched(b);
-  return std::ranges::find_first_of(of_a, of_b) != of_a.end();
-}
-
 void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker,
                                Time now, WorkerActions& actions) {
   const auto waits = [this](const std::vector<Generation>& boxes) {

@@ -53,8 +53,8 @@ class BoxFetcher {
   // The padded box's memory, with what was derived from its voxels and cells; it may fall. Counts as at least the samples and cells.
   void SetBytes(Generation padded, std::uint64_t bytes);
 
-  // Of acquired padded boxes: whether rendering from one may touch what rendering from the other one touches.
-  bool Share(Generation a, Generation b) const;
+  // Whether there is room for what another render derives from this padded box: about as much as its voxels (worker_memory.h).
+  bool HasRoomBeside(Generation padded) const { return boxes_.at(padded).RawBytes() <= room_ - std::min(room_, cached_bytes_); }
 
   // Requests missing chunks of these padded boxes, which each client needs in this order, within the credit (one chunk is always allowed)
   // and the room. `next_at_any_rate`: the first of all begins to take memory even if there is no room.

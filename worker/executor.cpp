@@ -12,7 +12,6 @@
 #include "common/image/image_view.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
-#include "worker/arriving_cells.h"
 
 namespace slabstream {
 namespace {
@@ -119,81 +118,6 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
 
 }  // namespace
 
-// Voxels and cells while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
-struct Executor::HeldBox {
-  explicit HeldBox(const BoxKey& box_key) : key(box_key) {}
-
-  Status Store(const Chunk& chunk, const Bytes& payload) {
-    if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset)
-      return Status::DataLoss("chunk of another padded box");
-    if (data != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
-    if (IsCellChunk(chunk.chunk)) {
-      return key.types.layers.cells ? cells.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
-    }
-    if (chunk.chunk >= ChunkCount(chunk.box, key.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.types, chunk.chunk)) {
-      return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
-                              " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
-    }
-    const ChunkPart part = PartOfChunk(chunk.box, key.types, chunk.chunk);
-    unpacked.resize(chunk.raw_bytes);
-    if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
-    Voxels(part.layer).Write(chunk.box, part.begin, unpacked);
-    return Status::Ok();
-  }
-
-  // The data to render from. The first call, when all chunks are stored, copies voxels that other padded boxes hold. Render thread only.
-  BoxData& Data() {
-    if (data != nullptr) return *data;
-    for (const Layer layer : kLayers) {
-      if (!key.types.Of(layer)) continue;
-      BrickedVoxels& to = Voxels(layer);
-      for (const Copy& copy : copies) copy.Perform(layer, to);
-    }
-    copies.clear();
-    data = std::make_unique<BoxData>(*std::move(voxels[0]), BoxLayers{std::move(voxels[1]), std::move(voxels[2]), cells.cells()});
-    voxels = {};
-    cells = {};
-    unpacked = {};
-    return *data;
-  }
-
-  // Those that are being stored. The first call makes room for them.
-  BrickedVoxels& Voxels(Layer layer) {
-    std::optional<BrickedVoxels>& stored = voxels.at(std::size_t(layer));
-    if (!stored) stored.emplace(key.box, *key.types.Of(layer));
-    return *stored;
-  }
-
-  VoxelBricks Bricks(Layer layer) {
-    const BoxData& stored = Data();
-    if (layer == Layer::kVolume) return stored.bricks();
-    return *(layer == Layer::kLabels ? stored.layers().labels : stored.layers().overlay);
-  }
-
-  struct Copy {
-    std::shared_ptr<HeldBox> from;
-    Box box;
-
-    void Perform(Layer layer, BrickedVoxels& to) const {
-      const VoxelBricks source = from->Bricks(layer);
-      const Index3 size = box.size();
-      std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
-      for (std::int32_t z = 0; z < size.z; ++z) {
-        const std::uint64_t begin = std::uint64_t(z) * slice.size();
-        source.Read(box, begin, slice);
-        to.Write(box, begin, slice);
-      }
-    }
-  };
-
-  const BoxKey key;
-  std::vector<Copy> copies;
-  std::array<std::optional<BrickedVoxels>, kLayers.size()> voxels;  // by layer
-  ArrivingCells cells;
-  std::vector<std::byte> unpacked;  // a chunk's samples
-  std::unique_ptr<BoxData> data;
-};
-
 Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
     : outbox_(outbox),
       frame_codec_(frame_codec),
@@ -232,16 +156,16 @@ Executor::~Executor() {
 }
 
 void Executor::Perform(const OpenBox& action) {
-  auto padded = std::make_shared<HeldBox>(action.padded);
-  for (const OpenBox::Copy& copy : action.copies) padded->copies.push_back({BoxOf(copy.from), copy.box});
-  boxes_.insert_or_assign(action.padded, std::move(padded));
+  std::vector<StoredBox::Copy> copies;
+  for (const OpenBox::Copy& copy : action.copies) copies.push_back({BoxOf(copy.from), copy.box});
+  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies)));
 }
 
 void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }
 
 void Executor::Perform(StoreChunk&& action) {
   const auto found = boxes_.find(action.padded);
-  std::shared_ptr<HeldBox> padded = found == boxes_.end() ? nullptr : found->second;
+  std::shared_ptr<StoredBox> padded = found == boxes_.end() ? nullptr : found->second;
   chunk_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
     Status status = Guard("box", [&] {
       return padded == nullptr ? Status::NotFound("chunk of a padded box that was dropped") : padded->Store(store.chunk, store.payload);
@@ -251,7 +175,7 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  std::shared_ptr<HeldBox> padded = BoxOf(action.padded);
+  std::shared_ptr<StoredBox> padded = BoxOf(action.padded);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
   std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
@@ -263,19 +187,18 @@ void Executor::Perform(StartRender&& action) {
       });
 }
 
-RenderDone Executor::Render(const StartRender& action, HeldBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image) {
+RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane,
+                            LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guard("render", [&] {
-    if (!padded.copies.empty()) {
-      padded.Data();
-      AddStage(report, Stage::kFetch, begin, NowNs());
-    }
+    if (padded.Assemble()) AddStage(report, Stage::kFetch, begin, NowNs());
+    const StoredBox::Lease lease = padded.Lend(action.client);
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(padded.Data(), action.placement.box, *action.setup, hidden, control, report);
+    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.box, *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;
@@ -283,7 +206,7 @@ RenderDone Executor::Render(const StartRender& action, HeldBox& padded, const Re
     return Status::Ok();
   });
   if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
-  done.box_bytes = padded.data == nullptr ? 0 : padded.data->bytes();
+  done.box_bytes = padded.bytes();
   return done;
 }
 
@@ -304,7 +227,7 @@ void Executor::Perform(const CancelRender& action) {
   if (const auto control = ControlOf(action.image)) control->Cancel();
 }
 
-std::shared_ptr<Executor::HeldBox> Executor::BoxOf(const BoxKey& key) const {
+std::shared_ptr<StoredBox> Executor::BoxOf(const BoxKey& key) const {
   const auto found = boxes_.find(key);
   CHECK(found != boxes_.end()) << "the machine copies and renders from boxes that it holds";
   return found->second;

@@ -5,10 +5,10 @@
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. The result goes to the outbox: an event for the machine, or a message that is ready to be sent.
 // Tables of padded boxes and images belong to the calling thread. Tasks share the entries that they need, so nothing is freed under a
-// running task and no lock is held while pixels are touched. One task at a time touches an entry's contents: the machine orders the next
-// use of a padded box or image only after the event that ends the last one. A combining thread's own tasks are an exception: they run in
-// order. Nothing is combined into the image of a finished frame; the image of a preview still grows, so previews are made on the combining
-// thread.
+// running task and no lock is held while pixels are touched. One task at a time touches the pixels of an image: the machine orders its next
+// use only after the event that ends the last one. A combining thread's own tasks are an exception: they run in order. Nothing is combined
+// into the image of a finished frame; the image of a preview still grows, so previews are made on the combining thread. Renders of several
+// clients may use a padded box at a time (StoredBox).
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -31,6 +31,7 @@
 #include "worker/peer_memory.h"
 #include "worker/renderers/renderer.h"
 #include "worker/sent_tallies.h"
+#include "worker/stored_box.h"
 #include "worker/thread_share.h"
 #include "worker/worker_machine.h"
 
@@ -84,8 +85,6 @@ class Executor {
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
 
  private:
-  struct HeldBox;
-
   // Runs `work`, which returns a Status, and catches its exceptions.
   template <class Work>
   Status Guard(const char* task, Work&& work);
@@ -94,18 +93,18 @@ class Executor {
   bool TrySend(const char* task, const GroupKey& key, Work&& work);
   void Break();
   // The entries of the tables, which exist.
-  std::shared_ptr<HeldBox> BoxOf(const BoxKey& key) const;
+  std::shared_ptr<StoredBox> BoxOf(const BoxKey& key) const;
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
   std::shared_ptr<RenderControl> ControlOf(ImageHandle image) const;   // null: the render has ended
-  RenderDone Render(const StartRender& action, HeldBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image);
+  RenderDone Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
   const Codec frame_codec_;
-  std::map<BoxKey, std::shared_ptr<HeldBox>> boxes_;
+  std::map<BoxKey, std::shared_ptr<StoredBox>> boxes_;
   std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
   LentImages lent_;
   SentTallies sent_;

@@ -20,7 +20,8 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     turns_.Join(client);
   }
   const Box voxels = PaddedBox(placement.box, *setup);
-  waiting_[{client, key, rank}] = {placement, setup, hidden, boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions);
+  waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
@@ -40,8 +41,8 @@ void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& action
 RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
   for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
     const BoxFetcher::Generation padded = job->second.padded;
-    const auto touches = [&](const auto& begun) { return boxes_.Share(padded, begun.second.job.padded); };
-    if (boxes_.complete(padded) && std::ranges::none_of(begun_, touches)) return job;
+    const auto uses = [&](const auto& begun) { return begun.second.job.padded == padded; };
+    if (boxes_.complete(padded) && (boxes_.HasRoomBeside(padded) || std::ranges::none_of(begun_, uses))) return job;
   }
   return waiting_.end();
 }
@@ -141,10 +142,12 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   report.group = job.key.group;
   report.rank = job.rank;
   report.box = job.job.placement.id;
-  const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
-  report.voxel_bytes = fetched.voxel_bytes;
-  if (fetched.voxel_bytes > 0) {
-    AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+  if (job.job.waited) {
+    const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
+    report.voxel_bytes = fetched.voxel_bytes;
+    if (fetched.voxel_bytes > 0) {
+      AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+    }
   }
   boxes_.Release(padded);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});

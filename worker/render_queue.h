@@ -4,7 +4,8 @@
 // client whose turn is over pauses, and goes on in its next turn. So a frame that takes seconds holds up nobody.
 //
 // A render that pauses stops only between two of its pieces, and one that is cancelled only soon, so others run beside it for a moment.
-// Renders that touch the same padded boxes are no two at a time, paused ones included. Each job pins its padded box.
+// Renders of several clients use the same padded box at a time, paused ones included, as long as there is room for what each of them
+// derives. Each job pins its padded box.
 #pragma once
 
 #include <map>
@@ -53,6 +54,7 @@ class RenderQueue {
     std::shared_ptr<const FrameSetup> setup;
     std::shared_ptr<const OcclusionMask> hidden;
     BoxFetcher::Generation padded = 0;
+    bool waited = false;  // for voxels: their fetch is reported with it
   };
   struct Begun {
     GroupKey key;

@@ -42,12 +42,12 @@ class ExecutorTest : public testing::Test {
     return outputs_.NextEvent<CombineDone>();
   }
   // What the image would be sent as: its pixels.
-  LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}) {
+  LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}, const PixelBounds& frame = kFrame) {
     executor_.Perform(
         SendPartial{.to = std::make_shared<Peer>(),
                     .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
-                    .frame = kFrame});
+                    .frame = frame});
     const auto sent = std::get<OutgoingPartial>(outputs_.Next());
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
@@ -305,6 +305,62 @@ TEST(ExecutorPauses, ARenderThatPausesLetsThatOfAnotherClientPass) {
   executor.Perform(CancelRender{5});
   steps.may_end.release(3);
   EXPECT_EQ(outputs.NextEvent<RenderDone>().status.code(), StatusCode::kCancelled) << "a render that pauses can be cancelled";
+}
+
+// Two transfer functions, so that each derives something else from the voxels.
+TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
+  const std::shared_ptr<const Volume> volume = TestSphere(24);
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->Can(Ability::kCells)) continue;
+    SCOPED_TRACE(renderer->name);
+    std::array<std::shared_ptr<const FrameSetup>, 2> setups;
+    for (int client = 0; client < 2; ++client) {
+      FrameRequest request = TestRequest(renderer, 40);
+      request.view.azimuth_degrees = 30 + 80 * client;
+      request.transfer.choice = TransferFunction{.colors = {{0, {0, 0, 0}}, {255, {1, 1, 1}}},
+                                                 .opacities = {{0, 0}, {60.0 + 90 * client, 0}, {61.0 + 90 * client, 1}, {255, 1}}};
+      setups.at(std::size_t(client)) =
+          std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
+    }
+    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
+    executor_.Perform(OpenBox{padded, {}});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
+    executor_.Perform(StoreChunk{padded, chunk, PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk)});
+    ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+
+    ImageHandle image = 0;
+    const auto start = [&](ClientId client) {
+      executor_.Perform(StartRender{.client = client,
+                                    .key = kKey,
+                                    .padded = padded,
+                                    .placement = {.box = padded.box, .worker = 1},
+                                    .setup = setups.at(client),
+                                    .image = ++image});
+    };
+    const auto pixels_of = [&](ImageHandle rendered) {
+      const PixelBounds frame = FrameBounds(*setups[0]);
+      return PixelsOf(rendered, {0, std::uint64_t(frame.pixel_count())}, frame);
+    };
+    std::vector<LocalImage> alone;
+    for (const ClientId client : {0, 1}) {
+      start(client);
+      ASSERT_TRUE(outputs_.NextEvent<RenderDone>().status.ok());
+      alone.push_back(pixels_of(image));
+      EXPECT_FALSE(alone.back().bounds.empty());
+    }
+    for (int round = 0; round < 8; ++round) {
+      start(0);
+      start(1);
+      for (int each = 0; each < 2; ++each) ASSERT_TRUE(outputs_.NextEvent<RenderDone>().status.ok());
+      for (const ClientId client : {0, 1}) {
+        const LocalImage beside = pixels_of(image - 1 + client);
+        EXPECT_EQ(beside.bounds, alone[client].bounds);
+        EXPECT_EQ(beside.rgba, alone[client].rgba);
+      }
+    }
+    for (; image > 0; --image) executor_.Perform(ReleaseImage{image});
+    executor_.Perform(DropBox{padded});
+  }
 }
 
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {

@@ -121,10 +121,8 @@ void ModelWorker::Perform(const DropBox& action) {
 }
 
 double ModelWorker::Begin(Job&, const StartRender& action) {
-  const std::set<BoxKey> touched = Touched(action.padded);
   for (const auto& [image, rendering] : rendering_) {
     EXPECT_NE(rendering.client, action.client) << "two renders of a client at a time";
-    for (const BoxKey& padded : Touched(rendering.padded)) EXPECT_FALSE(touched.contains(padded)) << "two renders touch a padded box";
     tally_.Add(Count::kRendersBesideOthers);
   }
   EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
@@ -135,16 +133,6 @@ double ModelWorker::Begin(Job&, const StartRender& action) {
   const double seconds = speed_.render * random_.Real(0.5, 2) * (large ? speed_.large : 1);
   rendering_[action.image] = {action.client, action.padded, seconds};
   return seconds;
-}
-
-// What rendering from the padded box reads: until it has been rendered from, those that it is copied from, too.
-std::set<BoxKey> ModelWorker::Touched(const BoxKey& padded) const {
-  std::set<BoxKey> touched = {padded};
-  const ModelBox& open = boxes_.at(padded);
-  for (const OpenBox::Copy& copy : open.copied) {
-    if (!open.rendered) touched.insert(copy.from);
-  }
-  return touched;
 }
 
 RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {

@@ -80,7 +80,6 @@ class ModelWorker {
   RenderDone Rendered(const StartRender& render, bool cancelled);
   ChunkStored Stored(const StoreChunk& store);
   bool Complete(const BoxKey& key) const;
-  std::set<BoxKey> Touched(const BoxKey& padded) const;
 
   const Node node_;
   const WorkerConfig config_;

@@ -3,6 +3,7 @@
 
 #include <map>
 
+#include "common/planning/worker_memory.h"
 #include "tests/support/random.h"
 #include "tests/worker/worker_machine_fixture.h"
 #include "worker/render_queue.h"
@@ -59,8 +60,24 @@ TEST_F(RenderTurnsTest, NobodyPausesForFramesOfItsOwn) {
   EXPECT_THAT(All<PauseRender>(After(std::chrono::seconds(1))), IsEmpty());
 }
 
-TEST_F(RenderTurnsTest, RendersThatTouchASlabAreNoTwoAtATime) {
-  const StartRender first = All<StartRender>(Assign(FrameOf(1, 1, 7))).at(0);
+TEST_F(RenderTurnsTest, ClientsOfTheSameDatasetTakeTurnsToo) {
+  const StartRender large = All<StartRender>(Assign(FrameOf(1, 1, 7))).at(0);
+  now += std::chrono::seconds(1);
+  const Actions begun = Assign(FrameOf(2, 2, 7));
+  EXPECT_THAT(All<PauseRender>(begun), ElementsAre(Pauses(large)));
+  ASSERT_THAT(All<StartRender>(begun), SizeIs(1));
+  EXPECT_EQ(All<StartRender>(begun)[0].padded, large.padded);
+  EXPECT_THAT(All<ResumeRender>(Rendered(All<StartRender>(begun)[0])), ElementsAre(Resumes(large)));
+}
+
+TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnother) {
+  const GroupAssignment frame = FrameOf(1, 1, 7);
+  const Box padded = PaddedBox(frame.group.placements.at(0).box, frame.setup);
+  const std::uint64_t images = GroupImageBytes(frame.setup, frame.group.placements) + PictureBytes(frame.setup);
+  WorkerConfig config = Config();
+  config.memory_bytes = kIdleMemoryBytes + 2 * images + std::uint64_t(padded.voxel_count()) * 3 / 2;
+  Start(config);
+  const StartRender first = All<StartRender>(Assign(frame)).at(0);
   now += std::chrono::seconds(1);
   const Actions same = Assign(FrameOf(2, 2, 7));
   EXPECT_THAT(All<PauseRender>(same), IsEmpty());

@@ -156,11 +156,11 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
 TEST(BoxData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
   const Volume volume = MakeBlobs({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, 33);
   const auto data = CutBox(volume, volume.block.box);
-  const std::size_t before = data->bytes();
+  const std::size_t before = data->derived_bytes();
   SetupOptions options;
   FrameSetup setup = MakeSetup(volume, options);
   const OccupiedVoxels* first = &data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box);
-  EXPECT_GE(data->bytes(), before + first->records.size() * sizeof(VoxelRecord));
+  EXPECT_GE(data->derived_bytes(), before + first->records.size() * sizeof(VoxelRecord));
   const VoxelRecord* records = first->records.data();
   const std::size_t record_count = first->records.size();
 
