@@ -312,7 +312,7 @@ TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
   const std::shared_ptr<const Volume> volume = TestSphere(24);
   for (const RendererKind* renderer : Renderers()) {
     if (renderer->Can(Ability::kCells)) continue;
-    SCOPED_TRACE(renderer->name);
+    SCOPED_TRACE(renderer->name());
     std::array<std::shared_ptr<const FrameSetup>, 2> setups;
     for (int client = 0; client < 2; ++client) {
       FrameRequest request = TestRequest(renderer, 40);
@@ -325,7 +325,8 @@ TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
     const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
     executor_.Perform(OpenBox{padded, {}});
     Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
-    executor_.Perform(StoreChunk{padded, chunk, PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk)});
+    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+    executor_.Perform(StoreChunk{padded, chunk, payload});
     ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
 
     ImageHandle image = 0;

@@ -4,6 +4,8 @@
 #include <map>
 
 #include "common/planning/worker_memory.h"
+#include "common/renderers/registry.h"
+#include "common/volume/memory_budget.h"
 #include "tests/support/random.h"
 #include "tests/worker/worker_machine_fixture.h"
 #include "worker/render_queue.h"
@@ -71,7 +73,14 @@ TEST_F(RenderTurnsTest, ClientsOfTheSameDatasetTakeTurnsToo) {
 }
 
 TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnother) {
-  const GroupAssignment frame = FrameOf(1, 1, 7);
+  const auto sized = [this](ClientId client) {  // without a renderer images have no size
+    GroupAssignment a = FrameOf(client, client, 7);
+    SetRenderer(*FindRenderer("raycast"), a.setup);
+    a.setup.sheets = {};
+    a.setup.camera = MakeCamera({}, {16, 16}, a.setup.description.geometry);
+    return a;
+  };
+  const GroupAssignment frame = sized(1);
   const Box padded = PaddedBox(frame.group.placements.at(0).box, frame.setup);
   const std::uint64_t images = GroupImageBytes(frame.setup, frame.group.placements) + PictureBytes(frame.setup);
   WorkerConfig config = Config();
@@ -79,7 +88,7 @@ TEST_F(RenderTurnsTest, ARenderWaitsWhereThereIsNoRoomForWhatItDerivesBesideAnot
   Start(config);
   const StartRender first = All<StartRender>(Assign(frame)).at(0);
   now += std::chrono::seconds(1);
-  const Actions same = Assign(FrameOf(2, 2, 7));
+  const Actions same = Assign(sized(2));
   EXPECT_THAT(All<PauseRender>(same), IsEmpty());
   EXPECT_THAT(All<StartRender>(same), IsEmpty());
   EXPECT_THAT(All<StartRender>(Rendered(first)), SizeIs(1));
