@@ -74,13 +74,13 @@ BoxData& StoredBox::DataFor(ClientId client) {
   auto best = derived_.end();
   for (auto each = derived_.begin(); each != derived_.end(); ++each) {
     if (each->lent) continue;
-    const auto rank = [client](const Derived& derived) { return std::pair(derived.client == client, derived.last_lease); };
+    const auto rank = [client](const Derived& derived) { return std::pair(derived.client == client, derived.last_use); };
     if (best == derived_.end() || rank(*best) < rank(*each)) best = each;
   }
   if (best == derived_.end()) best = derived_.emplace(derived_.end(), voxels_);
   best->lent = true;
   best->client = client;
-  best->last_lease = ++leases_;
+  ++leases_;
   best->data.TakeVoxels();
   return best->data;
 }
@@ -91,9 +91,10 @@ void StoredBox::Return(BoxData& data) {
   for (Derived& each : derived_) {
     if (&each.data != &data) continue;
     each.lent = false;
+    each.last_use = leases_;  // it may have lasted for many of others
     each.bytes = data.derived_bytes();
   }
-  std::erase_if(derived_, [this](const Derived& each) { return !each.lent && leases_ - each.last_lease >= kMostUnused; });
+  std::erase_if(derived_, [this](const Derived& each) { return !each.lent && leases_ - each.last_use >= kMostUnused; });
 }
 
 std::size_t StoredBox::bytes() const {

@@ -61,7 +61,7 @@ class StoredBox {
     BoxData data;
     ClientId client = 0;  // of the last render
     bool lent = false;
-    std::uint64_t last_lease = 0;
+    std::uint64_t last_use = 0;  // when it was returned: leases until then
     std::size_t bytes = 0;
   };
 
