@@ -75,9 +75,9 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
   }
   state.counters["finish"] = finish.count() / frames;
   state.counters["drawn"] = double(report.drawn_voxels) / frames;
-  double box_bytes = 0;
-  for (const auto& box : data) box_bytes += double(box->bytes());
-  state.counters["box_MB"] = box_bytes / 1e6;
+  double derived_bytes = 0;
+  for (const auto& box : data) derived_bytes += double(box->derived_bytes());
+  state.counters["derived_MB"] = derived_bytes / 1e6;
 }
 
 const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t(index)]; }
