@@ -10,6 +10,7 @@
 
 #include "client/image_io/annotations.h"
 #include "client/request/json_value.h"
+#include "common/cli/program.h"
 #include "common/view/camera.h"
 
 namespace slabstream {
@@ -43,11 +44,7 @@ PictureGeometry Geometry(const JsonValue& value) {
   static constexpr std::array<std::string_view, 3> kWorldNames = {NameOf(kWorlds[0]), NameOf(kWorlds[1]), NameOf(kWorlds[2])};
   PictureGeometry geometry;
   value.Fields({{"world", [&](const JsonValue& v) { geometry.world = kWorlds.at(v.OneOf(kWorldNames)); }},
-                {"unit",
-                 [&](const JsonValue& v) {
-                   static constexpr std::array<std::string_view, 3> kNames = {"voxel", "unknown", "mm"};
-                   geometry.unit = LengthUnit(v.OneOf(kNames) + 1);
-                 }},
+                {"unit", [&](const JsonValue& v) { geometry.unit = LengthUnit(v.OneOf(kLengthUnitNames) + 1); }},
                 {"projection",
                  [&](const JsonValue& v) {
                    static constexpr std::array<std::string_view, 2> kNames = {"orthographic", "perspective"};
@@ -147,8 +144,7 @@ Status RunAnnotate() {
     layers->PutOver(y, row);
     std::cout.write(reinterpret_cast<const char*>(row.data()), bytes);
   }
-  std::cout.flush();
-  return std::cout.good() ? Status::Ok() : Status::Unavailable("cannot write the pixels");
+  return FlushOutput();
 }
 
 }  // namespace slabstream

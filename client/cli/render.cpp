@@ -18,8 +18,8 @@
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
+#include "client/cli/warn_of_picture.h"
 #include "client/movie/turntable.h"
-#include "client/report/picture_warnings.h"
 #include "client/request/request_options.h"
 #include "common/base/files.h"
 #include "common/cli/program.h"
@@ -72,18 +72,6 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
   return Status::Ok();
 }
 
-// One line if the first picture shows nothing, or has one colour because of --scalar-range. No picture fails for want of it.
-void WarnOf(Client& client, const FrameRequest& request, const FrameRecord& frame) {
-  const std::optional<ScalarRange>& range = request.transfer.scalar_range;
-  if (!frame.empty && !range) return;
-  const Result<SummaryReply> summary = client.Summarize(request.dataset, request.transfer);
-  if (!summary.ok()) return;
-  std::optional<std::string> warning;
-  if (range && !range->percentiles) warning = RangeWarning("--scalar-range", range->min, range->max, summary->range);
-  if (!warning && frame.empty) warning = EmptyWarning(request, *summary);
-  if (warning) PrintWarning(*warning);
-}
-
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
 // Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
@@ -106,7 +94,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
-  WarnOf(connection->client(), jobs.front().request, frames->front());
+  WarnOf(connection->client(), jobs.front().request, frames->front().empty);
   if (!options.camera_path.empty()) {
     const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";
     if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;

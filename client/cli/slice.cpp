@@ -3,37 +3,17 @@
 
 #include <algorithm>
 #include <iostream>
-#include <optional>
 #include <utility>
 
 #include "client/cli/commands.h"
 #include "client/cli/picture_keys.h"
 #include "client/cli/service_connection.h"
+#include "client/cli/warn_of_picture.h"
 #include "client/image_io/image_writer.h"
 #include "client/report/picture_warnings.h"
 #include "common/base/files.h"
-#include "common/cli/program.h"
 
 namespace slabstream {
-namespace {
-
-// One line if the picture shows nothing, or has one colour. No picture fails for want of it.
-void WarnOf(Client& client, const SliceRequest& slice, const FrameRequest& frame, bool empty) {
-  const std::optional<ScalarRange>& range = frame.transfer.scalar_range;
-  if (!empty && !slice.window && !range) return;
-  const Result<SummaryReply> summary = client.Summarize(frame.dataset, frame.transfer);
-  if (!summary.ok()) return;
-  std::optional<std::string> warning;
-  if (const auto window = slice.shown_window()) {
-    warning = RangeWarning("--window", window->low(), window->high(), summary->range);
-  } else if (range && !range->percentiles) {
-    warning = RangeWarning("--scalar-range", range->min, range->max, summary->range);
-  }
-  if (!warning && empty) warning = EmptyWarning(frame, *summary);
-  if (warning) PrintWarning(*warning);
-}
-
-}  // namespace
 
 Status RunSlice(const SliceOptions& options) {
   if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
@@ -60,7 +40,7 @@ Status RunSlice(const SliceOptions& options) {
   const ImageSize whole = slice.size();
   const LocalImage all = SideBySide(images, slice.frame.size);
   if (Status status = WritePicture(all, whole, options.output, slice.format, notes); !status.ok()) return status;
-  WarnOf(connection->client(), slice, frames->front(), std::ranges::all_of(images, IsEmpty));
+  WarnOf(connection->client(), frames->front(), std::ranges::all_of(images, IsEmpty), slice.shown_window());
   std::cout << fmt::format("wrote {} {}x{}\n", options.output, whole.width, whole.height);
   return Status::Ok();
 }

@@ -44,10 +44,9 @@ std::string ListText(bool colors) {
   for (const TransferPreset& preset : TransferPresets()) widest = std::max(widest, preset.name.size());
   std::string text;
   for (const TransferPreset& preset : TransferPresets()) {
-    const auto map = std::ranges::find(NamedColorMaps(), preset.name, &ColorMap::name);
-    const bool is_map = map != NamedColorMaps().end();
-    text += fmt::format("{:<{}}  {}{}", preset.name, widest, colors && is_map ? TerminalBar(*map) : "", preset.purpose);
-    text += is_map ? fmt::format(" ({})\n", map->source) : "\n";
+    const ColorMap* const map = preset.map;
+    text += fmt::format("{:<{}}  {}{}", preset.name, widest, colors && map != nullptr ? TerminalBar(*map) : "", preset.purpose);
+    text += map != nullptr ? fmt::format(" ({})\n", map->source) : "\n";
   }
   return text;
 }

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "common/view/clip_corners.h"
+
 namespace slabstream {
 namespace {
 
@@ -15,10 +17,8 @@ std::string ExtentText(const VolumeGeometry& geometry, ClipUnit unit) {
   if (unit == ClipUnit::kVoxels) return fmt::format("0:{},0:{},0:{}v", geometry.size.x, geometry.size.y, geometry.size.z);
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
   Vec3 low = {kInfinite, kInfinite, kInfinite}, high = -low;
-  for (int corner = 0; corner < 8; ++corner) {
-    Vec3 p = {-0.5, -0.5, -0.5};
-    for (const Axis axis : kAxes) p[axis] += (corner >> Number(axis) & 1) != 0 ? geometry.size[axis] : 0;
-    const Vec3 world = geometry.ToWorld(p);
+  for (const Vec3& corner : CornersOf({}, geometry.bounds())) {
+    const Vec3 world = geometry.ToWorld(corner);
     for (const Axis axis : kAxes) {
       low[axis] = std::min(low[axis], world[axis]);
       high[axis] = std::max(high[axis], world[axis]);

@@ -15,12 +15,6 @@ bool IsShown(const Label& label, const LabelChoice& choice) {
          });
 }
 
-// As the picture has it (FrameRequest::brightness).
-Rgb Brightened(Rgb color, double factor) {
-  for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
-  return color;
-}
-
 }  // namespace
 
 PictureKey KeyOf(const FrameRequest& request, const SummaryReply& summary) {

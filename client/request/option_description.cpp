@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/request/request_options.h"
+#include "client/request/value_window.h"
 #include "common/classification/transfer_function.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
@@ -21,7 +22,10 @@ std::string NameOf(const CLI::Option& option) {
 }
 
 // "CAPTION" of "[=CAPTION]".
-std::string NameOfOptional(const std::string& type) { return type.substr(2, type.size() - 3); }
+std::string NameOfOptional(std::string type) {
+  std::erase_if(type, [](char c) { return c == '[' || c == '=' || c == ']'; });
+  return type;
+}
 
 // In order of their names: CLI11 keeps them in order of their addresses.
 Json NamesOf(const std::set<CLI::Option*>& options) {
@@ -53,6 +57,14 @@ Json DescribePresets() {
   return presets;
 }
 
+Json DescribeWindows() {
+  Json windows = Json::array();
+  for (const auto& [name, purpose, window] : kNamedWindows) {
+    windows.push_back({{"name", name}, {"width", window.width}, {"level", window.level}});
+  }
+  return windows;
+}
+
 Json Describe(CLI::Option& option) {
   Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
   const bool alone = option.get_items_expected_max() == 0;
@@ -81,6 +93,7 @@ Json Describe(CLI::Option& option) {
     }
     if (option.get_type_name() == "TRANSFER") json["presets"] = DescribePresets();
   }
+  if (NameOf(option) == "window") json["windows"] = DescribeWindows();
   json["help"] = option.get_description();
   return json;
 }

@@ -130,16 +130,9 @@ bool IsPlain(std::string_view word) {
 }  // namespace
 
 Json GeometryJson(const PictureGeometry& geometry) {
-  static constexpr std::array<const char*, 3> kUnits = {"voxel", "unknown", "mm"};
-  return {{"world", NameOf(geometry.world)},
-          {"unit", kUnits.at(std::size_t(geometry.unit) - 1)},
-          {"projection", NameOf(geometry.projection)},
-          {"right", VectorJson(geometry.right)},
-          {"up", VectorJson(geometry.up)},
-          {"forward", VectorJson(geometry.forward)},
-          {"target", VectorJson(geometry.target)},
-          {"target_depth", geometry.target_depth},
-          {"pixel_size", geometry.pixel_size}};
+  return {{"world", NameOf(geometry.world)},       {"unit", NameOf(geometry.unit)},         {"projection", NameOf(geometry.projection)},
+          {"right", VectorJson(geometry.right)},   {"up", VectorJson(geometry.up)},         {"forward", VectorJson(geometry.forward)},
+          {"target", VectorJson(geometry.target)}, {"target_depth", geometry.target_depth}, {"pixel_size", geometry.pixel_size}};
 }
 
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {

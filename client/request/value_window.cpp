@@ -2,20 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cctype>
 
+#include "common/base/find_named.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {
 
 Result<ValueWindow> ParseValueWindow(const std::string& option, const std::string& text) {
-  const auto* const named = std::ranges::find(kNamedWindows, text, &NamedWindow::name);
-  if (named != kNamedWindows.end()) return named->window;
+  if (const NamedWindow* const named = FindNamed(kNamedWindows, text)) return named->window;
   if (!text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) != 0) {
-    std::string names;
-    for (const NamedWindow& window : kNamedWindows) names.append(names.empty() ? "" : ", ").append(window.name);
-    return Status::InvalidArgument(fmt::format("{} '{}' is neither a number nor one of {}", option, text, names));
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither a number nor one of {}", option, text, NamesOf(kNamedWindows)));
   }
   const Result<double> width = ParseNumber(option, text, {0, 1e30, true});
   if (!width.ok()) return width.status();

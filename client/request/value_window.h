@@ -16,7 +16,7 @@ struct ValueWindow {
   friend bool operator==(const ValueWindow&, const ValueWindow&) = default;
 };
 
-// The usual windows of CT, in Hounsfield units.
+// The usual windows of CT, in Hounsfield units. The only list: the page and the Python package get it with the option --window.
 struct NamedWindow {
   std::string_view name, purpose;
   ValueWindow window;
@@ -25,7 +25,7 @@ inline constexpr std::array<NamedWindow, 6> kNamedWindows = {{
     {"bone", "width 1800, level 400", {1800, 400}},
     {"lung", "width 1500, level -600", {1500, -600}},
     {"mediastinum", "width 350, level 50", {350, 50}},
-    {"soft-tissue", "width 400, level 50", {400, 50}},
+    {"soft-tissue", "width 400, level 40", {400, 40}},
     {"brain", "width 80, level 40", {80, 40}},
     {"liver", "width 150, level 30", {150, 30}},
 }};

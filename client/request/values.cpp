@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/request/named_colors.h"
+#include "common/base/find_named.h"
 #include "common/cli/parse.h"
 
 namespace slabstream {
@@ -124,8 +125,8 @@ Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text)
 }
 
 Result<StraightColor> ParseColor(std::string_view option, std::string_view text) {
-  const auto* const named = std::ranges::find(kNamedColors, text, &NamedColor::name);
-  const std::string code = named != kNamedColors.end() ? fmt::format("#{:06x}", named->code) : std::string(text);
+  const NamedColor* const named = FindNamed(kNamedColors, text);
+  const std::string code = named != nullptr ? fmt::format("#{:06x}", named->code) : std::string(text);
   if (code.starts_with('#')) {
     if (const std::optional<StraightColor> color = FromHexadecimal(std::string_view(code).substr(1))) return *color;
     return Status::InvalidArgument(fmt::format("{} '{}' is neither #rrggbb nor #rrggbbaa", option, text));

@@ -26,7 +26,7 @@ bool Exists(const std::string& volume) {
 
 bool IsJson(const std::string& text) { return text.starts_with('{') || text.starts_with('['); }
 
-Result<TransferText> ColorMap(const std::string& option, const std::string& json, const std::string& name) {
+Result<TransferText> ReadColorMap(const std::string& option, const std::string& json, const std::string& name) {
   Result<TransferFunction> transfer = ParseParaViewColorMap(json, name);
   if (!transfer.ok()) return Status(transfer.status().code(), fmt::format("{} {}", option, transfer.status().message()));
   return TransferText(*std::move(transfer));
@@ -40,7 +40,7 @@ bool NamesFile(const std::string& transfer) {
 }  // namespace
 
 Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text) {
-  if (IsJson(text)) return ColorMap(option, text, "the colour map");
+  if (IsJson(text)) return ReadColorMap(option, text, "the colour map");
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
   const Result<std::size_t> index = ParseChoice(option, text, names);
@@ -52,7 +52,7 @@ Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::str
   if (NamesFile(text)) {
     const Result<std::string> json = ReadTextFile(text, kMaxTransferFileBytes);
     if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
-    return ColorMap(option, *json, text);
+    return ReadColorMap(option, *json, text);
   }
   Result<TransferText> transfer = ParseTransferText(option, text);
   if (!transfer.ok() && !IsJson(text)) return Status::InvalidArgument(transfer.status().message() + ", nor a .json file");

@@ -2,24 +2,24 @@
 #pragma once
 
 #include <algorithm>
+#include <ranges>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace slabstream {
 
 // Null: no entry has this name. Valid as long as `entries` is.
-template <class Entry>
-const Entry* FindNamed(const std::vector<Entry>& entries, std::string_view name) {
-  const auto found = std::ranges::find(entries, name, &Entry::name);
+template <std::ranges::range Entries>
+const std::ranges::range_value_t<Entries>* FindNamed(const Entries& entries, std::string_view name) {
+  const auto found = std::ranges::find(entries, name, &std::ranges::range_value_t<Entries>::name);
   return found == entries.end() ? nullptr : &*found;
 }
 
 // "slab, beam, subcube"
-template <class Entry>
-std::string NamesOf(const std::vector<Entry>& entries) {
+template <std::ranges::range Entries>
+std::string NamesOf(const Entries& entries) {
   std::string names;
-  for (const Entry& entry : entries) names.append(names.empty() ? "" : ", ").append(entry.name);
+  for (const auto& entry : entries) names.append(names.empty() ? "" : ", ").append(entry.name);
   return names;
 }
 

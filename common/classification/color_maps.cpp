@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <span>
 
-#include "common/base/check.h"
-
 namespace slabstream {
 namespace {
 
@@ -68,7 +66,6 @@ const std::vector<ColorMap>& NamedColorMaps() {
        "straight lines between six colours",
        {{0, {0, 0, 0.5F}}, {0.125, {0, 0, 1}}, {0.375, {0, 1, 1}}, {0.625, {1, 1, 0}}, {0.875, {1, 0, 0}}, {1, {0.5F, 0, 0}}}},
   };
-  CHECK(maps.size() == kColorMapCount);
   return maps;
 }
 

@@ -24,7 +24,6 @@ struct ColorMap {
   std::vector<Point> points;
 };
 // The only list.
-inline constexpr std::size_t kColorMapCount = 10;
 const std::vector<ColorMap>& NamedColorMaps();
 
 }  // namespace slabstream

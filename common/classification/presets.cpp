@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <utility>
 
 #include "common/base/find_named.h"
 #include "common/classification/color_maps.h"
@@ -210,19 +209,13 @@ TransferFunction Simulation(const VolumeSummary& summary) {
           {{begin, 0}, {at(0.40), 0.02}, {at(0.75), 0.08}, {at(0.93), 0.25}, {at(0.998), 0.7}}};
 }
 
-template <std::size_t map>
-TransferFunction Mapped(const VolumeSummary& summary) {
+TransferFunction Mapped(const ColorMap& map, const VolumeSummary& summary) {
   TransferFunction transfer;
-  for (const auto& [at, color] : NamedColorMaps()[map].points) {
+  for (const auto& [at, color] : map.points) {
     transfer.colors.push_back({std::lerp(double(summary.range.min), double(summary.range.max), at), color});
   }
   transfer.opacities = Automatic(summary).opacities;
   return transfer;
-}
-
-template <std::size_t... maps>
-void AddColorMaps(std::vector<TransferPreset>& presets, std::index_sequence<maps...>) {
-  (presets.push_back({NamedColorMaps()[maps].name, NamedColorMaps()[maps].purpose, Mapped<maps>}), ...);
 }
 
 std::vector<TransferPreset> AllPresets() {
@@ -240,7 +233,9 @@ std::vector<TransferPreset> AllPresets() {
       {"simulation", "simulations: glowing gas", Simulation},
       {kNoTransfer, "nothing is visible, so that isosurfaces (--isovalue) stand alone", None},
   };
-  AddColorMaps(presets, std::make_index_sequence<kColorMapCount>());
+  for (const ColorMap& map : NamedColorMaps()) {
+    presets.push_back({map.name, map.purpose, [&map](const VolumeSummary& summary) { return Mapped(map, summary); }, &map});
+  }
   return presets;
 }
 

@@ -68,6 +68,11 @@ double Interpolate(const OpacityPoint& a, const OpacityPoint& b, double s) {
 
 }  // namespace
 
+Rgb Brightened(Rgb color, double factor) {
+  for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
+  return color;
+}
+
 Rgb TransferFunction::Color(double value) const {
   const std::size_t end = SegmentEnd(colors, value);
   if (end == 0) return colors.front().color;

@@ -9,6 +9,7 @@
 // Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,6 +28,8 @@ struct Rgb {
   float r = 0, g = 0, b = 0;
   friend bool operator==(const Rgb&, const Rgb&) = default;
 };
+// Each channel times the factor, at most 1 (FrameRequest::brightness).
+Rgb Brightened(Rgb color, double factor);
 
 struct ColorPoint {
   double value = 0;  // data value, finite; points ascend (equal values make a step)
@@ -100,12 +103,15 @@ Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::strin
 // The inverse, as a preset called `name`. `transfer` valid; only its curves over data values have a place there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
+struct ColorMap;
+
 // Built-in transfer functions, chosen by name; "auto" is made from the histogram of the volume, kNoTransfer shows nothing.
 inline constexpr std::string_view kNoTransfer = "none";
 struct TransferPreset {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help
-  TransferFunction (*make)(const VolumeSummary&);
+  std::function<TransferFunction(const VolumeSummary&)> make;
+  const ColorMap* map = nullptr;  // it spreads these colours over all values, and all of them show in slices
 };
 // The only list.
 const std::vector<TransferPreset>& TransferPresets();

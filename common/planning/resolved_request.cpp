@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/base/find_named.h"
-#include "common/classification/color_maps.h"
 #include "common/renderers/registry.h"
 
 namespace slabstream {
@@ -79,11 +78,8 @@ Status CheckHasWhatIsDrawn(const RendererKind& renderer, const std::string& data
 namespace {
 
 void Brighten(double factor, TransferFunction& transfer) {
-  const auto brighten = [factor](Rgb& color) {
-    for (float* channel : {&color.r, &color.g, &color.b}) *channel = std::min(float(*channel * factor), 1.0F);
-  };
-  for (ColorPoint& point : transfer.colors) brighten(point.color);
-  for (Isosurface& surface : transfer.isosurfaces) brighten(surface.color);
+  for (ColorPoint& point : transfer.colors) point.color = Brightened(point.color, factor);
+  for (Isosurface& surface : transfer.isosurfaces) surface.color = Brightened(surface.color, factor);
 }
 
 }  // namespace
@@ -98,8 +94,8 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
-  const auto* const preset = std::get_if<std::string>(&request.transfer.choice);
-  if (request.clipping.slab && preset != nullptr && FindNamed(NamedColorMaps(), *preset) != nullptr) {
+  const auto* const name = std::get_if<std::string>(&request.transfer.choice);
+  if (request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
     transfer->opacities = {{double(summary->range.min), 1}};
   }
   Brighten(request.brightness, *transfer);

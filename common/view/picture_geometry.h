@@ -6,7 +6,10 @@
 // with k = 1 for orthographic pictures and k = d / target_depth for perspective ones.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string_view>
 
 #include "common/view/camera.h"
 #include "common/volume/orientation.h"
@@ -19,6 +22,8 @@ enum class LengthUnit : std::uint8_t {
   kFile = 2,        // of the file's spacing, which states none
   kMillimetre = 3,  // of patients
 };
+inline constexpr std::array<std::string_view, 3> kLengthUnitNames = {"voxel", "unknown", "mm"};  // in records and answers
+constexpr std::string_view NameOf(LengthUnit unit) { return kLengthUnitNames.at(std::size_t(unit) - 1); }
 
 struct PictureGeometry {
   World world = World::kVoxels;  // whose axes these are

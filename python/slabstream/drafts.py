@@ -242,16 +242,11 @@ def _caption(option: Option, value: Any) -> str | None:
     return ("" if value else None) if isinstance(value, bool) else _line(option, value)
 
 
-#: Widths and levels of CT windows, in Hounsfield units (client/request/value_window.h).
-WINDOWS = {"bone": (1800, 400), "lung": (1500, -600), "mediastinum": (350, 50), "soft-tissue": (400, 50), "brain": (80, 40),
-           "liver": (150, 30)}
-
-
 def _window(draft: Draft, option: Option, value: Any) -> None:
     if isinstance(value, str) and value[:1].isalpha():
-        if value not in WINDOWS:
-            raise InvalidArgument(f"{option.name} '{value}' is neither a number nor one of {', '.join(WINDOWS)}")
-        draft.window, level = WINDOWS[value]
+        if value not in option.windows:
+            raise InvalidArgument(f"{option.name} '{value}' is neither a number nor one of {', '.join(option.windows)}")
+        draft.window, level = option.windows[value]
         draft.level = level if draft.level is None else draft.level
     else:
         draft.window = values.number(option.name, value, 0, 1e30, above=True)

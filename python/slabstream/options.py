@@ -34,6 +34,7 @@ class Option:
     needs: tuple[str, ...]
     same_picture: bool      # it never changes the finished picture
     renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
+    windows: dict[str, tuple[float, float]]  # of the option window: width and level by name
 
 
 def _keyword(name: str) -> str:
@@ -57,6 +58,7 @@ def _option(entry: dict[str, Any]) -> Option:
         needs=tuple(map(_keyword, entry.get("needs", ()))),
         same_picture=entry.get("same_picture", False),
         renderers=tuple(entry.get("renderers", ())),
+        windows={window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
     )
 
 

@@ -5,14 +5,15 @@ Each function takes the option's name, for messages, and a value. Messages are t
 """
 from __future__ import annotations
 
+import json
 import math
 import operator
+import pathlib
 from typing import Any, Iterable, Sequence
 
 import numpy
 
 from .errors import InvalidArgument
-from .named_colors import NAMED_COLORS
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the precision of a float32
@@ -22,6 +23,9 @@ MOST_SCALAR = 1e300
 MOST_SIDE = 16384      # pixels
 MOST_LABEL = 1 << 24
 MOST_ISOSURFACES = 8
+
+#: The colours that CSS names, as codes: those of the command line (python/update-options writes the file).
+NAMED_COLORS: dict[str, str] = json.loads(pathlib.Path(__file__).with_name("colors.json").read_text(encoding="utf-8"))
 
 # Of isosurfaces without a colour, by their place in the list: bone, blood, fat, nerve and so on.
 _ISOSURFACE_COLORS: list[Vector] = [

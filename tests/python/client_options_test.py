@@ -227,6 +227,10 @@ class Drift(unittest.TestCase):
     def test_options_are_those_that_the_program_prints(self) -> None:
         self.assertEqual(update.OPTIONS.read_text(), update.options_text(client_support.PROGRAM), "run python/update-options")
 
+    def test_colours_are_those_of_the_command_line(self) -> None:
+        self.assertEqual(update.COLORS.read_text(), update.colors_text(), "run python/update-options")
+        self.assertEqual(len(json.loads(update.COLORS.read_text())), 148, "as many as CSS names")
+
     def test_the_schema_is_that_of_proto(self) -> None:
         from google.protobuf import descriptor_pb2
 

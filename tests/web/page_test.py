@@ -748,7 +748,7 @@ class PageTest(unittest.TestCase):
         viewer = self.viewer(layout="quad")
         viewer.settled()
         choice = viewer.driver.find_element(By.XPATH, "//div[label[. = 'Window for']]/select")
-        self.assertEqual(viewer.js("[...arguments[0].options].map(o => o.text)", choice), ["Automatic", "Bone", "Lung", "Soft tissue", "Brain", "Liver"])
+        self.assertEqual(viewer.js("[...arguments[0].options].map(o => o.text)", choice), ["Automatic", "Bone", "Lung", "Mediastinum", "Soft tissue", "Brain", "Liver"])
         choice.find_element(By.XPATH, "option[. = 'Soft tissue']").click()
         drawn = viewer.final("o.window === 400 && o.level === 40", "axial")
         self.assertSamePixels(viewer.pixels("axial"), self.command_line(drawn, "slice"))

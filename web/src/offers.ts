@@ -1,9 +1,10 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
 
 export interface Offer {
-  name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; renderers?: Renderer[];
+  name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
   automatic?: { volumes: string; grids: string }; // renderers
 }
+export interface NamedWindow { name: string; width: number; level: number }
 export interface Renderer { name: string; title: string; abilities: string[]; parameters: Record<string, string> } // parameters with their standard values
 
 const offers = new Map<string, Offer>();
@@ -38,6 +39,9 @@ export function words(name: string): string {
 // Presets of transfer functions, but for the one that shows nothing.
 export const presetChoices = (): (readonly [string, string])[] =>
   (offers.get("transfer")?.presets ?? ["auto"]).filter(name => name !== "none").map(name => [name, words(name)] as const);
+
+// Windows of CT, in Hounsfield units.
+export const namedWindows = (): readonly NamedWindow[] => offers.get("window")?.windows ?? [];
 
 const has = (what: string, { abilities, parameters }: Renderer): boolean => abilities.includes(what) || what in parameters;
 

@@ -2,14 +2,9 @@
 import type { Context } from "./context";
 import { choice, numberField, optionalField, section } from "./controls";
 import { h } from "./dom";
-import { words } from "./offers";
+import { namedWindows, words } from "./offers";
 import { AXES, AXIS_NAMES, clamp, withAxis } from "./vec";
 
-// The usual ones of radiologists, in Hounsfield units.
-const WINDOWS = [
-  { name: "bone", window: 1800, level: 400 }, { name: "lung", window: 1500, level: -600 }, { name: "soft-tissue", window: 400, level: 40 },
-  { name: "brain", window: 80, level: 40 }, { name: "liver", window: 150, level: 30 },
-] as const;
 const AUTOMATIC = "auto", OWN = "own", NO_WINDOW = { window: null, level: null };
 
 export function slicesSection(context: Context): HTMLElement {
@@ -22,8 +17,8 @@ export function slicesSection(context: Context): HTMLElement {
   const window = optionalField("Window of the slices", value => { if (value === null || value > 0) store.update(value === null ? NO_WINDOW : { window: value, level: store.state.level ?? (range()[0] + range()[1]) / 2 }, "slice window"); });
   const level = optionalField("Level of the slices", value => store.update(value === null ? NO_WINDOW : { level: value, window: store.state.window ?? Math.max(range()[1] - range()[0], 1e-6) }, "slice level"));
   const preset = choice("Window for", [], value => {
-    const chosen = WINDOWS.find(each => each.name === value);
-    if (value !== OWN) store.update({ window: chosen?.window ?? null, level: chosen?.level ?? null }, "slice preset");
+    const chosen = namedWindows().find(each => each.name === value);
+    if (value !== OWN) store.update({ window: chosen?.width ?? null, level: chosen?.level ?? null }, "slice preset");
   });
   preset.element.title = "Hounsfield units, of CT";
   const field = (name: string, input: HTMLElement): HTMLElement => h("label", {}, h("span", {}, name), input);
@@ -33,8 +28,8 @@ export function slicesSection(context: Context): HTMLElement {
     const { state } = store, volume = context.volume();
     element.hidden = state.layout !== "quad" || !volume;
     if (!volume) return;
-    const named = WINDOWS.find(each => each.window === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
-    preset.fill([AUTOMATIC, ...WINDOWS.map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
+    const named = namedWindows().find(each => each.width === state.window && each.level === state.level)?.name ?? (state.window === null ? AUTOMATIC : OWN);
+    preset.fill([AUTOMATIC, ...namedWindows().map(each => each.name), ...(named === OWN ? [OWN] : [])].map(name => [name, words(name)] as const));
     preset.set(named);
     at.forEach((each, i) => each.set((state.crosshair ?? volume.centre)[i] as number));
     window.set(state.window);
