@@ -136,6 +136,7 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
 # Of an unstructured grid.
 GRID_CASES: list[tuple[dict, list[str]]] = [
     ({"renderer": "slice", "sampling_rate": 2, "azimuth": 30}, ["--renderer", "slice", "--sampling-rate", "2", "--azimuth", "30"]),
+    ({"renderer": "auto", "sampling_rate": 4}, ["--renderer", "auto", "--sampling-rate", "4"]),
 ]
 GRID = """# vtk DataFile Version 3.0
 a hexahedron
