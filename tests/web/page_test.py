@@ -397,15 +397,15 @@ class PageTest(unittest.TestCase):
         volume.settled()
         volume.until("document.querySelector('.facts dd') !== null")
         self.assertNotIn("slice", volume.js(renderers))
+        light = "[...document.querySelectorAll('details')].find(d => d.querySelector('h2').textContent === 'Light')"
+        self.assertFalse(volume.js(f"{light}.hidden"))
         viewer = self.viewer(dataset="grid", sampling_rate=2)
         drawn = viewer.final("o['sampling-rate'] === '2' && h.statistics.plan.renderer === 'slice'")
         self.assertEqual(drawn["options"]["renderer"], "auto", "which draws the cells")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.until(f"{renderers}.includes('slice')")
         self.assertEqual(viewer.js(renderers)[0], "auto")
-        light = "[...document.querySelectorAll('details')].find(d => d.querySelector('h2').textContent === 'Light')"
         self.assertTrue(viewer.js(f"{light}.hidden"), "cells are not lit")
-        self.assertFalse(volume.js(f"{light}.hidden"))
         viewer.js("(s => { s.value = 'slice'; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'slice')))")
         drawn = viewer.final("o.renderer === 'slice'")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
