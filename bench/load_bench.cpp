@@ -1,7 +1,7 @@
 // Puts a service under the load of many clients, which are threads of this process. Well-behaved clients ask for a picture, read it, and
 // ask for the next one. After a while two others join them: one asks for pictures and never reads them, one asks for very large pictures.
 // The program exits with 0 if each process stays within its --memory, and if the well-behaved clients together keep at least half of their
-// pictures a second.
+// pictures a second. With --fair it measures small frames beside large requests instead (fair_load.h).
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -11,6 +11,7 @@
 #include <functional>
 #include <thread>
 
+#include "bench/fair_load.h"
 #include "bench/program.h"
 #include "bench/service_processes.h"
 #include "client/client.h"
@@ -160,6 +161,14 @@ int main(int argc, char** argv) {
   AddInteger(app, "--volume", options.volume, 2, 1024, "Voxels a side of the sphere");
   AddInteger(app, "--size", options.size, 1, 8192, "Pixels a side of most pictures");
   AddInteger(app, "--large", options.large, 1, 16384, "Pixels a side of the large pictures");
+  bool fair = false;
+  int samples = FairLoadOptions{}.samples;
+  app.add_flag("--fair", fair, "Instead: small frames beside large requests of another client, of --volume and --large");
+  AddInteger(app, "--samples", samples, 1, 16, "With --fair: samples in each voxel length of the large intensity projection");
   AddInteger(app, "--memory", options.memory_mebi, 256, 1 << 20, "MiB for the coordinator, and for each worker");
-  return RunProgram(app, argc, argv, [&options] { return Load(options).Run(); });
+  return RunProgram(app, argc, argv, [&] {
+    if (!fair) return Load(options).Run();
+    return MeasureFairLoad(
+        {.volume = options.volume, .size = options.large, .workers = options.workers, .threads = options.threads, .samples = samples});
+  });
 }

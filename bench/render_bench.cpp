@@ -42,7 +42,7 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
   }
 
   const std::unique_ptr<Renderer> renderer = MakeRenderer(kind);
-  const std::atomic<bool> cancelled{false};
+  RenderControl control;
   tbb::task_arena arena(threads);
   std::chrono::duration<double, std::milli> finish{};
   std::size_t frame = 0;
@@ -51,7 +51,7 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
       const FrameSetup& setup = setups[frame++ % setups.size()];
       LocalImage image;
       for (std::size_t i = 0; i < data.size(); ++i) {
-        image = renderer->Render(*data[i], partition.boxes()[i], setup, {}, cancelled, report).value();
+        image = renderer->Render(*data[i], partition.boxes()[i], setup, {}, control, report).value();
         benchmark::DoNotOptimize(image.rgba.data());
       }
       const auto begin = std::chrono::steady_clock::now();
@@ -75,9 +75,9 @@ void Render(benchmark::State& state, const Volume& volume, const RendererKind& k
   }
   state.counters["finish"] = finish.count() / frames;
   state.counters["drawn"] = double(report.drawn_voxels) / frames;
-  double box_bytes = 0;
-  for (const auto& box : data) box_bytes += double(box->bytes());
-  state.counters["box_MB"] = box_bytes / 1e6;
+  double derived_bytes = 0;
+  for (const auto& box : data) derived_bytes += double(box->derived_bytes());
+  state.counters["derived_MB"] = derived_bytes / 1e6;
 }
 
 const RendererKind& KindAt(std::int64_t index) { return *Renderers()[std::size_t(index)]; }

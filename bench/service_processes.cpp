@@ -20,9 +20,15 @@ Child StartProgram(const ServiceProcessesOptions& options, const std::string& na
 }
 
 Child StartCoordinator(const ServiceProcessesOptions& options) {
-  const std::string file = options.directory + "/sphere.mha";
-  CHECK(WriteVolume(MakeSphere({.sphere_class = SphereClass::kHollow, .size = options.volume}).value(), file).ok());
-  return StartProgram(options, "slabstream-coordinator", {"--listen", options.listen, "--data", "sphere=" + file});
+  std::vector<std::string> arguments = {"--listen", options.listen};
+  const auto add = [&](const std::string& name, int size) {
+    const std::string file = options.directory + "/" + name + ".mha";
+    CHECK(WriteVolume(MakeSphere({.sphere_class = SphereClass::kHollow, .size = size}).value(), file).ok());
+    arguments.insert(arguments.end(), {"--data", name + "=" + file});
+  };
+  add("sphere", options.volume);
+  if (options.other_volume > 0) add("other", options.other_volume);
+  return StartProgram(options, "slabstream-coordinator", arguments);
 }
 
 }  // namespace

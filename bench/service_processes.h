@@ -1,4 +1,5 @@
-// A coordinator and workers as processes, as `slabstream up` starts them, with a hollow sphere as the dataset "sphere".
+// A coordinator and workers as processes, as `slabstream up` starts them, with a hollow sphere as the dataset "sphere", and perhaps another
+// one as "other".
 #pragma once
 
 #include <string>
@@ -14,6 +15,7 @@ struct ServiceProcessesOptions {
   std::string directory;                       // for the volume, the log and ipc files
   std::string listen = "tcp://127.0.0.1:*";    // of the coordinator
   int volume = 64;                             // voxels a side of the sphere
+  int other_volume = 0;                        // of the other one; 0: there is none
   int workers = 2, threads = 1;                // threads: of each worker
   std::vector<std::string> arguments_of_each;  // further ones, of the coordinator and of each worker
 };

@@ -102,7 +102,7 @@ std::vector<CoordinatorEvent> BackgroundActions::TakeEvents() {
   return events;
 }
 
-BackgroundActions::AtOnce BackgroundActions::Post(BackgroundTasks& tasks, const char* what, auto make, auto failed) {
+BackgroundActions::AtOnce BackgroundActions::Post(auto&& tasks, const char* what, auto make, auto failed) {
   const Status begun = Guarded(what, [&] {
     tasks.Post([inbox = inbox_, barrier = std::string(what), make = std::move(make), failed] {
       Result<News> news = Guarded(barrier.c_str(), [&]() -> Result<News> { return make(); });
@@ -113,7 +113,7 @@ BackgroundActions::AtOnce BackgroundActions::Post(BackgroundTasks& tasks, const 
   return failed(begun);
 }
 
-BackgroundActions::AtOnce BackgroundActions::PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end) {
+BackgroundActions::AtOnce BackgroundActions::PostResult(auto&& tasks, const char* what, auto find, auto end) {
   return Post(
       tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
 }
@@ -212,17 +212,22 @@ BackgroundActions::AtOnce BackgroundActions::Perform(CountDataset& action) {
   const auto find = [count = count_occupied_, samples = voxels_.Find(action.volume.dataset()), action] {
     return Count(count, samples, action);
   };
-  return PostResult(counts_, "counting of occupied voxels", find, EndOf<OccupiedCounted>(action.count));
+  return PostResult(counts_.Of(action.volume.dataset()), "counting of occupied voxels", find, EndOf<OccupiedCounted>(action.count));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
   const PlanId plan = action.plan;
   if (auto planned = planner_->PlanAtHand(action)) return Planned{plan, *std::move(planned)};
   const Status begun = Guarded("planning", [&] {
-    const auto& dropped = plans_[plan] = std::make_shared<std::atomic<bool>>(false);
-    planning_.Post([inbox = inbox_, planner = planner_, make = make_plan_, dropped, request = std::move(action)] {
-      if (*dropped) return;
-      inbox->Post({Planned{request.plan, Guarded("planning", [&] { return make(*planner, request); })}});
+    action.stop = plans_[plan].get_token();
+    planning_.Post(action.client, [inbox = inbox_, planner = planner_, make = make_plan_, choices = choices_,
+                                   left = choosers_[action.client].get_token(), request = std::move(action)] {
+      if (!request.stop.stop_requested()) {
+        auto made = Guarded("planning", [&] { return make(*planner, request); });
+        if (!request.stop.stop_requested()) inbox->Post({Planned{request.plan, std::move(made)}});
+      }
+      if (!planner->WantsChoice(request.client)) return;
+      choices->Post(request.client, [planner, client = request.client, left] { planner->Choose(client, left); });
     });
   });
   if (begun.ok()) return std::nullopt;
@@ -231,19 +236,22 @@ BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(DropPlan& action) {
-  if (const auto plan = plans_.find(action.plan); plan != plans_.end()) {
-    *plan->second = true;
-    plans_.erase(plan);
-  }
+  if (auto plan = plans_.extract(action.plan)) plan.mapped().request_stop();
+  return std::nullopt;
+}
+
+BackgroundActions::AtOnce BackgroundActions::Perform(ClientLeft& action) {
+  if (auto chooser = choosers_.extract(action.client)) chooser.mapped().request_stop();
   return std::nullopt;
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(FrameMeasured& action) {
+  const PeerToken client = action.frame->asked.client;
   const auto learn = [planner = planner_, measured = std::move(action)] {
     const Status learnt = Guarded("learning from a frame", [&] { planner->Learn(measured); });
     if (!learnt.ok()) LogWarning(learnt.message());
   };
-  const Status begun = Guarded("learning from a frame", [&] { planning_.Post(learn); });
+  const Status begun = Guarded("learning from a frame", [&] { planning_.Post(client, learn); });
   if (!begun.ok()) LogWarning(begun.message());
   return std::nullopt;
 }

@@ -1,19 +1,22 @@
 // BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets or
-// take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, one counts occupied voxels, one plans. None
-// waits for another. An exception in one fails only what it was doing. What they find comes back as events for the machines.
+// take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, up to kCountsAtOnce count occupied voxels,
+// each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open policies. None waits for
+// another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as
+// events for the machines. Plans that are dropped stop soon, as do the choices for clients that have left.
 //
 // One thread uses an object of this class: the one that runs the machines.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "common/base/background_tasks.h"
+#include "common/base/fair_tasks.h"
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/dataset_machine.h"
@@ -27,12 +30,15 @@ namespace slabstream {
 
 using CoordinatorEvent = Merged<FrameEvent, DatasetEvent>;
 
-// Called by the planning and the counting thread. Tests replace them by functions that fail or wait.
+// Called by the planning and the counting threads. Tests replace them by functions that fail or wait.
 using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const ClassificationTable&)>;
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
 inline constexpr std::size_t kChecksAtOnce = 4;  // so one file system that does not answer leaves the others alone
+inline constexpr std::size_t kCountsAtOnce = 4;
+inline constexpr std::size_t kPlansAtOnce = 8;
+inline constexpr std::size_t kChoicesAtOnce = 2;
 
 class BackgroundActions {
  public:
@@ -54,6 +60,7 @@ class BackgroundActions {
   AtOnce Perform(CountDataset& action);
   AtOnce Perform(PlanRequest& action);
   AtOnce Perform(DropPlan& action);
+  AtOnce Perform(ClientLeft& action);
   AtOnce Perform(FrameMeasured& action);
 
   // What has ended since the last call. Voxels of loaded datasets are served from then on: before the machine can send anybody for them.
@@ -71,19 +78,22 @@ class BackgroundActions {
   };
   static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
-  AtOnce Post(BackgroundTasks& tasks, const char* what, auto make, auto failed);
+  AtOnce Post(auto&& tasks, const char* what, auto make, auto failed);
   // Where the event holds a result: that of `find`, or the error.
-  AtOnce PostResult(BackgroundTasks& tasks, const char* what, auto find, auto end);
+  AtOnce PostResult(auto&& tasks, const char* what, auto find, auto end);
 
   const std::shared_ptr<Mailbox<News>> inbox_ = std::make_shared<Mailbox<News>>();  // tasks that outlive this share it
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
-  const std::shared_ptr<Planner> planner_;  // the planning thread's, but for plans at hand
+  const std::shared_ptr<Planner> planner_;
   VoxelServer& voxels_;
   const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
-  std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;   // begun and neither finished nor dropped; null: memory is being taken
-  std::map<PlanId, std::shared_ptr<std::atomic<bool>>> plans_;  // under way: whether they are dropped
-  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_, counts_{1}, planning_{1};
+  std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
+  std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
+  std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen
+  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_;
+  const std::shared_ptr<FairTasks> choices_ = std::make_shared<FairTasks>(kChoicesAtOnce);  // plans share it
+  FairTasks counts_{kCountsAtOnce}, planning_{kPlansAtOnce};
 };
 
 }  // namespace slabstream

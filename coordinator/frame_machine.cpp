@@ -61,43 +61,53 @@ Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, con
   return FramesThatFit(plan, summary, workers);
 }
 
-// Counts for the next requests in turn. Those behind them wait, so that no grid is dropped before it is used.
+// Counts for the first request of each client, then for the next ones in turn. Those behind them wait, so that no grid is dropped before it
+// is used.
 void FrameMachine::State::CountAhead() {
-  std::size_t ahead = 0;
-  queue.VisitInTurn([&](const OpenRequest& request) {
+  std::vector<ClassifiedVolume> ahead;
+  const auto count = [&](const OpenRequest& request) {
     const auto* const dataset = request.dataset();
-    if (dataset == nullptr || !request.needs_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
+    if (dataset == nullptr || !request.uses_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
     const ClassifiedVolume volume = dataset->volume().Whole();
+    if (std::ranges::find(ahead, volume) != ahead.end()) return true;
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
       actions.emplace_back(CountDataset{.count = occupancy.Begin(volume), .volume = volume, .summary = dataset->resolved->summary});
     }
-    return ++ahead < kCountAhead;
-  });
+    ahead.push_back(volume);
+    return ahead.size() < kCountAhead;
+  };
+  queue.VisitFirsts(count);
+  if (ahead.size() < kCountAhead) queue.VisitInTurn(count);
 }
 
-// Plans as many of the next requests in turn as can start soon.
+// Plans as many of the next requests in turn as can start soon, and the first one of each client without a frame: however long the plans of
+// others take, its frame can start.
 void FrameMachine::State::PlanAhead() {
-  std::size_t ahead = 0;
-  const std::size_t most = frames.Room(roster.staying()) + kPlansAhead;
   const auto is_present =
       Overloaded{[](std::monostate) { return false; }, [this](const auto& plan) { return plan.version == roster.version(); }};
-  queue.VisitInTurn([&](OpenRequest& request) {
+  const auto plan = [&](OpenRequest& request) {  // false: its dataset or a count lacks
     auto* const dataset = request.dataset();
-    if (dataset == nullptr) return true;
-    if (!std::visit(is_present, dataset->plan)) {
-      const auto occupied = request.needs_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
-      if (request.needs_occupancy && occupied == nullptr) return true;  // it waits for the count
-      dataset->plan = PlanAsked{++last_plan, roster.version()};
-      planning.insert(last_plan);
-      actions.emplace_back(MakePlanRequest(request, occupied));
-    }
-    return ++ahead < most;
-  });
+    if (dataset == nullptr) return false;
+    if (std::visit(is_present, dataset->plan)) return true;
+    const auto occupied = request.uses_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
+    if (request.needs_occupancy && occupied == nullptr) return false;
+    dataset->plan = PlanAsked{++last_plan, roster.version()};
+    planning.insert(last_plan);
+    actions.emplace_back(MakePlanRequest(request, occupied));
+    return true;
+  };
+  std::size_t ahead = 0;
+  const std::size_t most = frames.Room(roster.staying()) + kPlansAhead;
+  queue.VisitInTurn([&](OpenRequest& request) { return !plan(request) || ++ahead < most; });
+  int clients_ahead = 0;
+  queue.VisitFirsts(
+      [&](OpenRequest& request) { return frames.RunsFor(request.client) || !plan(request) || ++clients_ahead < kMostInWindow; });
 }
 
 PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
   Team team = TeamOf(roster.slots(), std::uint32_t(request.submit.frame.policy.teams), last_plan);
   PlanRequest ask{.plan = last_plan,
+                  .client = request.client,
                   .resolved = request.dataset()->resolved,
                   .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
@@ -126,7 +136,8 @@ void FrameMachine::State::DropPlans() {
 
 void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
   for (RunningFrame& older : frames) {
-    if (older.id() < frame.id()) older.OnOvertaken(frame.HaveRendered(frame.groups_done() - 1));
+    if (older.id() < frame.id() && older.request().client == frame.request().client)
+      older.OnOvertaken(frame.HaveRendered(frame.groups_done() - 1));
   }
   SendClient(frame.request().client, frame.Progress());
 }
@@ -139,10 +150,7 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
        request.client, request.submit.frame.dataset, request.dataset()->resolved->frame.renderer, request.submit.frame.size.width,
        request.submit.frame.size.height, std::chrono::duration<double, std::milli>(now - request.arrived).count(), workers.size(),
        frame.attempt(), result);
-  // Frames overlap, so one costs the time since the frame before it ended. Waiting for workers costs nothing.
-  const Duration cost = frame.between_attempts() ? Duration::zero() : now - std::max(frame.attempt_begin(), last_end);
-  queue.Settle(frame.request(), cost);
-  last_end = now;
+  queue.Settle(frame.request(), frame.WorkerTime());
   actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   frames.Remove(id);
   for (const WorkerId worker : workers) SendWorker(worker, MakePing(worker));  // so that they drop it now
@@ -197,7 +205,8 @@ std::string_view FrameMachine::State::WhatLacks(const OpenRequest& request) cons
   if (!dataset->seen) return "its dataset's files were still being looked at";
   if (clients.IsBehind(request.client)) return "this client did not read its earlier pictures";
   if (roster.empty()) return "there was no worker";
-  if (occupancy.Counting(dataset->volume().Whole())) return "the occupied voxels of its dataset were still being counted";
+  if (request.needs_occupancy && occupancy.Counting(dataset->volume().Whole()))
+    return "the occupied voxels of its dataset were still being counted";
   const bool under_way = request.plan<PlanAsked>() != nullptr || (request.plan<PlanMade>() != nullptr && ReadyPlan(request) == nullptr);
   return under_way ? "it was still being planned" : "it was still queued";
 }
@@ -211,10 +220,9 @@ void FrameMachine::State::Advance() {
   }
   if (staying > 0) BeginAttempts();
   while (true) {
-    const FramesInFlight::Choice next = frames.Next(staying);
-    if (next.step == FramesInFlight::Step::kHandOut) {
-      HandOut(*next.frame);
-    } else if (next.step == FramesInFlight::Step::kWait || !StartNextFrame()) {
+    if (RunningFrame* const next = frames.NextToHandOut(staying)) {
+      HandOut(*next);
+    } else if (!StartNextFrame(staying)) {
       break;
     }
   }
@@ -267,11 +275,12 @@ void FrameMachine::State::DismissWorkers() {
   }
 }
 
-// Starts the first frame in turn that is planned for the present workers. False: there is none, or the workers' memory has no room for it
-// yet. None overtakes it then, so that it gets the room.
-bool FrameMachine::State::StartNextFrame() {
+// Starts the first frame in turn that is planned for the present workers and may start. False: there is none, or the workers' memory has no
+// room for it yet. None overtakes it then, so that it gets the room.
+bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   const auto ready = [&](const OpenRequest& open) {
-    return ReadyPlan(open) != nullptr && open.dataset()->seen && !clients.IsBehind(open.client);
+    const PlanMade* const plan = ReadyPlan(open);
+    return plan != nullptr && open.dataset()->seen && !clients.IsBehind(open.client) && frames.MayStart(open.client, *plan, workers);
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;

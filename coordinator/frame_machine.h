@@ -8,7 +8,7 @@
 //   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
 //              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
-//              for the count; a failed count fails them.
+//              for the count, and a failed count fails them, unless their policy is open: their frames begin without it.
 //   plans      The next requests in turn are planned ahead (PlanRequest), as many as the window has room for and kPlansAhead more, so
 //              that a frame can start the moment there is room. A request stays in the queue until its frame starts. A plan that was
 //              made for other workers than there are now is made again. A failed plan fails its request alone.
@@ -124,13 +124,16 @@ struct CountDataset {
 struct DropPlan {
   PlanId plan = 0;
 };
+struct ClientLeft {
+  PeerToken client = 0;  // nothing is planned or chosen for it any more
+};
 struct StopService {};  // everything was sent; end
 // End the connection of a client that reads nothing and says nothing: what waits for it must not stay in memory.
 struct DropClient {
   PeerToken client = 0;
 };
-using FrameAction =
-    std::variant<ToWorker, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
+using FrameAction = std::variant<ToWorker, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, ClientLeft, FrameMeasured,
+                                 Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).

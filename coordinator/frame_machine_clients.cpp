@@ -15,7 +15,8 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   OpenRequest request{.client = client, .submit = message, .arrived = now};
   if (Status names = CheckNames(policy); !names.ok()) return FailRequest(request, names, &RefusedRequests::bad_request);
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
-  request.needs_occupancy = NeedsOccupancy(policy);
+  request.uses_occupancy = NeedsOccupancy(policy);
+  request.needs_occupancy = request.uses_occupancy && !LeavesChoice(policy);
   request.use = ++last_use;
   queue.Push(std::move(request));
   actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, message.frame.dataset});
@@ -175,6 +176,7 @@ void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& 
 void FrameMachine::State::FreeClient(PeerToken client) {
   actions.emplace_back(std::in_place_type<ToDatasets>, ForgetClient{client});
   if (!clients.Forget(client)) return;
+  actions.emplace_back(ClientLeft{client});
   for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {

@@ -57,7 +57,6 @@ struct FrameMachine::State {
   Time now;                     // of this Step
   Time wake = Time::max();      // promised at the end of the last Step
   std::optional<Time> started;  // the first Step
-  Time last_end;                // of a frame
   Time next_ping;               // while there are workers
   bool stopped = false;
   std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
@@ -133,7 +132,7 @@ struct FrameMachine::State {
     return made != nullptr && made->version == roster.version() ? made : nullptr;
   }
   std::string_view WhatLacks(const OpenRequest& request) const;  // until its frame can begin
-  bool StartNextFrame();
+  bool StartNextFrame(std::size_t workers);
   void HandOut(RunningFrame& frame);
   void AfterGroupDone(const RunningFrame& frame);
   void EndFrame(FrameId id, std::string_view result);

@@ -43,10 +43,22 @@ FrameWindow FramesInFlight::Window(std::size_t workers) const {
   return WindowFor(workers, teams, frame_bytes, fit);
 }
 
-// Frames of other sizes count as if they took as much as this one, or as the largest that runs: a mixture takes less.
+std::uint32_t FramesInFlight::unfinished_groups() const {
+  std::uint32_t unfinished = 0;
+  for (const RunningFrame& frame : frames_) unfinished += frame.unfinished_groups();
+  return unfinished;
+}
+
+bool FramesInFlight::RunsFor(PeerToken client) const {
+  return std::ranges::any_of(frames_, [client](const RunningFrame& frame) { return frame.request().client == client; });
+}
+
+// If f frames such as one fit, it takes at most the f-th part of the room.
 bool FramesInFlight::HasRoomFor(const PlanMade& plan) const {
-  const auto teams = std::size_t(plan.frame->plan.turn.teams);
-  return frames_.empty() || frames_.size() < std::size_t(plan.fit) * teams;
+  constexpr double kRounding = 1e-9;
+  double taken = 1.0 / plan.fit;
+  for (const RunningFrame& frame : frames_) taken += 1.0 / frame.fit();
+  return frames_.empty() || taken <= plan.frame->plan.turn.teams + kRounding;
 }
 
 std::size_t FramesInFlight::Room(std::size_t workers) const {
@@ -63,18 +75,35 @@ bool FramesInFlight::OthersWait(const RunningFrame& frame) const {
   return std::ranges::any_of(frames_, [&](const RunningFrame& other) { return &other != &frame && other.waiting(); });
 }
 
-FramesInFlight::Choice FramesInFlight::Next(std::size_t workers) {
-  if (RunningFrame* const tried = OnTrial()) return tried->CanHandOut() ? Choice{Step::kHandOut, tried} : Choice{};
+bool FramesInFlight::MayStart(PeerToken client, const PlanMade& plan, std::size_t workers) {
+  if (OnTrial() != nullptr) return false;
   const FrameWindow window = Window(workers);
-  std::uint32_t unfinished = 0;
-  for (const RunningFrame& frame : frames_) unfinished += frame.unfinished_groups();
-  if (unfinished >= std::uint32_t(window.groups)) return {};
-  const auto next = std::ranges::find_if(frames_, [](const RunningFrame& frame) {
+  if (frames_.size() < std::size_t(window.frames) && unfinished_groups() < std::uint32_t(window.groups)) return true;
+  if (RunsFor(client)) return false;
+  // Beyond the window, images take kWindowBytes more than in it.
+  std::int64_t largest = FrameBytes(plan.frame->plan.setup), bytes = largest;
+  for (const RunningFrame& frame : frames_) {
+    const std::int64_t of_frame = FrameBytes(frame.plan().setup);
+    largest = std::max(largest, of_frame);
+    bytes += of_frame;
+  }
+  return bytes <= kWindowBytes + window.frames * largest;
+}
+
+RunningFrame* FramesInFlight::NextToHandOut(std::size_t workers) {
+  if (RunningFrame* const tried = OnTrial()) return tried->CanHandOut() ? tried : nullptr;
+  const FrameWindow window = Window(workers);
+  const bool full = unfinished_groups() >= std::uint32_t(window.groups);
+  const auto waits = [this](PeerToken client) {
+    return std::ranges::none_of(
+        frames_, [client](const RunningFrame& frame) { return frame.request().client == client && frame.unfinished_groups() > 0; });
+  };
+  const auto next = std::ranges::find_if(frames_, [&](const RunningFrame& frame) {
     const bool masked = UsesOcclusion(frame.plan().setup);
-    return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups));
+    return frame.CanHandOut() && (!masked || frame.unfinished_groups() < std::uint32_t(kMaskedGroups)) &&
+           (!full || waits(frame.request().client));
   });
-  if (next != frames_.end()) return {Step::kHandOut, &*next};
-  return {frames_.size() < std::size_t(window.frames) ? Step::kStart : Step::kWait};
+  return next == frames_.end() ? nullptr : &*next;
 }
 
 }  // namespace slabstream

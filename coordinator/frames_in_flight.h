@@ -1,5 +1,6 @@
 // FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. The window (common/planning/frame_window.h)
-// limits the running frames and their groups; Next says what it allows.
+// limits the running frames and their groups. But no client waits because of the frames of others: beyond the window, a client without a
+// frame may have one as far as memory allows, and a client without a group on its way may have one. Workers share their time among clients.
 #pragma once
 
 #include <list>
@@ -19,21 +20,19 @@ class FramesInFlight {
   RunningFrame* Find(FrameId id);                                  // null: not in flight
   RunningFrame* FindRequest(PeerToken client, RequestId request);  // null: not in flight
 
-  enum class Step { kHandOut, kStart, kWait };
-  struct Choice {
-    Step step = Step::kWait;
-    RunningFrame* frame = nullptr;  // kHandOut: the oldest one that may hand out a group
-  };
-  // What `workers` workers should be given next: a group of a frame that runs, another frame, or nothing for now.
-  Choice Next(std::size_t workers);
+  // The oldest frame that may hand out a group to `workers` workers; null: none may.
+  RunningFrame* NextToHandOut(std::size_t workers);
   // The oldest frame that has suspects: until it has none, nothing else is handed out or started. Null: there is none.
   RunningFrame* OnTrial();
   // Whether any frame but this one waits for workers.
   bool OthersWait(const RunningFrame& frame) const;
-  // How many more frames `workers` workers may have under way.
+  // How many more frames `workers` workers may have under way, whoever asks for them.
   std::size_t Room(std::size_t workers) const;
+  // Whether they may be given another frame, of this client and plan.
+  bool MayStart(PeerToken client, const PlanMade& plan, std::size_t workers);
   // Whether the workers' memory has room for a frame of this plan beside those that run.
   bool HasRoomFor(const PlanMade& plan) const;
+  bool RunsFor(PeerToken client) const;
 
   // Frames that workers may forget: all before finished_before(), and cancelled(): of later ones that are over, the newest kMaxCancelled.
   FrameId finished_before() const { return frames_.empty() ? next_id() : frames_.front().id(); }
@@ -47,6 +46,7 @@ class FramesInFlight {
 
  private:
   FrameWindow Window(std::size_t workers) const;
+  std::uint32_t unfinished_groups() const;
 
   std::list<RunningFrame> frames_;  // references stay valid
   std::vector<FrameId> over_;       // not smaller than finished_before(), ascending

@@ -33,8 +33,14 @@ LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
   return &*found;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots) {
-  Key key{volume, policy, slots};
+std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volume) {
+  const std::lock_guard lock(mutex_);
+  const Learnt* const learnt = FindLearnt(volume);
+  return learnt != nullptr && learnt->cost.any() ? std::optional(learnt->cost) : std::nullopt;
+}
+
+LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots, bool counted) {
+  Key key{volume, policy, slots, !counted && NeedsOccupancy(AskFor(policy))};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
@@ -42,48 +48,68 @@ LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const Resolv
 
 std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
-  Key key = KeyOf(*request.volume, policy, request.slots);
-
-  Learnt* learnt = nullptr;
-  if (request.occupied != nullptr) {
-    learnt = FindLearnt(key.volume);
-    if (learnt == nullptr) {
-      OccupancyGrid drawn = *request.occupied;
-      EmptyClippedCells(key.volume.clip(), drawn);
-      learnt = &learnt_.emplace_front(Learnt{key.volume, MeasuredCost(drawn)});
+  const Key key = KeyOf(*request.volume, policy, request.slots, request.occupied != nullptr);
+  std::unique_lock lock(mutex_);
+  if (request.occupied != nullptr && FindLearnt(key.volume) == nullptr) {
+    lock.unlock();
+    OccupancyGrid drawn = *request.occupied;
+    EmptyClippedCells(key.volume.clip(), drawn);
+    MeasuredCost cost(drawn);
+    lock.lock();
+    if (FindLearnt(key.volume) == nullptr) {
+      learnt_.push_front({key.volume, std::move(cost)});
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
+  const Learnt* const learnt = request.occupied == nullptr ? nullptr : FindLearnt(key.volume);
   const bool known = learnt != nullptr && learnt->cost.any();
-  LayoutRequest make{.summary = request.summary,
-                     .volume = request.volume,
-                     .policy = &policy,
-                     .slots = request.slots,
-                     .known = {.occupied = request.occupied.get()}};
-  std::optional<WorkField> cost;
-  const auto with_cost = [&]() -> const LayoutRequest& {
-    if (known && !cost) make.known.cost = &cost.emplace(learnt->cost.Field());
-    return make;
-  };
 
+  if (key.by_bricks) {  // a layout by counted voxels is better, and its voxels are where it wants them
+    Key counted = key;
+    counted.by_bricks = false;
+    if (const auto better = std::ranges::find(entries_, counted, &Entry::key); better != entries_.end()) return better->layout;
+  }
+  std::shared_ptr<const Layout> present;  // null: none is made
+  std::vector<double> seconds;            // of its boxes
+  int frames_seen = 0;
+  if (const auto found = std::ranges::find(entries_, key, &Entry::key); found != entries_.end()) {
+    entries_.splice(entries_.begin(), entries_, found);
+    const bool rebalance = known && policy.dynamic_balance && found->frames_seen >= std::clamp(found->changes, 1, kMostPatience);
+    const bool remake = known && !policy.dynamic_balance && !found->by_cost && policy.balance_by == BalanceBy::kCost;
+    if (!rebalance && !remake) return found->layout;
+    present = found->layout;
+    seconds = found->seconds;
+    frames_seen = found->frames_seen;
+  }
+  lock.unlock();
+
+  std::optional<WorkField> cost;
+  if (known) {
+    if (const std::optional<MeasuredCost> copy = CopyLearnt(key.volume)) cost.emplace(copy->Field());
+  }
+  if (present != nullptr && !cost) return present;  // what was known was dropped meanwhile
+  const LayoutRequest make{.summary = request.summary,
+                           .volume = request.volume,
+                           .policy = &policy,
+                           .slots = request.slots,
+                           .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
+                           .stop = request.stop};
+  const bool rebalance = present != nullptr && policy.dynamic_balance;
+  std::optional<Layout> made = rebalance ? Rebalance(*present, seconds, make, frames_seen) : MakeLayout(make);
+  if (request.stop.stop_requested()) return nullptr;
+
+  lock.lock();
   const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end()) {
-    entries_.push_front({std::move(key), std::make_shared<const Layout>(MakeLayout(with_cost())), known, 0, 0, {}});
+    entries_.push_front({key, made ? std::make_shared<const Layout>(*std::move(made)) : present, cost.has_value(), 0, 0, {}});
     KeepFirst(entries_, kMaxKept);
     return entries_.front().layout;
   }
-  entries_.splice(entries_.begin(), entries_, found);
   Entry& entry = *found;
-  std::optional<Layout> better;
-  if (known && policy.dynamic_balance) {
-    if (entry.frames_seen >= std::clamp(entry.changes, 1, kMostPatience))
-      better = Rebalance(*entry.layout, entry.seconds, with_cost(), entry.frames_seen);
-  } else if (known && !entry.by_cost && policy.balance_by == BalanceBy::kCost) {
-    better = MakeLayout(with_cost());
-    entry.by_cost = true;
-  }
-  if (better && *better != *entry.layout) {
-    entry.layout = std::make_shared<const Layout>(*std::move(better));
+  if (entry.layout != present) return entry.layout;  // another thread was quicker
+  entry.by_cost = entry.by_cost || cost.has_value();
+  if (made && *made != *present) {
+    entry.layout = std::make_shared<const Layout>(*std::move(made));
     ++entry.changes;
     entry.frames_seen = 0;
     entry.seconds.clear();
@@ -93,30 +119,34 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
 
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
-  const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots), &Entry::key);
-  if (found == entries_.end() || policy.dynamic_balance) return nullptr;
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock || policy.dynamic_balance) return nullptr;
+  const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots, true), &Entry::key);
+  if (found == entries_.end()) return nullptr;
   if (policy.balance_by == BalanceBy::kCost && !found->by_cost) return nullptr;
   entries_.splice(entries_.begin(), entries_, found);
   return entries_.front().layout;
 }
 
 bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
+  const std::lock_guard lock(mutex_);
   const Learnt* const learnt = FindLearnt(volume);
   return learnt != nullptr && learnt->cost.any();
 }
 
 std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) {
-  if (!KnowsCost(volume)) return std::nullopt;
-  return learnt_.front().cost.Field();
+  const std::optional<MeasuredCost> learnt = CopyLearnt(volume);
+  return learnt ? std::optional(learnt->Field()) : std::nullopt;
 }
 
 void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy,
                         std::span<const RankReport> reports) {
-  Learnt* const learnt = FindLearnt(volume);
-  if (learnt == nullptr) return;
   const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
   if (seconds.empty()) return;
-  const Key key = KeyOf(volume, policy, plan.slots);
+  const Key key = KeyOf(volume, policy, plan.slots, true);
+  const std::lock_guard lock(mutex_);
+  Learnt* const learnt = FindLearnt(volume);
+  if (learnt == nullptr) return;
   const auto is_of = [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); };
   const auto entry = std::ranges::find_if(entries_, is_of);
   // The first frame of a layout counts most; a frame of a layout that has been changed since counts as an average one.

@@ -6,12 +6,16 @@
 // all of them.
 //
 // The last few layouts and costs are kept. The least recently used go first.
+//
+// Any thread may call it. Layouts are made while nobody waits: of two that are made at a time for the same, the first one stays.
 #pragma once
 
 #include <list>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "common/planning/classified_volume.h"
@@ -36,12 +40,13 @@ class LayoutTable {
     const ResolvedPolicy* policy = nullptr;
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
-    std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
+    std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it, or begins without it
     std::uint32_t slots = 1;
+    std::stop_token stop = {};  // told to stop, Find returns soon
   };
-  // The layout to plan the frame with.
+  // The layout to plan the frame with; null: it was stopped.
   std::shared_ptr<const Layout> Find(const Request& request);
-  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume and slots alone.
+  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume and slots alone. Does not wait for other threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
   // Measured costs: seconds.
@@ -56,10 +61,11 @@ class LayoutTable {
     ClassifiedVolume volume;
     ResolvedPolicy policy;
     std::uint32_t slots = 1;
+    bool by_bricks = false;  // the policy needs occupied voxels, but they were not counted yet
     friend bool operator==(const Key&, const Key&) = default;
   };
   // Combining moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots);
+  static Key KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots, bool counted);
   struct Entry {
     Key key;
     std::shared_ptr<const Layout> layout;
@@ -73,7 +79,9 @@ class LayoutTable {
     MeasuredCost cost;
   };
   Learnt* FindLearnt(const ClassifiedVolume& volume);
+  std::optional<MeasuredCost> CopyLearnt(const ClassifiedVolume& volume);  // nothing: no cost is known
 
+  std::mutex mutex_;          // guards what follows
   std::list<Entry> entries_;  // most recently used first
   std::list<Learnt> learnt_;  // likewise
 };

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "common/planning/frame_plan.h"
@@ -11,6 +12,7 @@
 #include "common/stats/prediction.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
+#include "coordinator/peer_token.h"
 
 namespace slabstream {
 
@@ -18,18 +20,22 @@ using PlanId = std::uint64_t;  // never given twice; 0: none
 
 struct PlanRequest {
   PlanId plan = 0;
+  PeerToken client = 0;
   std::shared_ptr<const ResolvedRequest> resolved;  // never null; every plan of a request has the same one
-  std::shared_ptr<const OccupancyGrid> occupied;    // of its volume; null: the policy does not need it (NeedsOccupancy)
-  Roster roster;                                    // of the frame's team, with a worker in it
+  // Of its volume; null: the policy does not need it (NeedsOccupancy), or begins without it.
+  std::shared_ptr<const OccupancyGrid> occupied;
+  Roster roster;  // of the frame's team, with a worker in it
   Turn turn;
   std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
+  std::stop_token stop = {};               // told to stop: nobody wants the plan any more
 };
 
 struct PlannedFrame {
   PlanRequest asked;
-  ResolvedPolicy policy = {};                      // policy that the plan was made by
-  std::optional<FramePrediction> prediction = {};  // none: the policy was not open, or the frame is too much to simulate
-  double render_scale = 1;                         // used for the prediction (PolicyTable)
+  ResolvedPolicy policy = {};  // policy that the plan was made by
+  std::optional<FramePrediction> prediction =
+      {};                   // none: the policy was not open or is not chosen yet, or the frame is too much to simulate
+  double render_scale = 1;  // used for the prediction (PolicyTable)
   FramePlan plan = {};
 
   bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames

@@ -9,7 +9,6 @@
 namespace slabstream {
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& request) {
-  const std::lock_guard lock(mutex_);
   return Guarded("planning", [&] { return TryPlan(request); });
 }
 
@@ -17,8 +16,7 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   constexpr std::size_t kMostBoxes = 4096;  // a plan places each of them
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
-  const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock || LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
+  if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
   std::shared_ptr<const Layout> layout =
       layouts_.FindMade({.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots)});
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
@@ -36,8 +34,9 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   PlannedFrame planned{.asked = request};
   const MachineModel machine = ServiceMachine(request.workers, surroundings_);
   if (LeavesChoice(resolved.frame.policy, machine, request.roster.slots.size())) {
-    ChosenPolicy chosen = policies_.Find(request, *setup, machine, layouts_);
+    ChosenPolicy chosen = policies_.Find(request, machine, layouts_);
     planned.policy = std::move(chosen.policy);
+    if (!chosen.chosen) planned.asked.occupied = nullptr;
     planned.prediction = chosen.prediction;
     planned.render_scale = chosen.render_scale;
   } else {
@@ -46,8 +45,10 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned.policy,
                                                         .volume = &resolved.volume,
                                                         .summary = resolved.summary.get(),
-                                                        .occupied = request.occupied,
-                                                        .slots = std::uint32_t(request.roster.slots.size())});
+                                                        .occupied = planned.asked.occupied,
+                                                        .slots = std::uint32_t(request.roster.slots.size()),
+                                                        .stop = request.stop});
+  if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
   return WithLayout(std::move(planned), *std::move(setup), std::move(layout));
 }
 
@@ -60,7 +61,6 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(PlannedFrame pla
 }
 
 void Planner::Learn(const FrameMeasured& measured) {
-  const std::lock_guard lock(mutex_);
   const PlannedFrame& frame = *measured.frame;
   layouts_.Learn(frame.asked.resolved->volume, frame.plan, frame.policy, measured.reports);
   policies_.Learn(frame, measured.reports);

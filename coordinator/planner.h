@@ -1,12 +1,13 @@
 // Planner: makes plans, and keeps what they are made from: chosen policies, layouts and measured costs.
 //
-// Any thread may call it; calls wait for each other. The service gives it a thread of its own, since a plan may take seconds: an open
-// policy is chosen by simulated frames, and a layout may be refined several times. The same calls in the same order give the same plans.
+// Any thread may call it, and no plan waits for another one. A plan may take seconds, since a layout may be refined several times. An open
+// policy is chosen by simulated frames, which takes longer: Choose does that, and frames follow a cheap policy until then. The same calls,
+// one after the other, give the same plans.
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
+#include <stop_token>
 
 #include "coordinator/layout_table.h"
 #include "coordinator/plan_request.h"
@@ -20,12 +21,16 @@ class Planner {
   // `surroundings`: what open policies are chosen for.
   explicit Planner(const ServiceSurroundings& surroundings = {}) : surroundings_(surroundings) {}
 
-  // Errors as of MakeFrameSetup and PlanFrame; ResourceExhausted or Internal for exceptions.
+  // Errors as of MakeFrameSetup and PlanFrame; Cancelled: it was stopped; ResourceExhausted or Internal for exceptions.
   Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
 
-  // The same if that takes less time than to wake another thread: the policy is not open, its layout is made and stays, and nobody plans
-  // at the moment. Nothing: ask Plan.
+  // The same if that takes less time than to wake another thread: the policy is not open, and its layout is made and stays. Nothing: ask
+  // Plan.
   std::optional<Result<std::shared_ptr<const PlannedFrame>>> PlanAtHand(const PlanRequest& request);
+
+  // Whether open policies of this client's frames are to be chosen; makes one such choice, unless it is told to stop.
+  bool WantsChoice(PeerToken client) { return policies_.WantsChoice(client); }
+  void Choose(PeerToken client, const std::stop_token& stop) { policies_.Choose(client, layouts_, stop); }
 
   // Learns from a finished frame.
   void Learn(const FrameMeasured& measured);
@@ -36,7 +41,6 @@ class Planner {
                                                                 std::shared_ptr<const Layout> layout);
 
   const ServiceSurroundings surroundings_;
-  std::mutex mutex_;  // guards what follows
   LayoutTable layouts_;
   PolicyTable policies_;
 };

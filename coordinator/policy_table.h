@@ -1,16 +1,19 @@
 // PolicyTable: the choices made for open policies ("auto"), and what was predicted of their frames.
 //
-// A choice is made once for a volume, transfer function, renderer, policy and set of workers, with the first frame that asks for it
-// (ChoosePolicy). Its partition then stays for all views, so turning the view moves no voxels. Combining moves none, so the scheme
-// is chosen anew for each kind of view. When costs are first measured, the choice is made once more: another partition must then be
-// predicted to gain kRevisitGain. Measured render times correct later predictions.
+// Choosing takes long (ChoosePolicy), and no frame waits for it. The first frames of a volume, transfer function, renderer, policy and set
+// of workers follow FirstPolicy, until a choice is made beside them. Its partition then stays for all views, so turning the view moves no
+// voxels. Combining moves none, so the scheme is chosen anew for each kind of view. When costs are first measured, the choice is made once
+// more: another partition must then be predicted to gain kRevisitGain. Measured render times correct later predictions.
 //
-// The last few choices are kept. The least recently used go first.
+// Find notes what is to be chosen, and Choose chooses. The last few choices are kept. The least recently used go first. Any thread may call
+// it; nobody waits while a choice is made.
 #pragma once
 
 #include <list>
+#include <mutex>
 #include <optional>
 #include <span>
+#include <stop_token>
 
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
@@ -22,7 +25,8 @@ namespace slabstream {
 
 struct ChosenPolicy {
   ResolvedPolicy policy;
-  std::optional<FramePrediction> prediction;  // none: too much to simulate
+  bool chosen = true;                         // false: FirstPolicy, whose layout needs no count of voxels
+  std::optional<FramePrediction> prediction;  // none: not chosen yet for such views, or too much to simulate
   double render_scale = 1;                    // correction of the prediction (PolicyQuestion)
 };
 
@@ -35,7 +39,12 @@ class PolicyTable {
   static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
 
   // The policy for the frame of `request`, which leaves a choice. `machine`: of its workers. `layouts`: the source of measured costs.
-  ChosenPolicy Find(const PlanRequest& request, const FrameSetup& setup, const MachineModel& machine, LayoutTable& layouts);
+  ChosenPolicy Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
+
+  // Whether Find has noted something to choose for a frame of this client.
+  bool WantsChoice(PeerToken client);
+  // Makes one such choice, unless it is told to stop; it is then noted again when a frame needs it. Does nothing if there is none.
+  void Choose(PeerToken client, LayoutTable& layouts, const std::stop_token& stop);
 
   // Learns from a finished frame, if it had a prediction.
   void Learn(const PlannedFrame& frame, std::span<const RankReport> reports);
@@ -64,17 +73,31 @@ class PolicyTable {
   struct Entry {
     Key key;
     MachineModel machine;
+    ResolvedPolicy holds;     // the policy of its frames, but for `combine`
+    bool chosen = false;      // else it is FirstPolicy
+    bool noted = false;       // a choice for it is noted, or being made
     bool by_cost = false;     // chosen when costs were known
     double render_scale = 1;  // measured render time / predicted without it
     int frames_seen = 0;
     std::list<Choice> choices;  // by kind; most recently used first; they differ only in `combine`
   };
+  // What is to be chosen.
+  struct Noted {
+    PlanRequest request;
+    Key key;
+    MachineModel machine;
+    Policy open;
+    bool all = false;                   // not for this kind of view alone
+    std::optional<ResolvedPolicy> now;  // as in PolicyQuestion
+  };
   static Kind KindOf(const PlanRequest& request);
   static Key KeyOf(const PlanRequest& request);
-  static ChosenPolicy Choose(const PlanRequest& request, const FrameSetup& setup, LayoutTable& layouts, Entry& entry, const Policy& open,
-                             const ResolvedPolicy* now);
+  static std::optional<Noted> WhatLacks(const PlanRequest& request, const Entry& entry, const Choice* choice, bool knows_cost);
+  std::list<Entry>::iterator EntryOf(const Noted& noted);  // end: the choice is of no use any more
 
+  std::mutex mutex_;          // guards what follows
   std::list<Entry> entries_;  // most recently used first
+  std::list<Noted> noted_;    // oldest first
 };
 
 }  // namespace slabstream

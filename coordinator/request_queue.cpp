@@ -7,15 +7,15 @@ namespace slabstream {
 
 void RequestQueue::Push(OpenRequest request) {
   ClientQueue& queue = clients_[request.client];
-  if (queue.requests.empty()) queue.turn = AtLeastLast({queue.turn.used, ++turns_});
+  if (queue.requests.empty()) turns_.Join(request.client);
   queue.requests.push_back(std::move(request));
 }
 
 const OpenRequest* RequestQueue::FindNext(const Predicate& ready) const {
   const OpenRequest* next = nullptr;
-  Turn first;
+  FairTurns<PeerToken>::Turn first;
   for (const auto& [client, queue] : clients_) {
-    const Turn turn = AtLeastLast(queue.turn);
+    const auto turn = turns_.TurnOf(client);
     if (next != nullptr && first < turn) continue;
     const auto found = std::ranges::find_if(queue.requests, ready);
     if (found == queue.requests.end()) continue;
@@ -30,16 +30,16 @@ OpenRequest RequestQueue::Take(const OpenRequest& next) {
   const auto found = std::ranges::find_if(queue.requests, [&](const OpenRequest& request) { return &request == &next; });
   OpenRequest request = std::move(*found);
   queue.requests.erase(found);
-  used_by_last_ = AtLeastLast(queue.turn).used;
   request.charged = queue.expected;
-  queue.turn = {used_by_last_ + request.charged, ++turns_};
+  turns_.Take(request.client);
+  turns_.Charge(request.client, request.charged);
   return request;
 }
 
 void RequestQueue::Settle(const OpenRequest& taken, Duration cost) {
   const auto client = clients_.find(taken.client);
   if (client == clients_.end()) return;
-  client->second.turn.used += cost - taken.charged;
+  turns_.Charge(taken.client, cost - taken.charged);
   client->second.expected = cost;
 }
 
@@ -56,6 +56,7 @@ std::vector<OpenRequest> RequestQueue::Extract(const Predicate& wanted) {
 }
 
 std::deque<OpenRequest> RequestQueue::Forget(PeerToken client) {
+  turns_.Forget(client);
   auto forgotten = clients_.extract(client);
   return forgotten.empty() ? std::deque<OpenRequest>() : std::move(forgotten.mapped().requests);
 }
@@ -68,26 +69,41 @@ void RequestQueue::ForEach(const std::function<void(OpenRequest&)>& visit) {
 
 void RequestQueue::VisitInTurn(const std::function<bool(OpenRequest&)>& visit) {
   struct Waiting {
-    Turn turn;
+    FairTurns<PeerToken>::Turn turn;
+    PeerToken client = 0;
     ClientQueue* queue = nullptr;
     std::size_t visited = 0;
   };
   const auto later = [](const Waiting& a, const Waiting& b) { return a.turn > b.turn; };
+  FairTurns<PeerToken> turns = turns_;
   std::vector<Waiting> heap;  // the first is next
   for (auto& [client, queue] : clients_) {
-    if (!queue.requests.empty()) heap.push_back({AtLeastLast(queue.turn), &queue});
+    if (!queue.requests.empty()) heap.push_back({turns.TurnOf(client), client, &queue});
   }
   std::ranges::make_heap(heap, later);
-  for (std::uint64_t turns = turns_; !heap.empty();) {
+  while (!heap.empty()) {
     std::ranges::pop_heap(heap, later);
     Waiting& next = heap.back();
     if (!visit(next.queue->requests[next.visited])) return;
     if (++next.visited == next.queue->requests.size()) {
       heap.pop_back();
     } else {
-      next.turn = {next.turn.used + next.queue->expected, ++turns};
+      turns.Take(next.client);
+      turns.Charge(next.client, next.queue->expected);
+      next.turn = turns.TurnOf(next.client);
       std::ranges::push_heap(heap, later);
     }
+  }
+}
+
+void RequestQueue::VisitFirsts(const std::function<bool(OpenRequest&)>& visit) {
+  std::vector<std::pair<FairTurns<PeerToken>::Turn, ClientQueue*>> queues;
+  for (auto& [client, queue] : clients_) {
+    if (!queue.requests.empty()) queues.emplace_back(turns_.TurnOf(client), &queue);
+  }
+  std::ranges::sort(queues, {}, [](const auto& each) { return each.first; });
+  for (const auto& [turn, queue] : queues) {
+    if (!visit(queue->requests.front())) return;
   }
 }
 

@@ -1,12 +1,10 @@
-// RequestQueue: requested frames that do not run yet, a queue for each client. Clients share the service's time equally: the next frame is
-// of the client that has used least of it. So neither a turntable of a thousand frames nor one huge picture after another delays other
-// clients for long. (Start-time fair queueing: P. Goyal, H. M. Vin, H. Cheng, 1996.)
+// RequestQueue: requested frames that do not run yet, a queue for each client. Clients share the service's time equally (FairTurns): the
+// next frame is of the client that has used least of it. So neither a turntable of a thousand frames nor one huge picture after another
+// delays other clients for long.
 //
 // What a frame costs is known only when it ends (Settle). Until then it counts as much as the client's frame before it.
 #pragma once
 
-#include <algorithm>
-#include <compare>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -15,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/fair_turns.h"
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/machines.h"
@@ -39,7 +38,8 @@ struct OpenRequest {
   SubmitFrame submit;
   Time arrived;
   UseId use = 0;                 // of its dataset
-  bool needs_occupancy = false;  // of its policy (NeedsOccupancy)
+  bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
+  bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
 
   struct Submitted {};  // it has sought its dataset
   struct AwaitsDataset {};
@@ -71,7 +71,7 @@ class RequestQueue {
   // The first request that is `ready` of the first client in turn that has one; null: none is.
   const OpenRequest* FindNext(const Predicate& ready) const;
   OpenRequest Take(const OpenRequest& next);  // takes out what FindNext has found
-  // The frame of a request that was taken has ended. `cost`: the time that the service spent on it.
+  // The frame of a request that was taken has ended. `cost`: the time that workers spent on it.
   void Settle(const OpenRequest& taken, Duration cost);
   std::vector<OpenRequest> Extract(const Predicate& wanted);  // takes all of them out, wherever they stand
   std::deque<OpenRequest> Forget(PeerToken client);           // takes its requests out, and what it has used
@@ -79,6 +79,8 @@ class RequestQueue {
   void ForEach(const std::function<void(OpenRequest&)>& visit);  // client by client, then in order of arrival
   // In the order in which they are served if all are ready and cost what is expected of them, until `visit` returns false.
   void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
+  // The first request of each client, in turn, until `visit` returns false.
+  void VisitFirsts(const std::function<bool(OpenRequest&)>& visit);
   bool Contains(PeerToken client, RequestId request) const;
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;
@@ -86,23 +88,13 @@ class RequestQueue {
   std::uint32_t PositionOf(PeerToken client, RequestId request);
 
  private:
-  // When it is a client's turn: the smallest one is next.
-  struct Turn {
-    Duration used{};              // of the service's time
-    std::uint64_t last_turn = 0;  // counts Push to an empty queue and Take
-    friend auto operator<=>(const Turn&, const Turn&) = default;
-  };
   struct ClientQueue {
     std::deque<OpenRequest> requests;
-    Turn turn;
     Duration expected{};  // cost of its next frame
   };
-  // A client that had nothing to ask for has not saved up its time: it continues with what the client served last had used.
-  Turn AtLeastLast(Turn turn) const { return {std::max(turn.used, used_by_last_), turn.last_turn}; }
 
   std::map<PeerToken, ClientQueue> clients_;
-  Duration used_by_last_{};  // when its turn came
-  std::uint64_t turns_ = 0;
+  FairTurns<PeerToken> turns_;
 };
 
 }  // namespace slabstream

@@ -113,7 +113,8 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
                              .display = plan_.display,
                              .setup = plan_.setup,
                              .group = plan_.groups[number],
-                             .groups_done = std::min(groups_done_, number)},
+                             .groups_done = std::min(groups_done_, number),
+                             .client = request_.client},
               .workers = Renderers(number)};
   AddOnce(out.workers, plan_.display);
   for (const WorkerId worker : out.workers) out.assignment.peers.push_back({.worker = worker});
@@ -319,6 +320,20 @@ FrameProgress RunningFrame::Progress() const {
           .group_count = group_count(),
           .attempt = attempt(),
           .workers = std::uint32_t(Participants().size())};
+}
+
+Duration RunningFrame::WorkerTime() const {
+  Duration time{};
+  const auto add = [&time](const std::vector<RankReport>& reports) {
+    for (const RankReport& report : reports) {
+      for (const Stage stage : {Stage::kRender, Stage::kCombine, Stage::kEncode, Stage::kResolve}) {
+        time += Duration(report.stage_ns[std::size_t(stage)]);
+      }
+    }
+  };
+  for (const auto& reports : reports_) add(reports);
+  add(display_reports_);
+  return time;
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {

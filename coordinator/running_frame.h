@@ -100,7 +100,8 @@ class RunningFrame {
   enum class Use { kNothing, kPreview, kFinal };
   Use OnImage(const FrameImage& message, Time now);  // what the picture is used for; a preview reports groups done, too
   void OnHeartbeat(WorkerId worker, bool progressed, Time now);
-  // These workers have rendered a younger frame's group. They render in order, so what they do now is no progress of this frame.
+  // These workers have rendered a group of a younger frame of the same client. They render a client's frames in order, so what they do now
+  // is no progress of this frame.
   void OnOvertaken(const std::vector<WorkerId>& workers);
 
   // ---- what goes wrong. A Status that is not ok: the frame has failed.
@@ -117,6 +118,7 @@ class RunningFrame {
 
   FrameProgress Progress() const;
   FrameStatistics Statistics(Time now) const;
+  Duration WorkerTime() const;  // that workers spent on it, as far as they have reported
 
  private:
   struct Suspicion {

@@ -154,11 +154,27 @@ void SimulatedService::WakeWorker(Node node) {
   if (!held) CountSpin(worker.machine.NextWake() <= time());
 }
 
+std::optional<std::uint32_t> SimulatedService::RenderOf(Node node, ImageHandle image) const {
+  const auto& renders = workers_[node].renders;
+  const auto found = std::ranges::find(renders, image, &std::pair<ImageHandle, std::uint32_t>::first);
+  return found == renders.end() ? std::nullopt : std::optional(found->second);
+}
+
+void SimulatedService::Perform(Node node, PauseRender& action) {
+  if (const auto place = RenderOf(node, action.image)) lanes_.Pause(node, Lane::kRender, *place, now());
+}
+
+void SimulatedService::Perform(Node node, ResumeRender& action) {
+  if (const auto place = RenderOf(node, action.image)) lanes_.Resume(*place, now());
+}
+
 void SimulatedService::Perform(Node node, CancelRender& action) {
-  const std::optional<std::uint32_t> place = workers_[node].rendering;
-  if (!place || std::get<StartRender>(JobAt(*place).action).key != action.key || !conditions_.CancelsInTime()) return;
+  const auto place = RenderOf(node, action.image);
+  if (!place) return;
+  lanes_.Resume(*place, now());  // it ends by itself
+  if (!conditions_.CancelsInTime()) return;
   JobAt(*place).cancelled = true;
-  lanes_.EndNow(node, Lane::kRender, now());
+  lanes_.EndNow(node, Lane::kRender, *place, now());
 }
 
 // Previews are made where images are combined.
@@ -209,7 +225,9 @@ void SimulatedService::Finish(std::uint32_t place) {
   if (auto* frame = std::get_if<SendFrame>(&job.action)) {
     return SendToCoordinator(node, std::move(frame->message), TakePayload(job));
   }
-  if (std::holds_alternative<StartRender>(job.action)) workers_[node].rendering.reset();
+  if (std::holds_alternative<StartRender>(job.action)) {
+    std::erase_if(workers_[node].renders, [place](const auto& render) { return render.second == place; });
+  }
   StepWorker(node, conditions_.Answer(job));
 }
 

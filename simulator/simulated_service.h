@@ -73,9 +73,9 @@ class SimulatedService {
   struct Worker {
     WorkerMachine machine;
     bool alive = true;
-    double alarm = kNever;                   // planned
-    double held = 0;                         // until then it stands still
-    std::optional<std::uint32_t> rendering;  // a job
+    double alarm = kNever;                                            // planned
+    double held = 0;                                                  // until then it stands still
+    std::vector<std::pair<ImageHandle, std::uint32_t>> renders = {};  // jobs, paused ones included
   };
 
   static Time TimeAt(double seconds);
@@ -90,14 +90,21 @@ class SimulatedService {
   void CountSpin(bool due) { spins_ = due ? spins_ + 1 : 0; }
 
   void Perform(ToWorker& action);
-  void Perform(AnyOf<DropPlan, DropClient, Note> auto&) {}
+  void Perform(AnyOf<DropPlan, ClientLeft, DropClient, Note> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 
   void Perform(Node node, SendControl& action) { SendToCoordinator(node, std::move(action.message), {}); }
   void Perform(Node, AnyOf<ConnectVoxels, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups> auto&) {}
+  void Perform(Node node, StartRender& action) {
+    const ImageHandle image = action.image;
+    const std::uint32_t place = Order(node, action);
+    workers_[node].renders.emplace_back(image, place);
+  }
+  void Perform(Node node, PauseRender& action);
+  void Perform(Node node, ResumeRender& action);
   void Perform(Node node, CancelRender& action);
-  void Perform(Node node, StartRender& action) { workers_[node].rendering = Order(node, action); }
+  std::optional<std::uint32_t> RenderOf(Node node, ImageHandle image) const;  // its job's place; nothing: it has ended
   void Perform(Node node, AnyOf<StoreChunk, StartCombine, FindHidden, SendPartial, SendFrame> auto& action) { Order(node, action); }
   void Perform(Node node, auto& action) { conditions_.Perform(node, action); }
 

@@ -23,8 +23,26 @@ void WorkerLanes::Add(const LaneTask& task, double now) {
 
 bool WorkerLanes::Idle(Node worker, Lane lane) const { return !lanes_[NumberOf(worker, lane)].taken; }
 
-void WorkerLanes::EndNow(Node worker, Lane lane, double now) {
-  if (StateOf(worker, lane).running) processors_.EndNow(HostOf(worker), NumberOf(worker, lane), now);
+void WorkerLanes::EndNow(Node worker, Lane lane, std::uint32_t job, double now) {
+  const LaneState& state = StateOf(worker, lane);
+  if (state.running && state.task.job == job) processors_.EndNow(HostOf(worker), NumberOf(worker, lane), now);
+}
+
+void WorkerLanes::Pause(Node worker, Lane lane, std::uint32_t job, double now) {
+  LaneState& state = StateOf(worker, lane);
+  if (!state.running || state.task.job != job) return;
+  const double left = processors_.Stop(HostOf(worker), NumberOf(worker, lane), now), all = SecondsOf(state.task);
+  paused_.push_back(state.task);
+  paused_.back().cost.seconds *= all > 0 ? left / all : 0;
+  BeginNext(NumberOf(worker, lane), now);
+}
+
+void WorkerLanes::Resume(std::uint32_t job, double now) {
+  const auto paused = std::ranges::find(paused_, job, &LaneTask::job);
+  if (paused == paused_.end()) return;
+  const LaneTask task = *paused;
+  paused_.erase(paused);
+  Add(task, now);
 }
 
 double WorkerLanes::NextTime() {
@@ -42,16 +60,20 @@ std::optional<LaneTask> WorkerLanes::Step() {
   const Processors::Completion done = processors_.Finish();
   LaneState& state = lanes_[done.task];
   const LaneTask task = state.task;
-  state.running = false;
   threads_.Active(task.cost.direct ? Threads::Machine(task.worker) : Threads::Of(task.worker, task.lane), done.time);
-  state.taken = !state.waiting.empty();
-  if (state.taken) {  // a task in a lane's own queue needs no wake-up
-    state.task.job = state.waiting.front().job;
-    state.task.cost = state.waiting.front().cost;
-    state.waiting.pop_front();
-    Begin(done.task, done.time);
-  }
+  BeginNext(done.task, done.time);
   return task;
+}
+
+void WorkerLanes::BeginNext(std::size_t lane, double now) {
+  LaneState& state = lanes_[lane];
+  state.running = false;
+  state.taken = !state.waiting.empty();
+  if (!state.taken) return;
+  state.task.job = state.waiting.front().job;  // a task in a lane's own queue needs no wake-up
+  state.task.cost = state.waiting.front().cost;
+  state.waiting.pop_front();
+  Begin(lane, now);
 }
 
 // Only the first thread does the serial share of the work.
@@ -59,9 +81,12 @@ void WorkerLanes::Begin(std::size_t lane, double now) {
   LaneTask& task = lanes_[lane].task;
   task.begin = now;
   lanes_[lane].running = true;
+  processors_.Start(HostOf(task.worker), lane, SecondsOf(task), task.cost.threads, now);
+}
+
+double WorkerLanes::SecondsOf(const LaneTask& task) const {
   const auto& [seconds, threads, direct] = task.cost;
-  const double each = seconds * (1 + (threads - 1) * machine_.serial_share) / threads / SpeedOf(task.worker);
-  processors_.Start(HostOf(task.worker), lane, each, threads, now);
+  return seconds * (1 + (threads - 1) * machine_.serial_share) / threads / SpeedOf(task.worker);
 }
 
 std::uint32_t WorkerLanes::HostOf(Node worker) const { return worker / std::uint32_t(std::max(machine_.workers_a_host, 1)); }

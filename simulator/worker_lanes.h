@@ -1,6 +1,6 @@
 // WorkerLanes: what the threads of all workers do, in virtual time. Each worker has three lanes (Timeline's Lane): one renders, one
-// combines and encodes, one makes pictures. A lane does one task at a time, in the order in which the tasks came up. All lanes of a host
-// share its cores (Processors).
+// combines and encodes, one makes pictures. A lane does one task at a time, in the order in which the tasks came up, but for those that
+// pause. All lanes of a host share its cores (Processors).
 #pragma once
 
 #include <cstdint>
@@ -42,8 +42,11 @@ class WorkerLanes {
   // Queues the task, or hands it over to its lane. `now` may not go back from call to call.
   void Add(const LaneTask& task, double now);
   bool Idle(Node worker, Lane lane) const;  // and nothing waits
-  // What runs in the lane, if anything does, ends now.
-  void EndNow(Node worker, Lane lane, double now);
+  // The task, if it runs in the lane, ends now.
+  void EndNow(Node worker, Lane lane, std::uint32_t job, double now);
+  // The task, if it runs in the lane, pauses; until Resume queues what is left of it, if it has paused.
+  void Pause(Node worker, Lane lane, std::uint32_t job, double now);
+  void Resume(std::uint32_t job, double now);
 
   // When a task begins or ends next if none is added before: infinity if none is under way.
   double NextTime();
@@ -74,6 +77,8 @@ class WorkerLanes {
   LaneState& StateOf(Node worker, Lane lane) { return lanes_[NumberOf(worker, lane)]; }
   std::uint32_t HostOf(Node worker) const;
   void Begin(std::size_t lane, double now);
+  void BeginNext(std::size_t lane, double now);  // if anything waits
+  double SecondsOf(const LaneTask& task) const;  // if nothing slows it down
   double SpeedOf(Node worker) const;
 
   const MachineModel& machine_;
@@ -81,6 +86,7 @@ class WorkerLanes {
   Processors processors_;
   std::priority_queue<Start, std::vector<Start>, std::greater<>> starts_;  // of tasks that were handed over
   std::uint64_t wake_ups_ = 0;
+  std::vector<LaneTask> paused_;
   std::vector<LaneState> lanes_;  // worker by worker. Their numbers are the names of what they run on processors
 };
 

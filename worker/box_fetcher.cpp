@@ -108,23 +108,43 @@ void BoxFetcher::SetBytes(Generation padded, std::uint64_t bytes) {
   cached_bytes_ += of_box.bytes;
 }
 
-void BoxFetcher::RequestChunks(std::span<const Generation> boxes, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions) {
+void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker,
+                               Time now, WorkerActions& actions) {
+  const auto waits = [this](const std::vector<Generation>& boxes) {
+    return std::ranges::any_of(boxes,
+                               [this](Generation padded) { return !boxes_.at(padded).missing.empty() && !boxes_.at(padded).retired; });
+  };
+  const auto clients = std::ranges::count_if(by_client, waits);
+  if (clients == 0) return;
   std::uint64_t begun_bytes = BegunBytes();
-  for (const Generation generation : boxes) {
-    HeldBox& padded = boxes_.at(generation);
-    if (!padded.begun && generation != boxes.front() && begun_bytes + padded.bytes > room_) return;
-    if (!padded.begun) begun_bytes += padded.bytes;
-    padded.begun = true;
-    while (!padded.retired && !padded.missing.empty()) {
-      const ChunkPlace chunk = padded.missing.back();
-      const std::uint32_t bytes = padded.BytesOf(chunk);
-      if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
-      padded.missing.pop_back();
-      in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
-      in_flight_bytes_ += bytes;
-      if (!padded.requested) padded.report.begin = now;
-      padded.requested = true;
-      actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}});
+  bool first = true;
+  for (const std::vector<Generation>& boxes : by_client) {
+    std::uint64_t in_flight_bytes = 0;  // of this client
+    for (const auto& [name, request] : in_flight_) {
+      if (std::ranges::find(boxes, name.first) != boxes.end()) in_flight_bytes += request.bytes;
+    }
+    bool has_credit = true;
+    for (const Generation generation : boxes) {
+      if (!has_credit) break;
+      HeldBox& padded = boxes_.at(generation);
+      const bool at_any_rate = std::exchange(first, false) && next_at_any_rate;
+      if (!padded.begun && !at_any_rate && begun_bytes + padded.bytes > room_) return;
+      if (!padded.begun) begun_bytes += padded.bytes;
+      padded.begun = true;
+      while (!padded.retired && !padded.missing.empty()) {
+        const ChunkPlace chunk = padded.missing.back();
+        const std::uint32_t bytes = padded.BytesOf(chunk);
+        if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
+        has_credit = in_flight_bytes == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        if (!has_credit) break;
+        padded.missing.pop_back();
+        in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
+        in_flight_bytes_ += bytes;
+        in_flight_bytes += bytes;
+        if (!padded.requested) padded.report.begin = now;
+        padded.requested = true;
+        actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}});
+      }
     }
   }
 }

@@ -7,9 +7,10 @@
 //   2. RequestChunks, in the order in which padded boxes will be needed; Chunk -> StoreChunk -> ChunkStored. A chunk that does not arrive
 //      within chunk_timeout, or arrives damaged, is requested again, chunk_attempts times; then the padded box is given up (TakeFailures).
 //   3. complete(padded box): it can be rendered from. Release when that is done; the padded box stays cached.
+// Clients that wait for voxels at the same time have equal parts of the credit.
 // Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then the least recently used above
 // cache_bytes or the room (SetRoom). Padded boxes that are waited for begin to take memory one after the other, as far as there is room;
-// the one that is needed next always does.
+// the one that is needed next always does, unless others are needed at the same time (RequestChunks).
 #pragma once
 
 #include <algorithm>
@@ -52,9 +53,13 @@ class BoxFetcher {
   // The padded box's memory, with what was derived from its voxels and cells; it may fall. Counts as at least the samples and cells.
   void SetBytes(Generation padded, std::uint64_t bytes);
 
-  // Requests missing chunks of these padded boxes, which are in the order in which they are needed, within the credit (one chunk is always
-  // allowed) and the room.
-  void RequestChunks(std::span<const Generation> boxes, Epoch epoch, WorkerId worker, Time now, WorkerActions& actions);
+  // Whether there is room for what another render derives from this padded box: about as much as its voxels (worker_memory.h).
+  bool HasRoomBeside(Generation padded) const { return boxes_.at(padded).RawBytes() <= room_ - std::min(room_, cached_bytes_); }
+
+  // Requests missing chunks of these padded boxes, which each client needs in this order, within the credit (one chunk is always allowed)
+  // and the room. `next_at_any_rate`: the first of all begins to take memory even if there is no room.
+  void RequestChunks(std::span<const std::vector<Generation>> by_client, bool next_at_any_rate, Epoch epoch, WorkerId worker, Time now,
+                     WorkerActions& actions);
   void OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actions);
   void OnRefused(const ChunkRefused& refused);
   void OnStored(const ChunkStored& stored, Time now);

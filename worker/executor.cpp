@@ -12,12 +12,12 @@
 #include "common/image/image_view.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
-#include "worker/arriving_cells.h"
 
 namespace slabstream {
 namespace {
 
 const OcclusionMask kNothingHidden;
+constexpr ClientId kNobody = 0;  // for what belongs to no client
 
 std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 
@@ -118,93 +118,16 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
 
 }  // namespace
 
-// Voxels and cells while they arrive (combining thread), then the data to render from (render thread, from the first StartRender on).
-struct Executor::HeldBox {
-  explicit HeldBox(const BoxKey& box_key) : key(box_key) {}
-
-  Status Store(const Chunk& chunk, const Bytes& payload) {
-    if (chunk.box.empty() || !key.box.Contains(chunk.box) || chunk.dataset != key.dataset)
-      return Status::DataLoss("chunk of another padded box");
-    if (data != nullptr) return Status::Ok();  // a duplicate after the padded box was complete
-    if (IsCellChunk(chunk.chunk)) {
-      return key.types.layers.cells ? cells.Store(chunk, payload.span()) : Status::DataLoss("cells of a dataset that has none");
-    }
-    if (chunk.chunk >= ChunkCount(chunk.box, key.types) || chunk.raw_bytes != BytesOfChunk(chunk.box, key.types, chunk.chunk)) {
-      return Status::DataLoss("chunk " + std::to_string(chunk.chunk) + " of " + std::to_string(chunk.raw_bytes) +
-                              " bytes does not fit a box of " + std::to_string(chunk.box.voxel_count()) + " voxels");
-    }
-    const ChunkPart part = PartOfChunk(chunk.box, key.types, chunk.chunk);
-    unpacked.resize(chunk.raw_bytes);
-    if (Status status = UnpackChunk(chunk, payload.span(), unpacked); !status.ok()) return status;
-    Voxels(part.layer).Write(chunk.box, part.begin, unpacked);
-    return Status::Ok();
-  }
-
-  // The data to render from. The first call, when all chunks are stored, copies voxels that other padded boxes hold. Render thread only.
-  BoxData& Data() {
-    if (data != nullptr) return *data;
-    for (const Layer layer : kLayers) {
-      if (!key.types.Of(layer)) continue;
-      BrickedVoxels& to = Voxels(layer);
-      for (const Copy& copy : copies) copy.Perform(layer, to);
-    }
-    copies.clear();
-    data = std::make_unique<BoxData>(*std::move(voxels[0]), BoxLayers{std::move(voxels[1]), std::move(voxels[2]), cells.cells()});
-    voxels = {};
-    cells = {};
-    unpacked = {};
-    return *data;
-  }
-
-  // Those that are being stored. The first call makes room for them.
-  BrickedVoxels& Voxels(Layer layer) {
-    std::optional<BrickedVoxels>& stored = voxels.at(std::size_t(layer));
-    if (!stored) stored.emplace(key.box, *key.types.Of(layer));
-    return *stored;
-  }
-
-  VoxelBricks Bricks(Layer layer) {
-    const BoxData& stored = Data();
-    if (layer == Layer::kVolume) return stored.bricks();
-    return *(layer == Layer::kLabels ? stored.layers().labels : stored.layers().overlay);
-  }
-
-  struct Copy {
-    std::shared_ptr<HeldBox> from;
-    Box box;
-
-    void Perform(Layer layer, BrickedVoxels& to) const {
-      const VoxelBricks source = from->Bricks(layer);
-      const Index3 size = box.size();
-      std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
-      for (std::int32_t z = 0; z < size.z; ++z) {
-        const std::uint64_t begin = std::uint64_t(z) * slice.size();
-        source.Read(box, begin, slice);
-        to.Write(box, begin, slice);
-      }
-    }
-  };
-
-  const BoxKey key;
-  std::vector<Copy> copies;
-  std::array<std::optional<BrickedVoxels>, kLayers.size()> voxels;  // by layer
-  ArrivingCells cells;
-  std::vector<std::byte> unpacked;  // a chunk's samples
-  std::unique_ptr<BoxData> data;
-};
-
 Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
     : outbox_(outbox),
       frame_codec_(frame_codec),
       make_renderer_(std::move(make_renderer)),
       hook_(std::move(hook)),
       threads_(threads),
-      render_arena_(threads),
-      combine_arena_(threads),
-      finish_arena_(threads),
-      combine_thread_([this] { Break(); }),
-      finish_thread_([this] { Break(); }),
-      render_thread_([this] { Break(); }) {}
+      chunk_thread_([this] { Break(); }),
+      combine_(threads, [this] { Break(); }),
+      finish_(threads, [this] { Break(); }),
+      render_(threads, [this] { Break(); }) {}
 
 void Executor::Break() {
   broken_ = true;
@@ -227,21 +150,23 @@ bool Executor::TrySend(const char* task, const GroupKey& key, Work&& work) {
 }
 
 Executor::~Executor() {
-  if (last_render_) *last_render_->cancelled = true;
+  for (const auto& [image, render] : renders_) {
+    if (const std::shared_ptr<RenderControl> control = render.lock()) control->Cancel();
+  }
 }
 
 void Executor::Perform(const OpenBox& action) {
-  auto padded = std::make_shared<HeldBox>(action.padded);
-  for (const OpenBox::Copy& copy : action.copies) padded->copies.push_back({BoxOf(copy.from), copy.box});
-  boxes_.insert_or_assign(action.padded, std::move(padded));
+  std::vector<StoredBox::Copy> copies;
+  for (const OpenBox::Copy& copy : action.copies) copies.push_back({BoxOf(copy.from), copy.box});
+  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies)));
 }
 
 void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }
 
 void Executor::Perform(StoreChunk&& action) {
   const auto found = boxes_.find(action.padded);
-  std::shared_ptr<HeldBox> padded = found == boxes_.end() ? nullptr : found->second;
-  combine_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
+  std::shared_ptr<StoredBox> padded = found == boxes_.end() ? nullptr : found->second;
+  chunk_thread_.Post([this, padded = std::move(padded), store = std::move(action)] {
     Status status = Guard("box", [&] {
       return padded == nullptr ? Status::NotFound("chunk of a padded box that was dropped") : padded->Store(store.chunk, store.payload);
     });
@@ -250,29 +175,30 @@ void Executor::Perform(StoreChunk&& action) {
 }
 
 void Executor::Perform(StartRender&& action) {
-  std::shared_ptr<HeldBox> padded = BoxOf(action.padded);
+  std::shared_ptr<StoredBox> padded = BoxOf(action.padded);
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
-  auto cancelled = std::make_shared<std::atomic<bool>>(false);
-  last_render_ = {action.key, cancelled};
-  render_thread_.Post(
-      [this, padded = std::move(padded), image = std::move(image), cancelled = std::move(cancelled), render = std::move(action)] {
-        outbox_.Post(WorkerEvent(render_arena_.execute([&] { return Render(render, *padded, *cancelled, *image); })));
+  auto control = std::make_shared<RenderControl>();
+  std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
+  renders_[action.image] = control;
+  ClientLane& lane = render_.Of(action.client);
+  lane.thread.Post(
+      [this, &lane, padded = std::move(padded), image = std::move(image), control = std::move(control), render = std::move(action)] {
+        outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *padded, *control, lane, *image); })));
       });
 }
 
-RenderDone Executor::Render(const StartRender& action, HeldBox& padded, const std::atomic<bool>& cancelled, LocalImage& image) {
+RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane,
+                            LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
   const std::int64_t begin = NowNs();
   done.status = Guard("render", [&] {
-    if (!padded.copies.empty()) {
-      padded.Data();
-      AddStage(report, Stage::kFetch, begin, NowNs());
-    }
-    std::unique_ptr<Renderer>& renderer = renderers_[action.setup->renderer];
+    if (padded.Assemble()) AddStage(report, Stage::kFetch, begin, NowNs());
+    const StoredBox::Lease lease = padded.Lend(action.client);
+    std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(padded.Data(), action.placement.box, *action.setup, hidden, cancelled, report);
+    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.box, *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;
@@ -280,15 +206,28 @@ RenderDone Executor::Render(const StartRender& action, HeldBox& padded, const st
     return Status::Ok();
   });
   if (report.stage_ns[std::size_t(Stage::kRender)] == 0) AddStage(report, Stage::kRender, begin, NowNs());
-  done.box_bytes = padded.data == nullptr ? 0 : padded.data->bytes();
+  done.box_bytes = padded.bytes();
   return done;
 }
 
-void Executor::Perform(const CancelRender& action) {
-  if (last_render_ && last_render_->key == action.key) *last_render_->cancelled = true;
+std::shared_ptr<RenderControl> Executor::ControlOf(ImageHandle image) const {
+  const auto render = renders_.find(image);
+  return render == renders_.end() ? nullptr : render->second.lock();
 }
 
-std::shared_ptr<Executor::HeldBox> Executor::BoxOf(const BoxKey& key) const {
+void Executor::Perform(const PauseRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Pause();
+}
+
+void Executor::Perform(const ResumeRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Resume();
+}
+
+void Executor::Perform(const CancelRender& action) {
+  if (const auto control = ControlOf(action.image)) control->Cancel();
+}
+
+std::shared_ptr<StoredBox> Executor::BoxOf(const BoxKey& key) const {
   const auto found = boxes_.find(key);
   CHECK(found != boxes_.end()) << "the machine copies and renders from boxes that it holds";
   return found->second;
@@ -305,19 +244,20 @@ void Executor::Perform(StartCombine&& action) {
   const bool fresh = image == nullptr;
   if (fresh) image = std::make_shared<LocalImage>();
   std::shared_ptr<LocalImage> other = action.other == 0 ? nullptr : ImageOf(action.other);
-  combine_thread_.Post([this, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
+  ClientLane& lane = combine_.Of(action.client);
+  lane.thread.Post([this, &lane, fresh, image = image, other = std::move(other), combine = std::move(action)]() mutable {
     CombineDone done{combine.key, combine.image, {}, {Stage::kCombine, NowNs(), 0}};
     done.status = Guard("combine", [&] {
       const PixelRange pixels = combine.pixels == PixelRange{} ? PixelRange{0, std::uint64_t(combine.frame.pixel_count())} : combine.pixels;
       if (other != nullptr) {
-        WithAllThreads(combine_arena_, [&] { CombineImages(*image, fresh, other, combine, pixels); });
+        WithAllThreads(lane.arena, [&] { CombineImages(*image, fresh, other, combine, pixels); });
         return Status::Ok();
       }
       if (!combine.incoming) combine.incoming.emplace();
       if (!fresh && image->format != combine.incoming->header.format) {
         return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
       }
-      return WithAllThreads(combine_arena_, [&] {
+      return WithAllThreads(lane.arena, [&] {
         return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
                                         : CombineIncoming(*image, fresh, combine, pixels);
       });
@@ -329,7 +269,7 @@ void Executor::Perform(StartCombine&& action) {
 
 void Executor::Perform(FindHidden&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
-  combine_thread_.Post([this, image = std::move(image), find = std::move(action)]() mutable {
+  combine_.Of(action.client).thread.Post([this, image = std::move(image), find = std::move(action)]() mutable {
     HiddenFound found{find.key, find.image, {}};
     const Status status = Guard("hidden tiles", [&] {
       const PixelBounds frame = FrameBounds(*find.setup);
@@ -365,7 +305,8 @@ void Executor::Perform(SendPartial&& action) {
   std::optional<ImageView> view;
   std::optional<Bytes> payload;
   // Describing where pixels are takes less time than waking a thread for it.
-  if (combine_thread_.Idle()) {
+  ClientLane& lane = combine_.Of(action.client);
+  if (lane.thread.Idle()) {
     bool posted = false;
     const bool tried = TrySend("encode", action.message.key, [&] {
       const std::int64_t begin = NowNs();
@@ -376,15 +317,15 @@ void Executor::Perform(SendPartial&& action) {
     });
     if (posted || !tried) return;
   }
-  combine_thread_.Post(
-      [=, this, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
+  lane.thread.Post(
+      [=, this, &lane, image = std::move(image), view = std::move(view), payload = std::move(payload), send = std::move(action)]() mutable {
         TrySend("encode", send.message.key, [&] {
           const std::int64_t begin = NowNs();
           if (!view) {
             view = view_of(*image, send);
             payload = PayloadInPlace(*image, *view, send);
           }
-          if (!payload) payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(*view, send.color, send.message); });
+          if (!payload) payload = WithAllThreads(lane.arena, [&] { return EncodePixels(*view, send.color, send.message); });
           Post(send, PackForLink(*std::move(payload), send.delivery.bytes_per_second, send.message.packed), begin);
         });
       });
@@ -399,11 +340,12 @@ void Executor::Perform(const ForgetGroups& action) {
 void Executor::Perform(const ResendImage& action) {
   std::shared_ptr<const LentImage> lent = lent_.Find(action.refused.key, action.refused.step, action.refused.pixels);
   if (lent == nullptr) return;
-  combine_thread_.Post([this, lent = std::move(lent)] {
+  ClientLane& lane = combine_.Of(kNobody);
+  lane.thread.Post([this, &lane, lent = std::move(lent)] {
     TrySend("encode", lent->message.key, [&] {
       PartialImage message = lent->message;
       message.shared.reset();
-      Bytes payload = WithAllThreads(combine_arena_, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
+      Bytes payload = WithAllThreads(lane.arena, [&] { return EncodePixels(lent->view, ColorCoding::kFloat32, message); });
       outbox_.Post(OutgoingPartial{lent->to, Encode(message), std::move(payload), false, 0, message.key});
     });
   });
@@ -412,8 +354,9 @@ void Executor::Perform(const ResendImage& action) {
 void Executor::Perform(SendFrame&& action) {
   std::shared_ptr<LocalImage> image = ImageOf(action.image);
   const bool finished = action.message.groups_done == action.message.group_count;
-  (finished ? finish_thread_ : combine_thread_).Post([this, finished, image = std::move(image), send = std::move(action)]() mutable {
-    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, finished ? finish_arena_ : combine_arena_); });
+  ClientLane& lane = (finished ? finish_ : combine_).Of(action.client);
+  lane.thread.Post([this, &lane, image = std::move(image), send = std::move(action)]() mutable {
+    TrySend("picture", KeyOf(send.message), [&] { MakePicture(*image, send, lane.arena); });
   });
 }
 

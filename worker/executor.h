@@ -1,13 +1,14 @@
-// Executor: runs the slow actions of a WorkerMachine. One thread renders; another combines, encodes and unpacks chunks; a third makes
-// finished pictures while the next frames are combined. Rendering and making pictures use all render threads of the worker.
+// Executor: runs the slow actions of a WorkerMachine. For each client, one thread renders; another combines and encodes; a third makes
+// finished pictures while the next frames are combined (ClientLanes). Another one unpacks chunks. Rendering uses all render threads of the
+// worker; the machine lets one client's render go on at a time.
 //
 //   1. The thread that owns the machine calls Perform for each action of the kinds below, in order.
 //   2. The result goes to the outbox: an event for the machine, or a message that is ready to be sent.
 // Tables of padded boxes and images belong to the calling thread. Tasks share the entries that they need, so nothing is freed under a
-// running task and no lock is held while pixels are touched. One task at a time touches an entry's contents: the machine orders the next
-// use of a padded box or image only after the event that ends the last one. The combining thread's own tasks are an exception: they run in
-// order. Nothing is combined into the image of a finished frame; the image of a preview still grows, so previews are made on the combining
-// thread.
+// running task and no lock is held while pixels are touched. One task at a time touches the pixels of an image: the machine orders its next
+// use only after the event that ends the last one. A combining thread's own tasks are an exception: they run in order. Nothing is combined
+// into the image of a finished frame; the image of a preview still grows, so previews are made on the combining thread. Renders of several
+// clients may use a padded box at a time (StoredBox).
 #pragma once
 
 #include <tbb/task_arena.h>
@@ -24,17 +25,19 @@
 #include "common/base/task_thread.h"
 #include "common/image/local_image.h"
 #include "common/transport/mailbox.h"
+#include "worker/client_lanes.h"
 #include "worker/image_packing.h"
 #include "worker/lent_images.h"
 #include "worker/peer_memory.h"
 #include "worker/renderers/renderer.h"
 #include "worker/sent_tallies.h"
+#include "worker/stored_box.h"
 #include "worker/thread_share.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
 
-// An encoded message from the combining thread.
+// An encoded message from a combining thread.
 struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
@@ -58,12 +61,14 @@ class Executor {
   // `frame_codec` packs finished frames. `threads` render, at least 1. The outbox must outlive the executor.
   Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer = MakeRenderer,
            TaskHook hook = {});
-  ~Executor();  // cancels the running render, drops tasks that have not begun, joins
+  ~Executor();  // cancels the renders, drops tasks that have not begun, joins
 
   void Perform(const OpenBox& action);
   void Perform(StoreChunk&& action);
   void Perform(const DropBox& action);
   void Perform(StartRender&& action);
+  void Perform(const PauseRender& action);
+  void Perform(const ResumeRender& action);
   void Perform(const CancelRender& action);
   void Perform(StartCombine&& action);
   void Perform(FindHidden&& action);
@@ -80,12 +85,6 @@ class Executor {
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
 
  private:
-  struct HeldBox;
-  struct RunningRender {
-    GroupKey key;
-    std::shared_ptr<std::atomic<bool>> cancelled;
-  };
-
   // Runs `work`, which returns a Status, and catches its exceptions.
   template <class Work>
   Status Guard(const char* task, Work&& work);
@@ -94,34 +93,29 @@ class Executor {
   bool TrySend(const char* task, const GroupKey& key, Work&& work);
   void Break();
   // The entries of the tables, which exist.
-  std::shared_ptr<HeldBox> BoxOf(const BoxKey& key) const;
+  std::shared_ptr<StoredBox> BoxOf(const BoxKey& key) const;
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
-  RenderDone Render(const StartRender& action, HeldBox& padded, const std::atomic<bool>& cancelled, LocalImage& image);
+  std::shared_ptr<RenderControl> ControlOf(ImageHandle image) const;   // null: the render has ended
+  RenderDone Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
   const Codec frame_codec_;
-  std::map<BoxKey, std::shared_ptr<HeldBox>> boxes_;
+  std::map<BoxKey, std::shared_ptr<StoredBox>> boxes_;
   std::map<ImageHandle, std::shared_ptr<LocalImage>> images_;
   LentImages lent_;
   SentTallies sent_;
   PeerMemory peer_memory_;
-  std::optional<RunningRender> last_render_;
+  std::map<ImageHandle, std::weak_ptr<RenderControl>> renders_;  // their tasks hold them
   const RendererFactory make_renderer_;
   const TaskHook hook_;
   std::atomic<bool> broken_ = false;
-  std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers_;  // used by the render thread
   const ThreadShare threads_;
-  // One arena for each thread below that enters: in a shared one, the last picture would wait for the rendering of the next.
-  tbb::task_arena render_arena_;
-  tbb::task_arena combine_arena_;
-  tbb::task_arena finish_arena_;
-  TaskThread combine_thread_;
-  TaskThread finish_thread_;
-  TaskThread render_thread_;
+  TaskThread chunk_thread_;
+  ClientLanes combine_, finish_, render_;
 };
 
 }  // namespace slabstream

@@ -12,6 +12,7 @@ namespace slabstream {
 FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names)
     : epoch_(assignment.epoch),
       self_(self),
+      client_(assignment.client),
       frame_(assignment.key.frame),
       group_count_(assignment.group_count),
       previews_(assignment.previews),
@@ -75,7 +76,8 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
       continue;
     }
     if (image_ == 0) image_ = names_.Next();
-    actions.push_back(StartCombine{.key = group.key,
+    actions.push_back(StartCombine{.client = client_,
+                                   .key = group.key,
                                    .image = image_,
                                    .other = piece.image,
                                    .incoming = std::move(piece.incoming),
@@ -88,7 +90,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   }
   for (const ImageHandle image : used) actions.push_back(ReleaseImage{image});
   if (UsesOcclusion(*setup_) && groups_done_ + 1 < group_count_) {
-    actions.push_back(FindHidden{group.key, image_, setup_, hidden_});
+    actions.push_back(FindHidden{client_, group.key, image_, setup_, hidden_});
     ++combining_;
   }
 }
@@ -115,7 +117,7 @@ void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) c
 void FrameAccumulator::SendPicture(WorkerActions& actions) {
   FrameImage message{epoch_, self_, frame_, attempt_, groups_done_, group_count_, {}, {}};
   message.runs.image.format = setup_->format;
-  actions.push_back(SendFrame{std::move(message), image_, setup_});
+  actions.push_back(SendFrame{client_, std::move(message), image_, setup_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

@@ -45,6 +45,7 @@ class FrameAccumulator {
 
   const Epoch epoch_;
   const WorkerId self_;
+  const ClientId client_;
   const FrameId frame_;
   const std::uint32_t group_count_;
   const bool previews_;

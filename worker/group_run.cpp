@@ -251,6 +251,7 @@ void GroupRun::Combine(Rank rank, const Held& held, const ImagePiece& piece, Rar
 }
 
 void GroupRun::Start(StartCombine&& combine, Rank rank, WorkerActions& actions) {
+  combine.client = assignment_.client;
   combine.key = key();
   combine.frame = FrameBounds(assignment_.setup);
   combining_.emplace_back(combine.image, rank);
@@ -295,7 +296,8 @@ void GroupRun::SendFragments(Rank rank, std::span<const Held> fragments, std::ui
   const Peer* peer = FindPeer(to);
   if (peer == nullptr) return Fail(fmt::format("worker {} takes part in the group but has no endpoint in it", to));
   for (const Held& fragment : fragments) {
-    actions.push_back(SendPartial{.to = {peers_, peer},
+    actions.push_back(SendPartial{.client = assignment_.client,
+                                  .to = {peers_, peer},
                                   .message = {.epoch = assignment_.epoch,
                                               .from_worker = self_,
                                               .key = key(),

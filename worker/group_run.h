@@ -43,6 +43,7 @@ class GroupRun {
   const std::vector<Peer>& peers() const { return *peers_; }  // by ascending worker
   bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
+  ClientId client() const { return assignment_.client; }
   const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }  // of this worker; none if the assignment is inconsistent
   const Placement& placement(Rank rank) const { return assignment_.group.placements[rank]; }
   const Status& failure() const { return failure_; }

@@ -4,40 +4,134 @@
 
 namespace slabstream {
 
-void RenderQueue::Add(const GroupKey& key, Rank rank, const Placement& placement, const std::shared_ptr<const FrameSetup>& setup,
-                      const std::shared_ptr<const OcclusionMask>& hidden, WorkerActions& actions) {
-  const Box voxels = PaddedBox(placement.box, *setup);
-  waiting_[{key, rank}] = {placement, setup, hidden, boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions)};
+bool RenderQueue::Busy(ClientId client) const {
+  const auto first = waiting_.lower_bound({client, {}, 0});
+  return begun_.contains(client) || (first != waiting_.end() && std::get<ClientId>(first->first) == client);
 }
 
-void RenderQueue::DropGroup(const GroupKey& key, WorkerActions& actions) {
+void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Placement& placement,
+                      const std::shared_ptr<const FrameSetup>& setup, const std::shared_ptr<const OcclusionMask>& hidden, Time now,
+                      WorkerActions& actions) {
+  if (!Busy(client)) {  // it begins where the others are
+    if (turn_ && OnlyTurns()) {
+      ChargeTurn(now);
+      turns_.Take(turn_->client);
+    }
+    turns_.Join(client);
+  }
+  const Box voxels = PaddedBox(placement.box, *setup);
+  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), actions);
+  waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
+}
+
+void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
   std::erase_if(waiting_, [&](const auto& entry) {
-    if (entry.first.first != key) return false;
+    if (std::get<GroupKey>(entry.first) != key) return false;
     boxes_.Release(entry.second.padded);
     return true;
   });
-  if (running_ && running_->key == key && !running_->dropped) {
-    running_->dropped = true;
-    actions.push_back(CancelRender{key});
+  for (auto& [client, begun] : begun_) {
+    if (begun.key != key || begun.dropped) continue;
+    begun.dropped = true;
+    actions.push_back(CancelRender{begun.image});
+    if (turn_ && turn_->client == client) EndTurn(now);
   }
 }
 
-void RenderQueue::StartNext(WorkerActions& actions) {
-  if (running_) return;
-  const auto next = std::ranges::find_if(waiting_, [&](const auto& entry) { return boxes_.complete(entry.second.padded); });
-  if (next == waiting_.end()) return;
-  running_ = Running{next->first.first, next->first.second, std::move(next->second), names_.Next(), false};
-  waiting_.erase(next);
-  actions.push_back(StartRender{running_->key, running_->rank, boxes_.key(running_->job.padded), running_->job.placement,
-                                running_->job.setup, running_->job.hidden, running_->image});
+RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const {
+  for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
+    const BoxFetcher::Generation padded = job->second.padded;
+    const auto uses = [&](const auto& begun) { return begun.second.job.padded == padded; };
+    if (boxes_.complete(padded) && (boxes_.HasRoomBeside(padded) || std::ranges::none_of(begun_, uses))) return job;
+  }
+  return waiting_.end();
 }
 
-std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, WorkerActions& actions) {
-  if (!running_ || running_->image != done.image) return std::nullopt;
-  const Running job = *std::exchange(running_, std::nullopt);
+bool RenderQueue::WantsTurn(ClientId client) const {
+  const auto begun = begun_.find(client);
+  return begun != begun_.end() ? !begun->second.dropped : NextOf(client) != waiting_.end();
+}
+
+std::set<ClientId> RenderQueue::Clients() const {
+  std::set<ClientId> clients;
+  for (const auto& [client, begun] : begun_) clients.insert(client);
+  for (auto job = waiting_.begin(); job != waiting_.end();) {
+    const ClientId client = std::get<ClientId>(job->first);
+    clients.insert(client);
+    job = waiting_.lower_bound({client + 1, {}, 0});
+    if (client + 1 == 0) break;
+  }
+  return clients;
+}
+
+bool RenderQueue::OnlyTurns() const {
+  const auto other = [this](const auto& job) { return std::get<ClientId>(job.first) != turn_->client; };
+  return begun_.size() == 1 && (waiting_.empty() || !(other(*waiting_.begin()) || other(*waiting_.rbegin())));
+}
+
+std::optional<ClientId> RenderQueue::NextInTurn() const {
+  std::optional<ClientId> next;
+  for (const ClientId client : Clients()) {
+    if ((turn_ && turn_->client == client) || !WantsTurn(client)) continue;
+    if (!next || turns_.TurnOf(client) < turns_.TurnOf(*next)) next = client;
+  }
+  return next;
+}
+
+void RenderQueue::ChargeTurn(Time now) {
+  turns_.Charge(turn_->client, now - turn_->charged);
+  turn_->charged = now;
+}
+
+void RenderQueue::EndTurn(Time now) {
+  ChargeTurn(now);
+  turn_.reset();
+}
+
+void RenderQueue::StartNext(Time now, WorkerActions& actions) {
+  if (turn_ && (OnlyTurns() || now < turn_->begin + kTurn)) return;
+  const std::optional<ClientId> next = NextInTurn();
+  if (!next) return;
+  if (turn_) {
+    ChargeTurn(now);
+    if (turns_.TurnOf(*next).used > turns_.TurnOf(turn_->client).used) {  // another turn of the same client
+      turn_->begin = now;
+      return turns_.Take(turn_->client);
+    }
+    actions.push_back(PauseRender{begun_.at(turn_->client).image});
+  }
+  Begin(*next, now, actions);
+}
+
+void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
+  turns_.Take(client);
+  turn_ = TurnNow{client, now, now};
+  if (const auto paused = begun_.find(client); paused != begun_.end()) {
+    actions.push_back(ResumeRender{paused->second.image});
+    return;
+  }
+  const auto next = NextOf(client);
+  const auto& [of_client, key, rank] = next->first;
+  const Begun& begun = begun_.emplace(client, Begun{key, rank, next->second, names_.Next()}).first->second;
+  waiting_.erase(next);
+  actions.push_back(StartRender{client, begun.key, begun.rank, boxes_.key(begun.job.padded), begun.job.placement, begun.job.setup,
+                                begun.job.hidden, begun.image});
+}
+
+Time RenderQueue::NextTurn() const { return turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max(); }
+
+std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions) {
+  const auto ended = std::ranges::find_if(begun_, [&](const auto& begun) { return begun.second.image == done.image; });
+  if (ended == begun_.end()) return std::nullopt;
+  const ClientId client = ended->first;
+  if (turn_ && turn_->client == client) EndTurn(now);
+  const Begun job = std::move(ended->second);
+  begun_.erase(ended);
   const BoxFetcher::Generation padded = job.job.padded;
   if (done.status.ok()) boxes_.Rendered(padded);
   boxes_.SetBytes(padded, done.box_bytes);  // a cancelled frame derives data too
+  if (waiting_.empty() && begun_.empty()) turns_.ForgetAll();
+  turns_.ForgetIdle([this](ClientId each) { return Busy(each); });
   if (job.dropped) {
     boxes_.Release(padded);
     actions.push_back(ReleaseImage{done.image});
@@ -48,26 +142,33 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   report.group = job.key.group;
   report.rank = job.rank;
   report.box = job.job.placement.id;
-  const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
-  report.voxel_bytes = fetched.voxel_bytes;
-  if (fetched.voxel_bytes > 0) {
-    AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+  if (job.job.waited) {
+    const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
+    report.voxel_bytes = fetched.voxel_bytes;
+    if (fetched.voxel_bytes > 0) {
+      AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+    }
   }
   boxes_.Release(padded);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
   return report;
 }
 
-std::vector<BoxFetcher::Generation> RenderQueue::BoxesInOrder() const {
-  std::vector<BoxFetcher::Generation> boxes;
-  for (const auto& [name, job] : waiting_) boxes.push_back(job.padded);
-  return boxes;
+std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::BoxesInTurn() const {
+  std::vector<ClientId> clients;
+  std::map<ClientId, std::vector<BoxFetcher::Generation>> boxes;
+  for (const auto& [name, job] : waiting_) boxes[std::get<ClientId>(name)].push_back(job.padded);
+  for (const auto& [client, of_client] : boxes) clients.push_back(client);
+  std::ranges::sort(clients, {}, [this](ClientId client) { return turns_.TurnOf(client); });
+  std::vector<std::vector<BoxFetcher::Generation>> in_turn;
+  for (const ClientId client : clients) in_turn.push_back(std::move(boxes[client]));
+  return in_turn;
 }
 
 std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation padded) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.padded == padded) groups.insert(name.first);
+    if (job.padded == padded) groups.insert(std::get<GroupKey>(name));
   }
   return groups;
 }

@@ -36,6 +36,7 @@ struct WorkerMachine::State {
 
   // One frame, at the latest known attempt. A group without a run is over here: done, failed, or not needed.
   struct Frame {
+    ClientId client = 0;
     std::uint32_t attempt = 0;
     std::map<std::uint32_t, std::optional<GroupRun>> groups;
     std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
@@ -249,6 +250,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (Over(key.frame)) return;
   Frame& frame = frames[key.frame];
   if (key.attempt < frame.attempt) return;
+  frame.client = assignment.client;
   if (key.attempt > frame.attempt) BeginAttempt(key.frame, frame, assignment);
   const auto [entry, added] = frame.groups.try_emplace(key.group);
   if (!added) return;
@@ -277,7 +279,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
       run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
       ++rendered_ranks;
     } else {
-      renders.Add(key, rank, placement, setup, hidden, actions);
+      renders.Add(run.client(), key, rank, placement, setup, hidden, now, actions);
     }
   }
   for (auto& [partial, payload] : early.Take(key)) run.OnPartial(std::move(partial), payload, actions);
@@ -319,7 +321,7 @@ void WorkerMachine::State::On(PartialImage&& partial, const Bytes& payload) {
 }
 
 void WorkerMachine::State::On(const RenderDone& done) {
-  std::optional<RankReport> report = renders.Finish(done, worker, actions);
+  std::optional<RankReport> report = renders.Finish(done, worker, now, actions);
   if (!report) return;
   if (!done.status.ok()) return FailGroup(done.key, done.status);
   ++rendered_ranks;
@@ -329,9 +331,11 @@ void WorkerMachine::State::On(const RenderDone& done) {
 }
 
 void WorkerMachine::State::On(const CombineDone& done) {
-  if (GroupRun* run = FindRun(done.key); run != nullptr && run->OnCombined(done, actions)) return AfterRun(*run);
   const auto frame = frames.find(done.key.frame);
-  if (frame == frames.end() || !frame->second.accumulator) return;
+  if (frame == frames.end()) return;
+  renders.Charge(frame->second.client, Duration(done.span.end_ns - done.span.begin_ns));
+  if (GroupRun* run = FindRun(done.key); run != nullptr && run->OnCombined(done, actions)) return AfterRun(*run);
+  if (!frame->second.accumulator) return;
   if (frame->second.accumulator->OnCombined(done, actions)) CheckAccumulator(frame->first, frame->second);
 }
 
@@ -381,7 +385,7 @@ void WorkerMachine::State::AfterRun(GroupRun& run) {
 void WorkerMachine::State::EndRun(GroupKey key) {
   brief = false;
   latest_run = nullptr;
-  renders.DropGroup(key, actions);
+  renders.DropGroup(key, now, actions);
   Frame& frame = frames.at(key.frame);
   std::optional<GroupRun>& run = frame.groups.at(key.group);
   for (const Peer& peer : run->peers()) {
@@ -463,8 +467,8 @@ void WorkerMachine::State::Tend() {
   ReportFetchFailures();
   if (!ended) KeepTime();
   if (worker != 0) {
-    boxes.RequestChunks(renders.BoxesInOrder(), epoch, worker, now, actions);
-    renders.StartNext(actions);
+    boxes.RequestChunks(renders.BoxesInTurn(), !renders.AnyPaused(), epoch, worker, now, actions);
+    renders.StartNext(now, actions);
   }
   boxes.Trim(actions);
   wake = NextWake();
@@ -483,7 +487,7 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
 Time WorkerMachine::State::NextWake() const {
   if (ended) return Time::max();
   if (worker == 0) return next_register;
-  return std::min({next_heartbeat, last_heard + timeout, boxes.NextExpiry(), leave_by.value_or(Time::max())});
+  return std::min({next_heartbeat, last_heard + timeout, boxes.NextExpiry(), renders.NextTurn(), leave_by.value_or(Time::max())});
 }
 
 Time WorkerMachine::NextWake() const { return state_->wake; }

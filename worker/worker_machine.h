@@ -12,7 +12,8 @@
 // A group on this worker:
 //   GroupAssignment   fetch the voxels of its boxes that no cached padded box holds (chunk requests within the byte credit); a box that is
 //                     entirely hidden needs none: its rank holds an empty image at once
-//   box complete      ranks are rendered one after the other, groups in order of frame and group
+//   box complete      ranks are rendered: those of a client one after the other, groups in order of frame and group. The clients take
+//                     turns, also in the midst of a rank (RenderQueue)
 //   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
 //   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
@@ -21,9 +22,10 @@
 // finished frames and older attempts are dropped. A second copy of any message changes nothing.
 //
 // The executor must: run StartRender, StartCombine, FindHidden and StoreChunk on other threads and answer each with exactly one event; run
-// StartCombine, FindHidden, SendPartial and SendFrame in the order given; drop messages of the images plane that come with another key than
-// their sender's (FindPeer); call Step(Tick) no later than NextWake(). If it calls late, the machine assumes that its own process was held
-// up (stopped), and gives the coordinator as much more time: messages not read meanwhile do not mean that the coordinator was silent.
+// StartCombine, FindHidden, SendPartial and SendFrame of a client in the order given, and not let those of another one wait for them; drop
+// messages of the images plane that come with another key than their sender's (FindPeer); call Step(Tick) no later than NextWake(). If it
+// calls late, the machine assumes that its own process was held up (stopped), and gives the coordinator as much more time: messages not
+// read meanwhile do not mean that the coordinator was silent.
 #pragma once
 
 #include <algorithm>
@@ -187,6 +189,7 @@ struct DropBox {
 };
 // Renders a picture and stores it under the handle `image`, unless it fails.
 struct StartRender {
+  ClientId client = 0;
   GroupKey key;
   Rank rank = 0;
   BoxKey padded;
@@ -195,13 +198,22 @@ struct StartRender {
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
 };
+// Of a started render, by its image, for which RenderDone has not come. PauseRender: it stops soon, between two of its pieces, and keeps
+// what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.
+struct PauseRender {
+  ImageHandle image = 0;
+};
+struct ResumeRender {
+  ImageHandle image = 0;
+};
 struct CancelRender {
-  GroupKey key;
-};  // the running one, if it belongs to this group; RenderDone still comes
+  ImageHandle image = 0;
+};
 // Combines `other` (if 0: the incoming image; none is an empty one) into `image`. If `image` names no image yet, it becomes a copy of the
 // other one. Only the pixels of `pixels` count in the other one: an image may hold pixels that have been passed on. `other` stays unchanged
 // and needs its own release. -> CombineDone
 struct StartCombine {
+  ClientId client = 0;
   GroupKey key;
   ImageHandle image = 0;
   ImageHandle other = 0;
@@ -214,6 +226,7 @@ struct StartCombine {
 };
 // Finds the hidden tiles of `image`, a frame that has accumulated the groups up to `key`. `known`: the last hidden tiles. -> HiddenFound
 struct FindHidden {
+  ClientId client = 0;
   GroupKey key;
   ImageHandle image = 0;
   std::shared_ptr<const FrameSetup> setup;
@@ -228,6 +241,7 @@ struct Delivery {
 // Sends message.pixels of `image`. Fills in how they travel, and adds bytes and times of messages to the reports of this worker's ranks. ->
 // SendFailed, or nothing.
 struct SendPartial {
+  ClientId client = 0;
   std::shared_ptr<const Peer> to;
   PartialImage message;
   ImageHandle image = 0;
@@ -264,6 +278,7 @@ struct ForgetGroups {
 // Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator. -> SendFailed, or
 // nothing.
 struct SendFrame {
+  ClientId client = 0;
   FrameImage message;
   ImageHandle image = 0;
   std::shared_ptr<const FrameSetup> setup;
@@ -276,16 +291,16 @@ struct ReleaseImage {
 struct StopProcess {
   std::uint32_t rendered_ranks = 0;  // since the process began: for the log
 };
-using WorkerAction =
-    std::variant<SendControl, SendChunkRequest, ConnectVoxels, OpenBox, StoreChunk, DropBox, StartRender, CancelRender, StartCombine,
-                 FindHidden, SendPartial, ResendImage, AnswerPeer, AdmitKeys, ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
+using WorkerAction = std::variant<SendControl, SendChunkRequest, ConnectVoxels, OpenBox, StoreChunk, DropBox, StartRender, PauseRender,
+                                  ResumeRender, CancelRender, StartCombine, FindHidden, SendPartial, ResendImage, AnswerPeer, AdmitKeys,
+                                  ForgetGroups, SendFrame, ReleaseImage, StopProcess>;
 using WorkerActions = std::vector<WorkerAction>;
 
 // Entries in the machine's tables. At rest, all but those of cached padded boxes are 0.
 struct WorkerSizes {
   std::size_t frames = 0, cancelled = 0;
   std::size_t early_images = 0;  // groups that images have come for too early
-  std::size_t renders = 0;       // waiting, or running
+  std::size_t renders = 0;       // waiting, running or paused
   std::size_t chunk_requests = 0;
   std::size_t boxes = 0;
 };

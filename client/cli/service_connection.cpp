@@ -61,7 +61,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
   }
   if (connection.unasked) {
-    PrintNote(fmt::format("no service is named and none runs here, so this process renders {} itself, as with --local",
+    PrintNote(fmt::format("no service is named and none runs here, so this process works on {} itself, as with --local",
                           Printable(sources.front())));
   }
   return OpenLocal(connection, std::move(files));

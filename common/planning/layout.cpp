@@ -94,6 +94,8 @@ struct LayoutMaker::State {
                                        .shape = shape});
   }
 
+  bool stopped() const { return request.stop.stop_requested(); }
+
   bool BoxesFit(const Partition& partition) {
     const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
     return std::ranges::all_of(partition.boxes(), [&](const Box& box) {
@@ -183,12 +185,12 @@ struct LayoutMaker::State {
   Layout MakeByPredictedCost(const ResolvedPolicy& policy, int groups) {
     constexpr int kCuts = 2, kResizings = 3;
     std::optional<Refined> best;
-    for (int shape = 0; shape < policy.decomposition->shapes; ++shape) {
+    for (int shape = 0; shape < policy.decomposition->shapes && (shape == 0 || !stopped()); ++shape) {
       Refined refined(fields.Grid());
-      for (int cut = 0; cut < kCuts; ++cut) Refine(policy, groups, shape, nullptr, refined);
+      for (int cut = 0; cut < kCuts && (cut == 0 || !stopped()); ++cut) Refine(policy, groups, shape, nullptr, refined);
       if (!best || refined.frame < best->frame) best.emplace(std::move(refined));
     }
-    for (int i = 0; i < kResizings; ++i) {
+    for (int i = 0; i < kResizings && !stopped(); ++i) {
       const Partition of = best->best.partition;
       Refine(policy, groups, 0, &of, *best);
     }
@@ -209,7 +211,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
   const int most = MostGroups(state_->request, policy);
   const WorkField& work = state_->fields.Of(policy.balance_by);
   int groups = 1;
-  while (groups < most && !state_->BoxesFit(state_->MakePartition(policy, groups, work))) ++groups;
+  while (groups < most && !state_->stopped() && !state_->BoxesFit(state_->MakePartition(policy, groups, work))) ++groups;
   return groups;
 }
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <vector>
 
 #include "common/decomposition/partition.h"
@@ -42,6 +43,7 @@ struct LayoutRequest {
   std::int64_t box_bytes_target = kBoxBytesTarget;
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
+  std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped
 };
 
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their

@@ -119,6 +119,7 @@ void Fields(auto& io, Is<GroupAssignment> auto& m) {
   io.Range("first_group", m.first_group, &P::first_group, &P::set_first_group, 0, m.key.group);
   io.Any(m.previews, &P::previews, &P::set_previews);
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.key.group);
+  io.Any(m.client, &P::client, &P::set_client);
   io.Range("display", m.display, &P::display, &P::set_display, 1, kMaxWorkerId);
   io.Message("setup", m.setup, &P::setup, &P::mutable_setup);
   io.Message("group", m.group, &P::group, &P::mutable_group);

@@ -106,6 +106,7 @@ struct GroupAssignment {
   std::vector<Peer> peers;        // every worker of the group, and the display worker
   OcclusionMask hidden;           // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
   std::uint32_t groups_done = 0;  // of the frame, at most key.group: accumulated, so images lent for them have been read
+  ClientId client = 0;            // whom the frame is for: a worker shares its time among clients
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 

@@ -11,6 +11,7 @@ using Epoch = std::uint64_t;        // random; one coordinator incarnation
 using Incarnation = std::uint64_t;  // random; one registration of a worker process: what it held before is gone
 using RequestId = std::uint64_t;    // chosen by the client, unique within its connection
 using FrameId = std::uint64_t;      // ascending within an epoch
+using ClientId = std::uint64_t;     // whom a frame is for, within an epoch
 
 // One group of one attempt at a frame. A re-plan raises `attempt`; messages of an older attempt are dropped.
 struct GroupKey {

@@ -51,7 +51,8 @@ class Search {
                   .volume = &question.resolved->volume,
                   .slots = question.slots,
                   .box_bytes_target = question.box_bytes_target,
-                  .known = question.known}),
+                  .known = question.known,
+                  .stop = question.stop}),
         predictor_(predictor),
         asked_(*question.open),
         open_partition_(asked_.decomposition == kAutomatic),
@@ -120,6 +121,7 @@ class Search {
   void ChooseScheme() {
     if (!prediction_) return;
     for (const std::string& scheme : SchemesToTry()) {
+      if (question_.stop.stop_requested()) return;
       ResolvedPolicy policy = best_;
       policy.combine = scheme;
       if (const auto prediction = predictor_.Predict(prepared_, scheme)) Consider(policy, *prediction, kLeastGain);
@@ -128,6 +130,7 @@ class Search {
 
   // Layouts that have been tried under another name are not tried again. `schemes`: under all kPartitionSchemes, if the scheme is open.
   void TryLayout(const ResolvedPolicy& policy, bool schemes) {
+    if (question_.stop.stop_requested()) return;
     Layout layout = layouts_.Make(policy);
     if (std::ranges::find(tried_, layout) != tried_.end()) return;
     tried_.push_back(layout);
@@ -142,7 +145,7 @@ class Search {
     bool better = prediction && Consider(policy, *prediction, least_gain);
     if (better) stands_in_ = stands_in;
     for (const char* const scheme : kPartitionSchemes) {
-      if (!schemes || asked_.combine != kAutomatic || scheme == policy.combine) continue;
+      if (!schemes || asked_.combine != kAutomatic || scheme == policy.combine || question_.stop.stop_requested()) continue;
       ResolvedPolicy other = policy;
       other.combine = scheme;
       prediction = predictor_.Predict(prepared, scheme);
@@ -190,6 +193,16 @@ Policy FixedPolicy(Policy policy) {
   if (policy.combine == kAutomatic) policy.combine = defaults.combine;
   policy.balance_by = BalanceByOf(policy);
   return policy;
+}
+
+Policy FirstPolicy(Policy policy, std::size_t workers) {
+  constexpr std::size_t kManyWorkers = 8;
+  if (policy.decomposition == kAutomatic) {
+    policy.decomposition = "kd-tree";
+    if (policy.balance_by == kAutomatic) policy.balance_by = NameOf(BalanceBy::kOccupied);
+  }
+  if (policy.combine == kAutomatic && workers >= kManyWorkers) policy.combine = "radix-k";
+  return FixedPolicy(std::move(policy));
 }
 
 PolicyChoice ChoosePolicy(const PolicyQuestion& question) {

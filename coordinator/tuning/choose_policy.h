@@ -14,6 +14,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <stop_token>
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
@@ -33,7 +34,8 @@ struct PolicyQuestion {
   double render_scale = 1;  // measured / predicted time of boxes so far; > 0
   // The present policy, if any; it fits the open one. It stays unless another one gains the share least_gain.
   const ResolvedPolicy* now = nullptr;
-  double least_gain = 0;  // [0, 1)
+  double least_gain = 0;      // [0, 1)
+  std::stop_token stop = {};  // once it is told to stop, the choice comes soon, and is of no use but to be dropped
 };
 
 struct PolicyChoice {
@@ -51,6 +53,10 @@ bool LeavesChoice(const Policy& policy, const MachineModel& machine, std::size_t
 
 // The policy of a frame if nothing is chosen: open names are as in Policy{}.
 Policy FixedPolicy(Policy policy);
+
+// What to begin with where a policy leaves a choice, until it is made: a kd-tree by occupied voxels, and a tree of images or, for many
+// workers, radix-k. Bricks alone tell enough to cut it.
+Policy FirstPolicy(Policy policy, std::size_t workers);
 
 PolicyChoice ChoosePolicy(const PolicyQuestion& question);
 

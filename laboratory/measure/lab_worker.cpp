@@ -25,13 +25,13 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
     if (cells_ != nullptr) layers.cells = std::make_shared<const Mesh>(cells_->Cut(padded_box));
     padded = std::make_unique<BoxData>(BrickedVoxels(CutBlock(volume_.block, padded_box)), std::move(layers));
   }
-  const std::atomic<bool> cancelled = false;
+  RenderControl control;
   BoxRendering rendering;
   tbb::task_arena one_thread(1);
   one_thread.execute([&] {
     const Time begin = MonotonicNow();
     rendering.processor_seconds =
-        SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, {}, cancelled, rendering.report).value(); });
+        SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, {}, control, rendering.report).value(); });
     rendering.seconds = double((MonotonicNow() - begin).count()) * 1e-9;
   });
   return rendering;

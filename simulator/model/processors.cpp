@@ -39,6 +39,15 @@ void Processors::EndNow(std::uint32_t host, std::uint64_t task, double now) {
   Predict(host);
 }
 
+double Processors::Stop(std::uint32_t host, std::uint64_t task, double now) {
+  AdvanceTo(hosts_[host], now);
+  const auto stopped = std::ranges::find(hosts_[host].tasks, task, &Task::name);
+  const double left = std::max(stopped->left, 0.0);
+  hosts_[host].tasks.erase(stopped);
+  Predict(host);
+  return left;
+}
+
 double Processors::NextTime() {
   while (!forecasts_.empty() && forecasts_.top().generation != hosts_[forecasts_.top().host].generation) forecasts_.pop();
   return forecasts_.empty() ? std::numeric_limits<double>::infinity() : forecasts_.top().time;

@@ -20,6 +20,9 @@ class Processors {
   // A task that runs there is done now: Finish comes next to it, but for others that end now.
   void EndNow(std::uint32_t host, std::uint64_t task, double now);
 
+  // A task that runs there stops. Returns what it would have taken, if nothing slowed it down.
+  double Stop(std::uint32_t host, std::uint64_t task, double now);
+
   struct Completion {
     double time = 0;
     std::uint64_t task = 0;

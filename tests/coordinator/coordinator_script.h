@@ -222,7 +222,9 @@ class CoordinatorScript {
   Actions Plan() {
     const PlanRequest request = std::move(plans.front());
     plans.erase(plans.begin());
-    return Step(Planned{request.plan, planner.Plan(request)});
+    const auto planned = planner.Plan(request);
+    planner.Choose(request.client, {});
+    return Step(Planned{request.plan, planned});
   }
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {
     return Step(FromWorker{from.token, std::move(message), std::move(payload)});

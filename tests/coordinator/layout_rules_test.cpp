@@ -214,9 +214,31 @@ class ChoiceScript : public BalanceScript {
   }
 };
 
+TEST(CoordinatorPolicies, TheFirstFrameOfAnOpenPolicyWaitsForNoCountAndNoChoice) {
+  ChoiceScript script;
+  script.Join(21, 21);
+  const std::vector<GroupAssignment> begun = HandedOut(script.Submit(kFarClient, OpenFrame(1)));
+  ASSERT_EQ(begun.size(), 1U) << "it waits for something";
+  ASSERT_EQ(script.counts.size(), 1U);
+  script.Step(OccupiedCounted{script.counts[0].count, Status::ResourceExhausted("no memory")});
+  const auto replies = ToClients<FrameReply>(script.AnswerAll(script.Answer(begun[0])));
+  ASSERT_EQ(replies.size(), 1U) << "a failed count fails only what needs it";
+  EXPECT_EQ(replies[0].message.statistics.decomposition, "kd-tree");
+  EXPECT_EQ(replies[0].message.statistics.balance_by, "occupied");
+  EXPECT_EQ(replies[0].message.statistics.combine, "fan-in");
+  EXPECT_FALSE(replies[0].message.statistics.predicted);
+}
+
 TEST(CoordinatorPolicies, AnOpenPolicyIsFilledInAndPredicted) {
   ChoiceScript script;
-  const FrameStatistics statistics = script.StatisticsOf(OpenFrame(1), 1);
+  const auto frame = [](RequestId request) {
+    SubmitFrame submit = OpenFrame(request);
+    submit.frame.view.azimuth_degrees = 0;
+    return submit;
+  };
+  script.StatisticsOf(frame(11), 1);  // while voxels are counted
+  script.StatisticsOf(frame(12), 1);  // while the choice is made
+  const FrameStatistics statistics = script.StatisticsOf(frame(13), 1);
   for (const std::string& name : {statistics.decomposition, statistics.balance_by, statistics.assignment, statistics.combine}) {
     EXPECT_NE(name, "auto");
     EXPECT_NE(name, "");
@@ -232,7 +254,7 @@ TEST(CoordinatorPolicies, AChoiceStaysWhileViewsChange) {
   for (RequestId request = 1; request < 14; ++request) {
     const std::vector<Box> now = script.Play(OpenFrame(request), 1);
     // Once costs are known, another partition must gain a lot; here nothing can.
-    if (request > 1) {
+    if (request > 3) {
       EXPECT_EQ(now, boxes) << "frame " << request;
     }
     boxes = now;
@@ -242,11 +264,12 @@ TEST(CoordinatorPolicies, AChoiceStaysWhileViewsChange) {
 TEST(CoordinatorPolicies, WhatHappenedCorrectsThePrediction) {
   ChoiceScript script;
   double predicted = 0, happened = 0;
-  for (RequestId request = 1; request < 10; ++request) {
+  for (RequestId request = 1; request < 20; ++request) {
     SubmitFrame submit = OpenFrame(request);
     submit.frame.view.azimuth_degrees = 0;
     const FrameStatistics statistics = script.StatisticsOf(submit, 1);
-    ASSERT_TRUE(statistics.predicted);
+    if (request < 3) continue;  // the choice is made beside these
+    ASSERT_TRUE(statistics.predicted) << "frame " << request;
     predicted = statistics.predicted->render_seconds;
     happened = 0;
     for (const RankReport& report : statistics.reports) {

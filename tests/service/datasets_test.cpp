@@ -101,7 +101,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
     BoxData data(CutBlock(volume_->block, volume_->block.box), BoxLayers{BrickedVoxels(layers.labels->block), {}});
     RankReport report;
     LocalImage frame =
-        MakeRenderer(*plan.setup.renderer)->Render(data, volume_->block.box, plan.setup, {}, std::atomic<bool>(false), report).value();
+        MakeRenderer(*plan.setup.renderer)->Render(data, volume_->block.box, plan.setup, {}, RenderControl(), report).value();
     return FinishPicture(frame, plan.setup);
   };
   const auto expect_shows = [&](const LocalImage& image) {

@@ -79,11 +79,11 @@ std::uint64_t DrawnBehindWithoutMasks(const FrameRequest& request, const Volume&
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
   BoxData data(std::move(copy));
-  const std::atomic<bool> cancelled = false;
+  RenderControl control;
   RankReport report;
   for (std::size_t group = 2; group < plan.groups.size(); ++group) {
     for (const Placement& placement : plan.groups[group].placements) {
-      EXPECT_TRUE(MakeRenderer(*plan.setup.renderer)->Render(data, placement.box, plan.setup, {}, cancelled, report).ok());
+      EXPECT_TRUE(MakeRenderer(*plan.setup.renderer)->Render(data, placement.box, plan.setup, {}, control, report).ok());
     }
   }
   return report.drawn_voxels;

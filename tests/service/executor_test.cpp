@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <semaphore>
 
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
@@ -14,6 +15,7 @@
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
+#include "worker/renderers/for_each_piece.h"
 
 namespace slabstream {
 namespace {
@@ -40,12 +42,12 @@ class ExecutorTest : public testing::Test {
     return outputs_.NextEvent<CombineDone>();
   }
   // What the image would be sent as: its pixels.
-  LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}) {
+  LocalImage PixelsOf(ImageHandle image, PixelRange pixels = {0, 16 * 8}, const PixelBounds& frame = kFrame) {
     executor_.Perform(
         SendPartial{.to = std::make_shared<Peer>(),
                     .message = {.epoch = 1, .from_worker = 1, .key = kKey, .interval = {0, 1}, .pixels = pixels, .reports = {RankReport{}}},
                     .image = image,
-                    .frame = kFrame});
+                    .frame = frame});
     const auto sent = std::get<OutgoingPartial>(outputs_.Next());
     const AnyMessage message = Decode(sent.header).value();
     const auto& partial = std::get<PartialImage>(message);
@@ -144,9 +146,9 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
                                    .frame = frame});
   };
   combine({0, 0, 20, 8}, 1);
-  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  executor_.Perform(FindHidden{0, kKey, 1, shared, {}});
   combine({30, 0, 40, 8}, 1);
-  executor_.Perform(FindHidden{kKey, 1, shared, {}});
+  executor_.Perform(FindHidden{0, kKey, 1, shared, {}});
   EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
   const auto first = outputs_.NextEvent<HiddenFound>();
   EXPECT_EQ(first.image, 1U);
@@ -158,7 +160,7 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
 
 TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
   EXPECT_TRUE(CombineIncoming(1, MakeLocalImage(PixelFormat::kDepth, {0, 0, 8, 4}), Side::kBack).status.ok());
-  executor_.Perform(FindHidden{kKey, 1, std::make_shared<const FrameSetup>(), {}});
+  executor_.Perform(FindHidden{0, kKey, 1, std::make_shared<const FrameSetup>(), {}});
   EXPECT_TRUE(outputs_.NextEvent<HiddenFound>().hidden.empty());
 }
 
@@ -225,7 +227,7 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
 
   const auto setup = std::make_shared<const FrameSetup>(plan.setup);
   executor_.Perform(StartRender{.key = kKey, .padded = padded, .placement = {.box = padded.box, .worker = 1}, .setup = setup, .image = 1});
-  executor_.Perform(CancelRender{kKey});
+  executor_.Perform(CancelRender{1});
   auto done = outputs_.NextEvent<RenderDone>();
   EXPECT_EQ(done.image, 1U);
   EXPECT_TRUE(done.status.ok() || done.status.code() == StatusCode::kCancelled) << done.status.message();
@@ -240,6 +242,126 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   EXPECT_TRUE(done.status.ok()) << done.status.message();
   EXPECT_GT(done.box_bytes, 0U);
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
+}
+
+// Renders small frames at once. Larger ones have three pieces, each of which says that it has begun and then waits until it may end.
+class StepwiseRenderer : public Renderer {
+ public:
+  struct Steps {
+    std::counting_semaphore<> begun{0}, may_end{0};
+  };
+  explicit StepwiseRenderer(Steps& steps) : steps_(steps) {}
+
+  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
+                            RankReport&) override {
+    if (FrameBounds(setup).pixel_count() >= 64 * 64) {
+      ForEachPiece(3, control, [this](std::int32_t) {
+        steps_.begun.release();
+        steps_.may_end.acquire();
+      });
+    }
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
+    return MakeLocalImage(setup.format, {});
+  }
+
+ private:
+  Steps& steps_;
+};
+
+TEST(ExecutorPauses, ARenderThatPausesLetsThatOfAnotherClientPass) {
+  StepwiseRenderer::Steps steps;
+  Outputs outputs;
+  Executor executor(outputs.outbox, Codec::kRaw, 1, [&](const RendererKind&) { return std::make_unique<StepwiseRenderer>(steps); });
+  const std::shared_ptr<const Volume> volume = TestSphere(8);
+  const auto start = [&](ClientId client, std::int32_t size, ImageHandle image) {
+    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = image};
+    executor.Perform(OpenBox{padded});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
+    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+    executor.Perform(StoreChunk{padded, chunk, payload});
+    ASSERT_TRUE(outputs.NextEvent<ChunkStored>().status.ok());
+    FrameRequest request = TestRequest(FindRenderer("mip"), 20);
+    request.size = {size, size};
+    const auto setup = std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
+    executor.Perform(StartRender{
+        .client = client, .key = kKey, .padded = padded, .placement = {.box = padded.box, .worker = 1}, .setup = setup, .image = image});
+  };
+  start(1, 64, 1);
+  steps.begun.acquire();
+  executor.Perform(PauseRender{1});
+  steps.may_end.release(3);
+  for (ImageHandle small = 2; small < 5; ++small) {
+    start(2, 1, small);
+    EXPECT_EQ(outputs.NextEvent<RenderDone>().image, small) << "the other one goes on";
+  }
+  EXPECT_FALSE(steps.begun.try_acquire()) << "a piece begins in a pause";
+  executor.Perform(ResumeRender{1});
+  const RenderDone done = outputs.NextEvent<RenderDone>();
+  EXPECT_EQ(done.image, 1U);
+  EXPECT_TRUE(done.status.ok()) << done.status.message();
+
+  start(1, 64, 5);
+  executor.Perform(PauseRender{5});
+  executor.Perform(CancelRender{5});
+  steps.may_end.release(3);
+  EXPECT_EQ(outputs.NextEvent<RenderDone>().status.code(), StatusCode::kCancelled) << "a render that pauses can be cancelled";
+}
+
+// Two transfer functions, so that each derives something else from the voxels.
+TEST_F(ExecutorTest, RendersOfTwoClientsFromOneBoxAreAsEachAlone) {
+  const std::shared_ptr<const Volume> volume = TestSphere(24);
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->Can(Ability::kCells)) continue;
+    SCOPED_TRACE(renderer->name());
+    std::array<std::shared_ptr<const FrameSetup>, 2> setups;
+    for (int client = 0; client < 2; ++client) {
+      FrameRequest request = TestRequest(renderer, 40);
+      request.view.azimuth_degrees = 30 + 80 * client;
+      request.transfer.choice = TransferFunction{.colors = {{0, {0, 0, 0}}, {255, {1, 1, 1}}},
+                                                 .opacities = {{0, 0}, {60.0 + 90 * client, 0}, {61.0 + 90 * client, 1}, {255, 1}}};
+      setups.at(std::size_t(client)) =
+          std::make_shared<const FrameSetup>(PlanFrame(request, 1, Summarize(*volume), Roster{{1}}).value().setup);
+    }
+    const BoxKey padded{.dataset = 1, .box = volume->block.box, .types = volume->block.type, .generation = 1};
+    executor_.Perform(OpenBox{padded, {}});
+    Chunk chunk{.epoch = 1, .dataset = 1, .box = padded.box, .chunk = 0};
+    const Bytes payload = PackChunk(Bytes(volume, volume->block.bytes), Codec::kRaw, chunk);
+    executor_.Perform(StoreChunk{padded, chunk, payload});
+    ASSERT_TRUE(outputs_.NextEvent<ChunkStored>().status.ok());
+
+    ImageHandle image = 0;
+    const auto start = [&](ClientId client) {
+      executor_.Perform(StartRender{.client = client,
+                                    .key = kKey,
+                                    .padded = padded,
+                                    .placement = {.box = padded.box, .worker = 1},
+                                    .setup = setups.at(client),
+                                    .image = ++image});
+    };
+    const auto pixels_of = [&](ImageHandle rendered) {
+      const PixelBounds frame = FrameBounds(*setups[0]);
+      return PixelsOf(rendered, {0, std::uint64_t(frame.pixel_count())}, frame);
+    };
+    std::vector<LocalImage> alone;
+    for (const ClientId client : {0, 1}) {
+      start(client);
+      ASSERT_TRUE(outputs_.NextEvent<RenderDone>().status.ok());
+      alone.push_back(pixels_of(image));
+      EXPECT_FALSE(alone.back().bounds.empty());
+    }
+    for (int round = 0; round < 8; ++round) {
+      start(0);
+      start(1);
+      for (int each = 0; each < 2; ++each) ASSERT_TRUE(outputs_.NextEvent<RenderDone>().status.ok());
+      for (const ClientId client : {0, 1}) {
+        const LocalImage beside = pixels_of(image - 1 + client);
+        EXPECT_EQ(beside.bounds, alone[client].bounds);
+        EXPECT_EQ(beside.rgba, alone[client].rgba);
+      }
+    }
+    for (; image > 0; --image) executor_.Perform(ReleaseImage{image});
+    executor_.Perform(DropBox{padded});
+  }
 }
 
 TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {

@@ -45,9 +45,9 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   BoxLayers layers;
   layers.cells = volume.cells;
   BoxData data(std::move(copy), std::move(layers));
-  const std::atomic<bool> cancelled = false;
+  RenderControl control;
   RankReport report;
-  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(data, volume.block.box, plan->setup, {}, cancelled, report);
+  Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(data, volume.block.box, plan->setup, {}, control, report);
   CHECK(image.ok()) << image.status().message();
   return FinishPicture(*std::move(image), plan->setup);
 }

@@ -188,7 +188,8 @@ class TwoExecutors : public testing::Test {
       return outputs.NextEvent<CombineDone>().status;
     }
     std::pair<PartialImage, Bytes> Send(ImageHandle image, bool lend) {
-      executor.Perform(SendPartial{std::make_shared<Peer>(Peer{2, "inproc://two", 7}),
+      executor.Perform(SendPartial{0,
+                                   std::make_shared<Peer>(Peer{2, "inproc://two", 7}),
                                    {.epoch = 1, .from_worker = 1, .key = kKey, .step = 4, .interval = {0, 1}, .pixels = kWhole},
                                    image,
                                    kFrame,

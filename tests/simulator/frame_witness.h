@@ -28,6 +28,7 @@ class FrameWitness {
  private:
   // What the coordinator handed out for a frame.
   struct SeenFrame {
+    ClientId client = 0;
     std::uint32_t group_count = 0;
     std::uint32_t attempt = 0;
     FrameSetup setup;
@@ -46,6 +47,7 @@ class FrameWitness {
     }
   };
 
+  std::size_t OthersThan(ClientId client) const;
   void CheckHidden(const GroupAssignment& assignment, const SeenFrame& frame);
 
   const bool faultless_;

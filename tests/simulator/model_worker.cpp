@@ -116,22 +116,27 @@ void ModelWorker::Perform(const DropBox& action) {
     for (const OpenBox::Copy& copy : padded.copied)
       EXPECT_TRUE(padded.rendered || copy.from != action.padded) << "a padded box is dropped that is copied from";
   }
-  EXPECT_NE(rendering_, action.padded) << "a padded box is dropped while it is rendered from";
+  for (const auto& [image, rendering] : rendering_)
+    EXPECT_NE(rendering.padded, action.padded) << "a padded box is dropped while it is rendered from";
 }
 
 double ModelWorker::Begin(Job&, const StartRender& action) {
-  EXPECT_FALSE(rendering_.has_value()) << "two renders at a time";
+  for (const auto& [image, rendering] : rendering_) {
+    EXPECT_NE(rendering.client, action.client) << "two renders of a client at a time";
+    tally_.Add(Count::kRendersBesideOthers);
+  }
   EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
   EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.box, *action.setup))) << "a padded box without the voxels of its box";
   EXPECT_EQ(action.padded.dataset, action.setup->dataset);
-  rendering_ = action.padded;
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);
-  render_seconds_ = speed_.render * random_.Real(0.5, 2);
-  return render_seconds_;
+  const bool large = std::uint64_t(FrameBounds(*action.setup).pixel_count()) >= kLargePixels;
+  const double seconds = speed_.render * random_.Real(0.5, 2) * (large ? speed_.large : 1);
+  rendering_[action.image] = {action.client, action.padded, seconds};
+  return seconds;
 }
 
 RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
-  rendering_.reset();
+  const double render_seconds = rendering_.extract(render.image).mapped().seconds;
   Status status;
   if (cancelled) {
     status = Status::Cancelled("render");
@@ -149,7 +154,7 @@ RenderDone ModelWorker::Rendered(const StartRender& render, bool cancelled) {
     images_.FailRender(render.image);
   }
   RankReport report;
-  report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds_ * 1e9);
+  report.stage_ns[std::size_t(Stage::kRender)] = std::int64_t(render_seconds * 1e9);
   return {render.key, render.rank, render.image, std::move(status), report, std::uint64_t(render.padded.box.voxel_count()) * 2};
 }
 

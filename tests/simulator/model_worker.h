@@ -21,6 +21,7 @@ inline constexpr ScalarType kVoxelType = ScalarType::kFloat32;  // of the only v
 
 struct WorkerSpeed {
   double render = 0, combine = 0, store = 0, finish = 0;  // seconds
+  double large = 1;                                       // times as long renders a box of a large frame
 };
 
 class ModelWorker {
@@ -93,8 +94,12 @@ class ModelWorker {
   bool has_memory_ = true;
 
   SymbolicImages images_;
-  std::optional<BoxKey> rendering_;
-  double render_seconds_ = 0;                    // of that
+  struct Rendering {
+    ClientId client = 0;
+    BoxKey padded;
+    double seconds = 0;
+  };
+  std::map<ImageHandle, Rendering> rendering_;   // begun and not ended, paused or not
   std::map<ImageHandle, OcclusionMask> hidden_;  // found, and not yet told
   std::map<BoxKey, ModelBox> boxes_;             // that are open
   std::map<ChunkName, Outstanding> requested_;   // and not yet stored, as the credit counts

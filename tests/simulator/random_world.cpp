@@ -1,5 +1,6 @@
 #include "tests/simulator/random_world.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -53,6 +54,8 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   SimulatedWorld world;
   MakeVolume(random, cells, world);
   world.speed.render = random.Chance(0.1) ? 0.3 : random.Real(0.001, 0.04);
+  // A box takes less time than a frame may be without progress, also if all clients have one.
+  if (random.Chance(0.3)) world.speed.large = std::max(1.0, std::min(random.Real(5, 20), 0.3 / world.speed.render));
   world.speed.combine = random.Real(10e-6, 5e-3);
   world.speed.store = random.Real(10e-6, 1e-3);
   world.speed.finish = random.Real(10e-6, 20e-3);

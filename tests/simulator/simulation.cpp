@@ -14,7 +14,9 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr std::uint32_t kDeadlineMs = 60000;
+// Frames of several clients share the workers and end together, each after about as much time as all of them take: more than a minute
+// where boxes take long and each frame keeps only one worker busy at a time.
+constexpr std::uint32_t kDeadlineMs = 120000;
 constexpr Duration kBound = milliseconds(kDeadlineMs) + seconds(30);  // until every request has ended, from the last one on
 constexpr Duration kTroubled = seconds(5);                            // requests are made and things break in this time
 constexpr Duration kSettleSlowly = seconds(90);                       // and for what was begun slowly
@@ -399,6 +401,7 @@ void Simulation::Perform(const CountDataset& action) {
 // Plans come late, and not always in the order in which they were asked for.
 void Simulation::Perform(const PlanRequest& action) {
   Planned planned{action.plan, planner_->Plan(action)};
+  planner_->Choose(action.client, {});
   if (random_.Chance(current_.fail_load / 5)) planned.frame = Status::ResourceExhausted("not enough memory to plan");
   service_.TellCoordinator(service_.now() + random_.Real(0, faults_.none() ? 200e-6 : 0.1), std::move(planned));
 }

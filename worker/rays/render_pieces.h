@@ -1,7 +1,6 @@
 // RenderPieces: the image of a box, from the pieces that kernels can address (RayPiece).
 #pragma once
 
-#include <atomic>
 #include <span>
 #include <utility>
 
@@ -18,7 +17,7 @@ struct RayFrame {
   const FrameSetup& setup;
   const ViewRays& rays;
   const OcclusionMask& hidden;
-  const std::atomic<bool>& cancelled;
+  const RenderControl& control;
   RankReport& report;
 };
 
@@ -34,7 +33,7 @@ LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame,
     if (part.empty()) continue;
     const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera);
     LocalImage layer = MakeLocalImage(setup.format, box.reach.pixels);
-    RenderTiles(layer, frame.hidden, frame.cancelled, frame.report,
+    RenderTiles(layer, frame.hidden, frame.control, frame.report,
                 [&](const PixelBounds& tile, float* pixels, std::size_t floats_a_row) { render(number, box, tile, pixels, floats_a_row); });
     if (image.bounds.empty()) {
       image = std::move(layer);

@@ -5,17 +5,16 @@
 namespace slabstream {
 
 const VoxelBlock& BoxData::voxels() const {
-  if (bricks_) {
-    block_ = MakeVoxelBlock(bricks_->grid().box, bricks_->type());
-    bricks().Read(block_.box, 0, block_.bytes);
-    bricks_.reset();
+  if (samples_.block == nullptr) {
+    samples_ = {};  // first, so that others' bricks may go
+    samples_ = voxels_->Block();
   }
-  return block_;
+  return *samples_.block;
 }
 
 ScalarType BoxData::widest_type() const {
   ScalarType widest = bricks().type();
-  for (const auto* layer : {&layers_.labels, &layers_.overlay}) {
+  for (const auto* layer : {&layers().labels, &layers().overlay}) {
     if (*layer && BytesPerSample((*layer)->type()) > BytesPerSample(widest)) widest = (*layer)->type();
   }
   return widest;
@@ -36,10 +35,8 @@ const ClassificationTable& BoxData::Classification(const FrameSetup& setup) {
   return table_;
 }
 
-std::size_t BoxData::bytes() const {
-  std::size_t total = block_.bytes.capacity() + (bricks_ ? bricks_->bytes() : 0) + (ranges_ ? ranges_->bytes() : 0);
-  for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
-  if (layers_.cells != nullptr) total += layers_.cells->bytes();
+std::size_t BoxData::derived_bytes() const {
+  std::size_t total = ranges_ ? ranges_->bytes() : 0;
   total += table_.opacity.capacity() * sizeof(float) + table_.color.capacity() * sizeof(Rgb);
   for (const auto& [type, cache] : caches_) total += cache->bytes();
   return total;

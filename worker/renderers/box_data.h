@@ -1,4 +1,5 @@
-// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it.
+// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it; renders of the same
+// box at a time have a BoxData each, of the same voxels.
 #pragma once
 
 #include <concepts>
@@ -12,8 +13,7 @@
 
 #include "common/classification/classification_table.h"
 #include "common/frame/frame_setup.h"
-#include "common/mesh/mesh.h"
-#include "common/volume/bricks.h"
+#include "worker/renderers/box_voxels.h"
 #include "worker/renderers/brick_ranges.h"
 
 namespace slabstream {
@@ -25,24 +25,23 @@ class BoxCache {
   virtual std::size_t bytes() const = 0;  // memory
 };
 
-// nullopt, null: the dataset has no such layer.
-struct BoxLayers {
-  std::optional<BrickedVoxels> labels, overlay;
-  std::shared_ptr<const Mesh> cells;  // those that touch the box, in the order of the whole grid; perhaps others
-};
-
 class BoxData {
  public:
-  explicit BoxData(VoxelBlock voxels, BoxLayers layers = {}) : block_(std::move(voxels)), layers_(std::move(layers)) {}
-  explicit BoxData(BrickedVoxels voxels, BoxLayers layers = {}) : bricks_(std::move(voxels)), layers_(std::move(layers)) {}
+  explicit BoxData(std::shared_ptr<BoxVoxels> voxels) : voxels_(std::move(voxels)), samples_(voxels_->samples()) {}
+  explicit BoxData(VoxelBlock voxels, BoxLayers layers = {}) : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(layers))) {}
+  explicit BoxData(BrickedVoxels voxels, BoxLayers layers = {})
+      : BoxData(std::make_shared<BoxVoxels>(std::move(voxels), std::move(layers))) {}
   BoxData(const BoxData&) = delete;
   BoxData& operator=(const BoxData&) = delete;
 
   // All voxels as one block. If there are only bricks, the first call turns them into a block; after that any thread may call.
   const VoxelBlock& voxels() const;
-  VoxelBricks bricks() const { return bricks_ ? VoxelBricks(*bricks_) : VoxelBricks(block_); }
+  VoxelBricks bricks() const { return samples_.view(); }
+  // Between renders it lets go of the voxels: another one may store them otherwise.
+  void TakeVoxels() { samples_ = voxels_->samples(); }
+  void LeaveVoxels() { samples_ = {}; }
 
-  const BoxLayers& layers() const { return layers_; }
+  const BoxLayers& layers() const { return voxels_->layers(); }
   // Of volume and layers, the type whose samples take most.
   ScalarType widest_type() const;
 
@@ -60,15 +59,12 @@ class BoxData {
     return static_cast<Cache&>(*cache);
   }
 
-  // Memory of voxels and of everything derived from them.
-  std::size_t bytes() const;
+  // Memory of everything derived from the voxels.
+  std::size_t derived_bytes() const;
 
  private:
-  // The same samples, stored in one of two ways.
-  mutable VoxelBlock block_;
-  mutable std::optional<BrickedVoxels> bricks_;  // then block_ is empty
-
-  BoxLayers layers_;
+  const std::shared_ptr<BoxVoxels> voxels_;
+  mutable BoxVoxels::Samples samples_;  // of them; empty between renders
   std::optional<BrickRanges> ranges_;
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;

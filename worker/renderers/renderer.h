@@ -5,7 +5,6 @@
 // borders of a box decide only which samples it owns.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <memory>
 
@@ -15,6 +14,7 @@
 #include "common/image/occlusion_mask.h"
 #include "common/stats/report.h"
 #include "worker/renderers/box_data.h"
+#include "worker/renderers/render_control.h"
 
 namespace slabstream {
 
@@ -23,11 +23,11 @@ class Renderer {
   virtual ~Renderer() = default;
 
   // Local image of `box` in setup.format. `data` holds the voxels and halo (PaddedBox) of the box. Pixels that `hidden` hides may be left
-  // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads. If `cancelled` becomes true it stops
-  // soon and returns Cancelled. Called within the task arena of the worker's render threads: parallel algorithms of oneTBB use as many
-  // threads as the worker has.
+  // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads, without pauses. If it is cancelled
+  // it stops soon and returns Cancelled; it pauses between pieces (`control`). Called within the task arena of the worker's render threads:
+  // parallel algorithms of oneTBB use as many threads as the worker has.
   virtual Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                                    const std::atomic<bool>& cancelled, RankReport& report) = 0;
+                                    const RenderControl& control, RankReport& report) = 0;
 };
 
 // The pixel half of `kind`, one of Renderers().

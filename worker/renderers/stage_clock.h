@@ -3,6 +3,7 @@
 
 #include "common/base/time.h"
 #include "common/stats/report.h"
+#include "worker/renderers/render_control.h"
 
 namespace slabstream {
 
@@ -16,10 +17,11 @@ class StageClock {
     last_ = now;
   }
 
-  // Records everything since construction as `stage` too: time and span.
-  void Finish(Stage stage) {
+  // Records everything since construction as `stage` too: time, without the pauses of `control`, and span.
+  void Finish(Stage stage, const RenderControl& control) {
     last_ = MonotonicNow();
     AddStage(report_, stage, begin_.time_since_epoch().count(), last_.time_since_epoch().count());
+    report_.stage_ns[std::size_t(stage)] -= control.paused().count();
   }
 
  private:

@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <random>
+#include <thread>
 
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
@@ -154,11 +156,11 @@ TEST(Surface, IsTheOpenFacesOfOpaqueVoxels) {
 TEST(BoxData, KeepsWhatItMadeWhileTheSameVoxelsShow) {
   const Volume volume = MakeBlobs({{40, 40, 40}, {1, 1, 1}}, ScalarType::kUint8, 33);
   const auto data = CutBox(volume, volume.block.box);
-  const std::size_t before = data->bytes();
+  const std::size_t before = data->derived_bytes();
   SetupOptions options;
   FrameSetup setup = MakeSetup(volume, options);
   const OccupiedVoxels* first = &data->CacheOf<SplatCache>().Occupied(*data, setup, volume.block.box);
-  EXPECT_GE(data->bytes(), before + first->records.size() * sizeof(VoxelRecord));
+  EXPECT_GE(data->derived_bytes(), before + first->records.size() * sizeof(VoxelRecord));
   const VoxelRecord* records = first->records.data();
   const std::size_t record_count = first->records.size();
 
@@ -201,7 +203,7 @@ TEST(Renderers, WhatLiesOutsideTheFrameIsNotDrawn) {
     const FrameSetup setup = MakeSetup(block, options);
     const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    const LocalImage image = MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, std::atomic<bool>(false), report).value();
+    const LocalImage image = MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, RenderControl(), report).value();
     EXPECT_EQ(image.bounds, FrameBounds(setup));
     EXPECT_LT(report.drawn_voxels, block.block.box.voxel_count() / 20);
   }
@@ -214,9 +216,42 @@ TEST(Renderers, StopWhenCancelled) {
     options.renderer = kind;
     const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    const auto result = MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, std::atomic<bool>(true), report);
+    RenderControl cancelled;
+    cancelled.Cancel();
+    const auto result = MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, cancelled, report);
     ASSERT_FALSE(result.ok());
     EXPECT_EQ(result.status().code(), StatusCode::kCancelled);
+  }
+}
+
+TEST(Renderers, PausesChangeNoBit) {
+  const Volume block = AsGrid(MakeBlock({{40, 40, 40}, {1, 1, 1}}));
+  for (const RendererKind* kind : Renderers()) {
+    SCOPED_TRACE(kind->name());
+    SetupOptions options;
+    options.renderer = kind;
+    options.size = {200, 200};
+    const FrameSetup setup = MakeSetup(block, options);
+    const auto render = [&](const RenderControl& control) {
+      RankReport report;
+      const auto data = BoxFor(*kind, block, block.block.box);
+      return MakeRenderer(*kind)->Render(*data, block.block.box, setup, {}, control, report).value();
+    };
+    const LocalImage expected = render(RenderControl());
+    RenderControl control;
+    LocalImage paused;
+    {
+      const std::jthread pauses([&](const std::stop_token& stop) {
+        while (!stop.stop_requested()) {
+          control.Pause();
+          control.Resume();
+        }
+      });
+      paused = render(control);
+    }
+    EXPECT_EQ(paused.bounds, expected.bounds);
+    EXPECT_TRUE(std::ranges::equal(paused.rgba, expected.rgba));
+    EXPECT_TRUE(std::ranges::equal(paused.depth, expected.depth));
   }
 }
 
@@ -227,7 +262,7 @@ TEST(Renderers, ReportTheirStages) {
     options.renderer = kind;
     const auto data = BoxFor(*kind, block, block.block.box);
     RankReport report;
-    ASSERT_TRUE(MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, std::atomic<bool>(false), report).ok());
+    ASSERT_TRUE(MakeRenderer(*kind)->Render(*data, block.block.box, MakeSetup(block, options), {}, RenderControl(), report).ok());
     ASSERT_EQ(report.spans.size(), 1U);
     EXPECT_EQ(report.spans[0].stage, Stage::kRender);
     std::int64_t stages = 0;

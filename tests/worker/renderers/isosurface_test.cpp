@@ -298,7 +298,7 @@ TEST(Isosurfaces, OpaqueOnesEndRays) {
     const FrameSetup setup = MakeSetup(half, options);
     RankReport report;
     const auto data = CutBox(half, half.block.box);
-    (void)MakeRenderer(*setup.renderer)->Render(*data, half.block.box, setup, {}, std::atomic<bool>(false), report).value();
+    (void)MakeRenderer(*setup.renderer)->Render(*data, half.block.box, setup, {}, RenderControl(), report).value();
     return double(report.drawn_voxels);
   };
   TransferFunction with_surface = options.transfer;
@@ -352,7 +352,7 @@ TEST(Isosurfaces, AreDrawnWhereBricksSaySo) {
     for (const Box& box : partition.boxes()) {
       RankReport report;
       const auto data = CutBox(volume, PaddedBox(box, setup));
-      (void)MakeRenderer(*renderer)->Render(*data, box, setup, {}, std::atomic<bool>(false), report).value();
+      (void)MakeRenderer(*renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
       if (bricks.AnyVisible(PaddedBox(box, setup))) {
         drawn += report.drawn_voxels > 0 ? 1 : 0;
       } else {

@@ -139,7 +139,7 @@ namespace {
 LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
   const auto data = BoxFor(*setup.renderer, volume, box, setup.halo);
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, std::atomic<bool>(false), report).value();
+  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
 }
 
 }  // namespace
@@ -221,8 +221,7 @@ void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& 
   const LocalImage whole = RenderWhole(volume, setup);
   const auto data = BoxFor(*setup.renderer, volume, volume.block.box, 0);
   RankReport report;
-  const LocalImage masked =
-      MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, mask, std::atomic<bool>(false), report).value();
+  const LocalImage masked = MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, mask, RenderControl(), report).value();
   for (int y = 0; y < frame.height(); ++y) {
     for (int x = 0; x < frame.width(); ++x) {
       if (!mask.Hides(x, y)) {

@@ -36,7 +36,7 @@ class BoundsCache : public BoxCache {
 class MipRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const ProjectionMode mode = ModeOf(setup);
     // If data values fall as stored samples rise, the largest value belongs to the least sample.
@@ -50,7 +50,7 @@ class MipRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
     const ValueScale values = MakeValueScale(double(setup.range.min), double(setup.range.max), mapping);
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
           const ProjectWork work = {.rays = &rays,
                                     .box = &ray_box,
@@ -61,8 +61,8 @@ class MipRenderer : public Renderer {
                                     .nearest = TakesNearestVoxel(setup)};
           ProjectTile(work, tile, pixels, floats_a_row);
         });
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 };

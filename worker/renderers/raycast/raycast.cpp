@@ -135,7 +135,7 @@ class VisibilityCache : public BoxCache {
 class RaycastRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
@@ -148,7 +148,7 @@ class RaycastRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
     std::atomic<std::uint64_t> shaded = 0;
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t piece) { return visible[piece].region; },
+        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
           const std::optional<RayLayers> layers = shown.Of(piece);
           const MarchWork work = {.rays = &rays,
@@ -160,8 +160,8 @@ class RaycastRenderer : public Renderer {
           shaded += MarchTile(work, tile, rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 };

@@ -61,7 +61,7 @@ ShearPasses PassesOf(const ViewRays& rays) {
 }
 
 // Renders the tiles of an image.
-std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::atomic<bool>& cancelled, RankReport& report) {
+std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const RenderControl& control, RankReport& report) {
   const PixelBounds& bounds = image.bounds;
   if (bounds.empty()) return 0;
   const bool turned = work.passes->turned;
@@ -71,7 +71,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
   const std::int32_t across = (u_end - u_begin - 1) / kTileColumns + 1, down = (v_end - v_begin - 1) / kTileRows + 1;
   std::atomic<std::uint64_t> shaded = 0;
   tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
-  ForEachTile(across * down, cancelled, report, [&](std::int32_t number) {
+  ForEachTile(across * down, control, report, [&](std::int32_t number) {
     TilePixels tile;
     tile.u_begin = u_begin + number % across * kTileColumns;
     tile.v_begin = v_begin + number / across * kTileRows;
@@ -90,7 +90,7 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const std::a
 class ShearRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const VolumeGeometry& geometry = setup.description.geometry;
@@ -121,11 +121,11 @@ class ShearRenderer : public Renderer {
     work.k_begin = reach.begin;
     work.k_end = reach.end;
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
-    const std::uint64_t shaded = RenderTiles(work, image, cancelled, report);
+    const std::uint64_t shaded = RenderTiles(work, image, control, report);
 
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, geometry)));
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 };

@@ -35,7 +35,7 @@ RayReach SetBox(const Box& box, SliceWork& work) {
 class SliceRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     if (data.layers().cells == nullptr) {
       return Status::InvalidArgument("renderer slice draws the cells of unstructured grids, but the dataset has none");
     }
@@ -48,7 +48,7 @@ class SliceRenderer : public Renderer {
     const std::span<const std::uint32_t> shown = data.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
     clock.Charge(Stage::kPrepare);
     if (shown.empty()) {
-      clock.Finish(Stage::kRender);
+      clock.Finish(Stage::kRender, control);
       return MakeLocalImage(setup.format, {});
     }
 
@@ -64,21 +64,21 @@ class SliceRenderer : public Renderer {
     clock.Charge(Stage::kTransform);
 
     LocalImage image = MakeLocalImage(setup.format, reach.pixels);
-    const std::uint64_t drawn = RenderTiles(work, *bins, image, cancelled, report);
+    const std::uint64_t drawn = RenderTiles(work, *bins, image, control, report);
     report.drawn_voxels += std::uint64_t(std::ceil(double(drawn) * VoxelsASample(space.rays(), setup.camera, geometry)));
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 
  private:
   // Returns how many samples were drawn.
-  static std::uint64_t RenderTiles(const SliceWork& work, const CellBins& bins, LocalImage& image, const std::atomic<bool>& cancelled,
+  static std::uint64_t RenderTiles(const SliceWork& work, const CellBins& bins, LocalImage& image, const RenderControl& control,
                                    RankReport& report) {
     const auto width = std::size_t(image.bounds.width());
     std::atomic<std::uint64_t> drawn = 0;
     tbb::enumerable_thread_specific<TileRoomPtr> rooms(MakeTileRoom);
-    ForEachTile(bins.tiles(), cancelled, report, [&](std::int32_t number) {
+    ForEachTile(bins.tiles(), control, report, [&](std::int32_t number) {
       const std::span<const CellBins::Entry> cells = bins.VoxelsOf(number);
       if (cells.empty()) return;
       const PixelBounds tile = bins.TileAt(number);

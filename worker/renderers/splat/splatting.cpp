@@ -1,9 +1,8 @@
 // The splatting pipeline (Westover 1990, one sheet a slice): transform, shade, splat, composite. docs/rendering.md defines what it
 // computes.
-#include <tbb/parallel_for.h>
-
 #include <vector>
 
+#include "worker/renderers/for_each_piece.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/splat/splat_band.h"
 #include "worker/renderers/splat/splat_cache.h"
@@ -16,11 +15,11 @@ namespace {
 // Rows of a band: few enough to stay in the second-level cache with their beams, enough that few voxels are shaded twice.
 constexpr std::int32_t kBandRows = 64;
 
-void RenderBand(const SplatPass& pass, std::int32_t y_begin, const std::atomic<bool>& cancelled, LocalImage& image, RankReport& report) {
+void RenderBand(const SplatPass& pass, std::int32_t y_begin, const RenderControl& control, LocalImage& image, RankReport& report) {
   SplatBand band(pass, y_begin, std::min(y_begin + kBandRows, pass.bounds.y_end), image, report);
   const Axis c = pass.cells.axes.c;
   const std::int32_t begin = pass.cells.occupied.begin[c], end = pass.cells.occupied.end[c];
-  for (std::int32_t i = 0; i < end - begin && !band.finished() && !cancelled; ++i) {
+  for (std::int32_t i = 0; i < end - begin && !band.finished() && !control.cancelled(); ++i) {
     band.AddSlice(pass.setup.camera.ascending ? begin + i : end - 1 - i);
   }
 }
@@ -33,7 +32,7 @@ void AddTo(RankReport& sum, const RankReport& part) {
 class SplattingRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const ClassificationTable& table = data.Classification(setup);
     const OccupiedVoxels& cells = data.CacheOf<SplatCache>().Occupied(data, setup, box);
@@ -46,13 +45,12 @@ class SplattingRenderer : public Renderer {
       clock.Charge(Stage::kTransform);
       const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;
       std::vector<RankReport> parts(static_cast<std::size_t>(bands));
-      tbb::parallel_for(0, bands, [&](std::int32_t i) {
-        RenderBand(pass, pass.bounds.y_begin + i * kBandRows, cancelled, image, parts[std::size_t(i)]);
-      });
+      ForEachPiece(bands, control,
+                   [&](std::int32_t i) { RenderBand(pass, pass.bounds.y_begin + i * kBandRows, control, image, parts[std::size_t(i)]); });
       for (const RankReport& part : parts) AddTo(report, part);
     }
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 };

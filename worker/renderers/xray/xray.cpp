@@ -12,7 +12,7 @@ namespace {
 class XrayRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
     clock.Charge(Stage::kPrepare);
@@ -21,12 +21,12 @@ class XrayRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, volume.geometry, setup.parameters.at(0), setup.clip);
     const auto values = MakeValueScale(AttenuationOf(setup).clear, double(setup.range.max), volume.mapping);
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, cancelled, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
         [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
           ProjectTile({.rays = &rays, .box = &ray_box, .values = values}, tile, pixels, floats_a_row);
         });
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 };

@@ -19,6 +19,7 @@
 
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/shade_faces.h"
+#include "worker/renderers/for_each_piece.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 #include "worker/renderers/zbuffer/brick_projection.h"
@@ -121,7 +122,7 @@ struct Scratch {
 
 // The keys of a band of the scene, and the cuts in it. `cuts` may be null.
 std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProjection& projection, Projection kind, const CutFaces* cuts,
-                     const std::atomic<bool>& cancelled, const KeyBand& band, Scratch& scratch) {
+                     const RenderControl& control, const KeyBand& band, Scratch& scratch) {
   const std::size_t pixels = band.stride * std::size_t(band.bounds.height());
   std::fill_n(band.keys, pixels, kEmptyKey);
   std::vector<std::uint32_t> bricks;
@@ -141,7 +142,7 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
   };
   constexpr std::size_t kAhead = 2;  // bricks
   std::size_t drawn = 0;
-  for (std::size_t i = 0; i < bricks.size() && !cancelled.load(std::memory_order_relaxed); ++i) {
+  for (std::size_t i = 0; i < bricks.size() && !control.cancelled(); ++i) {
     if (i + kAhead < bricks.size()) FetchSites(surface, bricks[i + kAhead], scene.views[bricks[i + kAhead]].sides);
     const ProjectedBrick& view = scene.views[bricks[i]];
     if (!cuts_drawn && view.nearest >= cuts->turn()) draw_cuts();
@@ -169,7 +170,7 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
 class ZBufferRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
-                            const std::atomic<bool>& cancelled, RankReport& report) override {
+                            const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const ClassificationTable& table = data.Classification(setup);
     auto& cache = data.CacheOf<SurfaceCache>();
@@ -203,8 +204,9 @@ class ZBufferRenderer : public Renderer {
 
     std::atomic<std::size_t> drawn = 0;
     std::atomic<std::int64_t> draw_ns = 0, shade_ns = 0;
-    tbb::parallel_for(std::size_t{1}, begins.size(), [&](std::size_t i) {
+    ForEachPiece(std::int32_t(begins.size()) - 1, control, [&](std::int32_t number) {
       const Time begin = MonotonicNow();
+      const std::size_t i = std::size_t(number) + 1;
       KeyBand band;
       band.bounds = {scene.bounds.x_begin, begins[i - 1], scene.bounds.x_end, begins[i]};
       band.stride = std::size_t(band.bounds.width() + kKeyPadding);
@@ -212,10 +214,10 @@ class ZBufferRenderer : public Renderer {
       Scratch& scratch = scratch_.local();
       scratch.keys.resize(std::max(scratch.keys.size(), pixels));
       band.keys = scratch.keys.data();
-      drawn += DrawBand(surface, scene, projection, setup.camera.projection, drawn_cuts, cancelled, band, scratch);
+      drawn += DrawBand(surface, scene, projection, setup.camera.projection, drawn_cuts, control, band, scratch);
       const Time middle = MonotonicNow();
       if (cuts) CutFaces::TakeSeen(band, scratch.cuts);
-      for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !cancelled.load(std::memory_order_relaxed); ++y) {
+      for (std::int32_t y = band.bounds.y_begin; y < band.bounds.y_end && !control.cancelled(); ++y) {
         const auto width = std::size_t(band.bounds.width()), pixel = std::size_t(y - scene.bounds.y_begin) * width;
         const std::size_t row = std::size_t(y - band.bounds.y_begin) * band.stride;
         ShadeFaceRow(shading, band.keys + row, band.bounds.x_begin, y, width, &image.rgba[4 * pixel], &image.depth[pixel],
@@ -228,8 +230,8 @@ class ZBufferRenderer : public Renderer {
     report.stage_ns[std::size_t(Stage::kZBuffer)] += draw_ns;
     report.stage_ns[std::size_t(Stage::kShade)] += shade_ns;
     report.drawn_voxels += drawn;
-    clock.Finish(Stage::kRender);
-    if (cancelled) return Status::Cancelled("rendering was cancelled");
+    clock.Finish(Stage::kRender, control);
+    if (control.cancelled()) return Status::Cancelled("rendering was cancelled");
     return image;
   }
 

@@ -45,7 +45,7 @@ FrameSetup LayeredSetup(const LayeredVolume& volume, SetupOptions options, Layer
 LocalImage Rendered(const LayeredVolume& volume, const FrameSetup& setup, const Box& box) {
   const auto data = CutLayered(volume, PaddedBox(box, setup));
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, std::atomic<bool>(false), report).value();
+  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
 }
 LocalImage Rendered(const LayeredVolume& volume, const FrameSetup& setup) {
   return Rendered(volume, setup, volume.volume->description.geometry.bounds());

@@ -97,12 +97,12 @@ TEST(Raycast, BoxesWithoutDrawnVoxelsShowNothing) {
     ++left_out;
     RankReport report;
     const auto data = CutBox(volume, PaddedBox(box, setup));
-    (void)MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, std::atomic<bool>(false), report).value();
+    (void)MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
     EXPECT_EQ(report.drawn_voxels, 0U);
   }
   RankReport report;
   const auto data = CutBox(volume, volume.block.box);
-  (void)MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, std::atomic<bool>(false), report).value();
+  (void)MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, RenderControl(), report).value();
   EXPECT_GT(report.drawn_voxels, 0U);
   EXPECT_LT(left_out, 16);
 }

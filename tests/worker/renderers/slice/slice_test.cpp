@@ -586,7 +586,7 @@ TEST(Slice, RefusesDatasetsWithoutCells) {
   const FrameSetup setup = SliceSetup(volume, {});
   const auto data = BoxFor(*setup.renderer, volume, volume.block.box);
   RankReport report;
-  const auto result = MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, std::atomic<bool>(false), report);
+  const auto result = MakeRenderer(*setup.renderer)->Render(*data, volume.block.box, setup, {}, RenderControl(), report);
   EXPECT_EQ(result.status().code(), StatusCode::kInvalidArgument);
 }
 

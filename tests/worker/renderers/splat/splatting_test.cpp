@@ -167,7 +167,7 @@ TEST(Splatting, TerminationSkipsVoxelsBehindAnOpaqueFront) {
   const FrameSetup setup = MakeSetup(block, options);
   const auto data = CutBox(block, block.block.box);
   RankReport report;
-  ASSERT_TRUE(MakeRenderer(*Splatting())->Render(*data, block.block.box, setup, {}, std::atomic<bool>(false), report).ok());
+  ASSERT_TRUE(MakeRenderer(*Splatting())->Render(*data, block.block.box, setup, {}, RenderControl(), report).ok());
   EXPECT_EQ(report.occupied_voxels, 48U * 48 * 48);
   EXPECT_LT(report.drawn_voxels, report.occupied_voxels / 2);
 }

@@ -36,7 +36,7 @@ FrameSetup LabelledSetup(const Labelled& data, SetupOptions options, std::option
 LocalImage Rendered(const Labelled& data, const FrameSetup& setup, const Box& box) {
   const auto slab = CutLabelled(data, PaddedBox(box, setup));
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, std::atomic<bool>(false), report).value();
+  return MakeRenderer(*setup.renderer)->Render(*slab, box, setup, {}, RenderControl(), report).value();
 }
 LocalImage Rendered(const Labelled& data, const FrameSetup& setup) { return Rendered(data, setup, data.volume.block.box); }
 
@@ -185,7 +185,7 @@ TEST(ZBufferLabels, ABoxFollowsTheLook) {
            Look(LabelMode::kSurface, {{kRed}, {kGreen}}), Look(LabelMode::kTint, {{kGreen}, {kRed}}, 0.5)}) {
     const FrameSetup setup = LabelledSetup(data, Unlit(), look);
     RankReport report;
-    ExpectSame(renderer->Render(*slab, data.volume.block.box, setup, {}, std::atomic<bool>(false), report).value(), Rendered(data, setup));
+    ExpectSame(renderer->Render(*slab, data.volume.block.box, setup, {}, RenderControl(), report).value(), Rendered(data, setup));
   }
 }
 

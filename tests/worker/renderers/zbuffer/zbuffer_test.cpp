@@ -145,7 +145,7 @@ TEST(ZBuffer, DrawsVoxelsFromHalfTheLargestOpacityOn) {
   const FrameSetup setup = MakeSetup(volume, options);
   const auto data = CutBox(volume, volume.block.box);
   RankReport report;
-  const LocalImage image = MakeRenderer(*ZBuffer())->Render(*data, volume.block.box, setup, {}, std::atomic<bool>(false), report).value();
+  const LocalImage image = MakeRenderer(*ZBuffer())->Render(*data, volume.block.box, setup, {}, RenderControl(), report).value();
   for (std::size_t i = 0; i < image.depth.size(); ++i) {
     if (std::isfinite(image.depth[i])) {
       EXPECT_GE(image.voxel[i] % 8 * 2, 4U);  // FaceIndex ends with x / 2

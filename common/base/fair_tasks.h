@@ -1,0 +1,103 @@
+// FairTasks: tasks of several owners that may take long, on threads of their own (BackgroundTasks). One task of an owner runs at a time, in
+// the order in which they were posted; the next task is of the owner that has used least time (FairTurns). So neither many tasks nor a long
+// one delay those of another owner, as long as no more than `most_threads` owners have long ones.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "common/base/background_tasks.h"
+#include "common/base/fair_turns.h"
+#include "common/base/log.h"
+
+namespace slabstream {
+
+class FairTasks {
+ public:
+  using Owner = std::uint64_t;
+
+  explicit FairTasks(std::size_t most_threads) : threads_(most_threads) {}
+  // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
+  ~FairTasks() {
+    const std::lock_guard lock(shared_->mutex);
+    shared_->waiting.clear();
+  }
+  FairTasks(const FairTasks&) = delete;
+  FairTasks& operator=(const FairTasks&) = delete;
+
+  // The tasks of one owner, for those who post and know nothing of owners.
+  struct OfOwner {
+    FairTasks& tasks;
+    Owner owner;
+    void Post(std::function<void()> task) { tasks.Post(owner, std::move(task)); }
+  };
+  OfOwner Of(Owner owner) { return {*this, owner}; }
+
+  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory or no thread; the
+  // task then runs with a later one, or never.
+  void Post(Owner owner, std::function<void()> task) {
+    std::list<std::function<void()>> one;
+    one.push_back(std::move(task));
+    {
+      const std::lock_guard lock(shared_->mutex);
+      if (!shared_->waiting.contains(owner) && !shared_->running.contains(owner)) shared_->turns.Join(owner);
+      std::list<std::function<void()>>& waiting = shared_->waiting[owner];
+      waiting.splice(waiting.end(), one);  // does not throw: nobody finds an owner that waits without a task
+    }
+    threads_.Post([shared = shared_] { RunTasks(*shared); });
+  }
+
+ private:
+  struct Shared {
+    std::mutex mutex;                                           // guards everything
+    std::map<Owner, std::list<std::function<void()>>> waiting;  // none of them empty
+    std::set<Owner> running;
+    FairTurns<Owner> turns;
+  };
+
+  // Until nothing waits but tasks of owners that have one running: their threads will come to those.
+  static void RunTasks(Shared& shared) {
+    std::unique_lock lock(shared.mutex);
+    while (true) {
+      auto next = shared.waiting.end();
+      for (auto it = shared.waiting.begin(); it != shared.waiting.end(); ++it) {
+        if (shared.running.contains(it->first)) continue;
+        if (next == shared.waiting.end() || shared.turns.TurnOf(it->first) < shared.turns.TurnOf(next->first)) next = it;
+      }
+      if (next == shared.waiting.end()) return;
+      const Owner owner = next->first;
+      shared.running.insert(owner);  // first: if it throws, the task still waits
+      std::function<void()> task = std::move(next->second.front());
+      next->second.pop_front();
+      if (next->second.empty()) shared.waiting.erase(next);
+      shared.turns.Take(owner);
+      lock.unlock();
+      const Time begin = MonotonicNow();
+      try {
+        task();
+      } catch (const std::exception& error) {
+        LogError(std::string("background task: ") + error.what());
+      }
+      task = nullptr;
+      const Time end = MonotonicNow();
+      lock.lock();
+      shared.turns.Charge(owner, end - begin);
+      shared.running.erase(owner);
+      shared.turns.ForgetIdle([&](Owner each) { return shared.waiting.contains(each) || shared.running.contains(each); });
+    }
+  }
+
+  const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
+  BackgroundTasks threads_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,60 @@
+// FairTurns: whose turn it is, among members that share something that only one of them uses at a time: a service, a thread, processors.
+// Start-time fair queueing (P. Goyal, H. M. Vin, H. Cheng, 1996): the next turn belongs to the member that has used least time. So a member
+// that always wants more gets an equal share, one that wants less than that hardly waits, and what a turn takes need not be known before.
+//
+// A member that had nothing to do has not saved up time: it continues with what the last member in turn had used when that turn began.
+// Pure; one thread.
+#pragma once
+
+#include <algorithm>
+#include <compare>
+#include <cstdint>
+#include <map>
+
+#include "common/base/time.h"
+
+namespace slabstream {
+
+template <class Member>
+class FairTurns {
+ public:
+  // When it is a member's turn: the smallest one is next.
+  struct Turn {
+    Duration used{};
+    std::uint64_t last = 0;  // counts Join and Take
+    friend auto operator<=>(const Turn&, const Turn&) = default;
+  };
+
+  // The member has something to do, and had nothing before.
+  void Join(const Member& member) { turns_[member] = {TurnOf(member).used, ++count_}; }
+  Turn TurnOf(const Member& member) const {
+    const auto known = turns_.find(member);
+    return known == turns_.end() ? Turn{used_by_last_, 0} : AtLeastLast(known->second);
+  }
+  Turn AtLeastLast(Turn turn) const { return {std::max(turn.used, used_by_last_), turn.last}; }
+
+  void Take(const Member& member) {  // its turn begins
+    used_by_last_ = TurnOf(member).used;
+    turns_[member] = {used_by_last_, ++count_};
+  }
+  // It has used so much; less than none: it was charged too much before. A member that was forgotten is charged nothing.
+  void Charge(const Member& member, Duration used) {
+    if (const auto known = turns_.find(member); known != turns_.end()) known->second.used += used;
+  }
+
+  void Forget(const Member& member) { turns_.erase(member); }
+  // Forgets members that have nothing to do and nothing to make up for: to remember them would change no turn.
+  template <class Busy>
+  void ForgetIdle(Busy&& busy) {
+    std::erase_if(turns_, [&](const auto& entry) { return entry.second.used <= used_by_last_ && !busy(entry.first); });
+  }
+  void ForgetAll() { turns_.clear(); }  // nobody has anything to do: the next ones begin as equals
+  std::size_t size() const { return turns_.size(); }
+
+ private:
+  std::map<Member, Turn> turns_;
+  Duration used_by_last_{};  // by the last member in turn, when its turn began
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace slabstream
