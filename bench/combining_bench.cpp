@@ -165,7 +165,7 @@ class Coordinator {
         voxels_(*Socket::Router(context_)) {
     CHECK(control_.Bind("ipc://" + directory + "/control").ok());
     voxels_endpoint_ = *voxels_.Bind("ipc://" + directory + "/voxels");
-    SetRenderer(*FindRenderer(kDefaultRenderer), setup_);
+    SetRenderer(DefaultRenderer(), setup_);
     setup_.dataset = kDataset;
     setup_.description.geometry.size = {16, 16, 65535};
     setup_.range = {0, 1};

@@ -25,7 +25,7 @@ constexpr int kWarmUpFrames = 20;
 struct Options {
   int volume = 64, size = 512, frames = 200, workers = 2, threads = 1;
   double zoom = 1;  // at 3 the object fills the picture
-  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
+  const RendererKind* renderer = &DefaultRenderer();
 };
 
 // Measurements of each frame, in milliseconds.

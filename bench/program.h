@@ -56,7 +56,7 @@ struct Subject {
 
 struct SubjectOptions {
   std::vector<std::string> volumes;
-  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
+  const RendererKind* renderer = &DefaultRenderer();
   int size = 512;  // pixels a side
   double azimuth = 30, elevation = 20, zoom = 1;
 };

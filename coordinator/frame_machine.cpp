@@ -147,7 +147,7 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
   const std::vector<WorkerId> workers = frame.Participants();
   const OpenRequest& request = frame.request();
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "frame {} of client {}: dataset {}, {}, {}x{}, {:.1f} ms, workers {}, attempts {}: {}", id,
-       request.client, request.submit.frame.dataset, request.submit.frame.renderer, request.submit.frame.size.width,
+       request.client, request.submit.frame.dataset, request.dataset()->resolved->frame.renderer, request.submit.frame.size.width,
        request.submit.frame.size.height, std::chrono::duration<double, std::milli>(now - request.arrived).count(), workers.size(),
        frame.attempt(), result);
   queue.Settle(frame.request(), frame.WorkerTime());

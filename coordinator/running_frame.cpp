@@ -10,6 +10,7 @@
 #include "common/base/check.h"
 #include "common/planning/frame_occlusion.h"
 #include "common/planning/placement.h"
+#include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 
@@ -340,6 +341,7 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
+                             .renderer = std::string(plan_.setup.renderer->name()),
                              .decomposition = std::string(policy.decomposition->name),
                              .balance_by = std::string(NameOf(policy.balance_by)),
                              .axis = std::string(1, Letter(policy.axis)),

@@ -70,7 +70,8 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
                {"stages_ms", std::move(stages)},
                {"plan",
-                {{"decomposition", statistics.decomposition},
+                {{"renderer", statistics.renderer},
+                 {"decomposition", statistics.decomposition},
                  {"axis", statistics.axis},
                  {"assignment", statistics.assignment},
                  {"balance", statistics.balance},
@@ -82,7 +83,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
 
 RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
   RenderedView view;
-  view.geometry = pictures.front().geometry;
+  for (const Picture& picture : pictures) view.panes.push_back(picture.geometry);
   view.statistics = std::move(pictures.front().statistics);
   for (const Picture& picture : pictures) view.latency = std::max(view.latency, picture.latency);
   view.size = {size.width * int(pictures.size()), size.height};
@@ -98,7 +99,7 @@ RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
 
 Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up) {
   const Time begin = MonotonicNow();
-  const Result<ComposedPicture> picture = ComposedPicture::Make(view.image, view.size, view.format, view.geometry);
+  const Result<ComposedPicture> picture = ComposedPicture::Make(view.image, view.size, view.format, view.panes, view.key);
   if (!picture.ok()) return picture.status();
   // Outside of what was rendered is background, unless something was drawn onto the picture.
   const PixelBounds bounds =
@@ -126,7 +127,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
                     {"scale", view.scale},
                     {"bounds", area},
                     {"background", {Decimal(background.r), Decimal(background.g), Decimal(background.b), Decimal(background.a)}},
-                    {"geometry", GeometryJson(view.geometry)},
+                    {"geometry", GeometryJson(view.panes.front())},
                     {"statistics", std::move(statistics)}};
   encoded.bytes = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
   return encoded;

@@ -22,8 +22,9 @@ struct RenderedView {
   ImageSize size;  // of the whole picture
   LocalImage image;
   PictureFormat format;
-  PictureGeometry geometry;    // of slices side by side: of the leftmost
-  FrameStatistics statistics;  // likewise
+  PictureKey key;
+  std::vector<PictureGeometry> panes;  // of the pictures side by side
+  FrameStatistics statistics;          // of the leftmost
   Duration latency{};
   bool timeline = false;
 };

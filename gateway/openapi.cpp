@@ -20,7 +20,7 @@ namespace {
 std::string TextOf(const Json& field, const char* name) { return field.value(name, std::string()); }
 
 Json SchemaOf(const Json& field) {
-  const std::string type = TextOf(field, "type");
+  const std::string type = TextOf(field, field.contains("optional_value") ? "optional_value" : "type");
   Json schema = {{"type", type.empty() ? "boolean" : type == "NUMBER" ? "number" : type == "N" ? "integer" : "string"}};
   if (field.contains("choices")) schema["enum"] = field["choices"];
   if (field.contains("max") && schema["type"] != "string") {
@@ -35,6 +35,7 @@ Json SchemaOf(const Json& field) {
 std::string DescriptionOf(const Json& field) {
   std::string text = TextOf(field, "help");
   if (field.contains("type")) text += " [" + TextOf(field, "type") + "]";
+  if (field.contains("optional_value")) text += " [true, or " + TextOf(field, "optional_value") + "]";
   if (field.contains("default")) text += " (default: " + TextOf(field, "default") + ")";
   return text;
 }

@@ -21,13 +21,16 @@ HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
 
 }  // namespace
 
-void PictureRequests::MakePng(std::vector<FrameRequest> frames, EncodeFunction encode, ReplyFunction reply, const Gone& gone) {
+void PictureRequests::MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
+                              const Gone& gone) {
+  if (const Status status = CheckCanDraw(annotations); !status.ok()) return reply(Failure(status));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
-    const auto done = [this, encode = std::move(encode), finish](Result<std::vector<Picture>> pictures) {
-      if (!pictures.ok()) return finish([status = pictures.status()] { return Failure(status); });
-      metrics_.CountFrame(pictures->front().statistics, pictures->front().latency);
+    const auto done = [this, encode = std::move(encode), finish](Result<ServiceLink::Rendered> rendered) {
+      if (!rendered.ok()) return finish([status = rendered.status()] { return Failure(status); });
+      const Picture& first = rendered->pictures.front();
+      metrics_.CountFrame(first.statistics, first.latency);
       // Handlers of asio are copied nowhere, but std::function would copy the pictures.
-      auto held = std::make_shared<std::vector<Picture>>(*std::move(pictures));
+      auto held = std::make_shared<ServiceLink::Rendered>(*std::move(rendered));
       boost::asio::post(encoders_, [this, encode, finish, held] {
         const Time begin = MonotonicNow();
         auto png = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
@@ -35,20 +38,21 @@ void PictureRequests::MakePng(std::vector<FrameRequest> frames, EncodeFunction e
         finish([png] { return PngReply(*png); });
       });
     };
-    return link_.Render(std::move(frames), kAnswerDeadline, {.progress = {}, .done = done});
+    return link_.Render(std::move(frames), annotations, kAnswerDeadline, {.progress = {}, .done = done});
   });
 }
 
 void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return reply(Failure(render.status()));
-  const auto encode = [request = *render](std::vector<Picture> pictures) {
-    const Picture& picture = pictures.front();
-    const PictureNotes notes{.geometry = picture.geometry,
-                             .record = RecordText(request.frame.dataset, request.frame, request.format, picture.geometry)};
+  const auto encode = [request = *render](const ServiceLink::Rendered& rendered) {
+    const Picture& picture = rendered.pictures.front();
+    const FrameRequest made = AsMade(request.frame, picture.statistics);
+    const PictureNotes notes{
+        .geometry = picture.geometry, .key = rendered.key, .record = RecordText(made.dataset, made, request.format, picture.geometry)};
     return PngFile(picture.image, picture.size, request.format, notes);
   };
-  MakePng({render->frame}, encode, std::move(reply), gone);
+  MakePng({render->frame}, render->format.annotations, encode, std::move(reply), gone);
 }
 
 void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
@@ -56,13 +60,16 @@ void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, co
   if (!slice.ok()) return reply(Failure(slice.status()));
   Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
   if (!frames.ok()) return reply(Failure(frames.status()));
-  const auto encode = [request = *slice](std::vector<Picture> pictures) {
+  const auto encode = [request = *slice](ServiceLink::Rendered rendered) {
+    PictureNotes notes{.key = std::move(rendered.key)};
     std::vector<LocalImage> images;
-    images.reserve(pictures.size());
-    for (Picture& picture : pictures) images.push_back(std::move(picture.image));
-    return PngFile(SideBySide(images, request.frame.size), request.size(), request.format);
+    for (Picture& picture : rendered.pictures) {
+      images.push_back(std::move(picture.image));
+      notes.panes.push_back(picture.geometry);
+    }
+    return PngFile(SideBySide(images, request.frame.size), request.size(), request.format, notes);
   };
-  MakePng(*std::move(frames), encode, std::move(reply), gone);
+  MakePng(*std::move(frames), slice->format.annotations, encode, std::move(reply), gone);
 }
 
 void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {

@@ -22,8 +22,9 @@ class PictureRequests {
 
  private:
   // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.
-  using EncodeFunction = std::function<Result<std::vector<std::byte>>(std::vector<Picture>)>;
-  void MakePng(std::vector<FrameRequest> frames, EncodeFunction encode, ReplyFunction reply, const Gone& gone);
+  using EncodeFunction = std::function<Result<std::vector<std::byte>>(ServiceLink::Rendered)>;
+  void MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
+               const Gone& gone);
 
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;

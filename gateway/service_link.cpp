@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "client/request/key_of_picture.h"
+
 namespace slabstream {
 namespace {
 
@@ -41,8 +43,15 @@ ServiceLink::Ticket ServiceLink::Post(Task task) {
   return ticket;
 }
 
-ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers) {
-  return Post({.frames = std::move(frames), .deadline = deadline, .handlers = std::move(handlers), .question = {}, .answered = {}});
+ServiceLink::Ticket ServiceLink::Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline,
+                                        Handlers handlers) {
+  std::optional<Question> question;
+  if (annotations.needs_key()) question = SummaryQuery{.dataset = frames.front().dataset, .transfer = frames.front().transfer};
+  return Post({.frames = std::move(frames),
+               .deadline = deadline,
+               .handlers = std::move(handlers),
+               .question = std::move(question),
+               .answered = {}});
 }
 
 ServiceLink::Ticket ServiceLink::Ask(Question question, Duration deadline, AnswerHandler done) {
@@ -101,7 +110,7 @@ void ServiceLink::TakeOrders() {
   for (Task& task : tasks) {
     if (client_ != nullptr) {
       Begin(std::move(task));
-    } else if (task.question) {
+    } else if (task.answered) {
       task.answered(Status::Unavailable(reason_.message()));
     } else {
       task.handlers.done(Status::Unavailable(reason_.message()));
@@ -111,19 +120,14 @@ void ServiceLink::TakeOrders() {
 
 void ServiceLink::Begin(Task task) {
   OpenTask& open = open_[task.ticket];
-  if (task.question) {
-    open.answered = std::move(task.answered);
-    open.requests.push_back(client_->Submit(*std::move(task.question), task.deadline));
-    requests_[open.requests.back()] = task.ticket;
-    return;
-  }
   open.handlers = std::move(task.handlers);
-  open.left = task.frames.size();
-  open.pictures.resize(task.frames.size());
-  for (const FrameRequest& frame : task.frames) {
-    open.requests.push_back(client_->Submit(frame, task.deadline));
-    requests_[open.requests.back()] = task.ticket;
-  }
+  open.answered = std::move(task.answered);
+  open.rendered.pictures.resize(task.frames.size());
+  for (const FrameRequest& frame : task.frames) open.requests.push_back(client_->Submit(frame, task.deadline));
+  if (task.question) open.requests.push_back(client_->Submit(*std::move(task.question), task.deadline));
+  open.left = open.requests.size();
+  for (const RequestId request : open.requests) requests_[request] = task.ticket;
+  if (!task.frames.empty()) open.first = std::move(task.frames.front());
 }
 
 void ServiceLink::Handle(ClientEvent event) {
@@ -149,15 +153,19 @@ void ServiceLink::Handle(ClientEvent event) {
     Forget(found);
     return done(std::move(status));
   }
-  auto& picture = std::get<Picture>(event.what);
-  if (!picture.final) return;
+  if (auto* answer = std::get_if<QuestionReply>(&event.what)) {
+    task.rendered.key = KeyOf(task.first, std::get<SummaryReply>(*answer));
+  } else {
+    auto& picture = std::get<Picture>(event.what);
+    if (!picture.final) return;
+    const auto place = std::ranges::find(task.requests, event.request) - task.requests.begin();
+    task.rendered.pictures[std::size_t(place)] = std::move(picture);
+  }
   requests_.erase(request);
-  const auto place = std::ranges::find(task.requests, event.request) - task.requests.begin();
-  task.pictures[std::size_t(place)] = std::move(picture);
   if (--task.left > 0) return;
   OpenTask finished = std::move(task);
   open_.erase(found);
-  finished.handlers.done(std::move(finished.pictures));
+  finished.handlers.done(std::move(finished.rendered));
 }
 
 void ServiceLink::Forget(std::map<Ticket, OpenTask>::iterator task) {

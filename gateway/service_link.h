@@ -15,6 +15,8 @@
 #include <vector>
 
 #include "client/client.h"
+#include "client/image_io/annotations.h"
+#include "client/image_io/picture_key.h"
 #include "common/base/status.h"
 
 namespace slabstream {
@@ -23,9 +25,13 @@ class ServiceLink {
  public:
   using Ticket = std::uint64_t;
   using AnswerHandler = std::function<void(Result<QuestionReply>)>;
+  struct Rendered {
+    std::vector<Picture> pictures;  // of each frame
+    PictureKey key;                 // of the first frame, if it was asked for
+  };
   struct Handlers {
-    std::function<void(const FrameProgress&)> progress;      // may be empty
-    std::function<void(Result<std::vector<Picture>>)> done;  // once, unless the ticket was cancelled before
+    std::function<void(const FrameProgress&)> progress;  // may be empty
+    std::function<void(Result<Rendered>)> done;          // once, unless the ticket was cancelled before
   };
 
   // `context` and what the handlers use must outlive it.
@@ -34,9 +40,9 @@ class ServiceLink {
   ServiceLink(const ServiceLink&) = delete;
   ServiceLink& operator=(const ServiceLink&) = delete;
 
-  // Any thread. Renders `frames`, at least one, all at once; the first failure is that of all. The handlers are called on the link's
-  // thread. Unavailable: the service does not answer.
-  Ticket Render(std::vector<FrameRequest> frames, Duration deadline, Handlers handlers);
+  // Any thread. Renders `frames`, at least one, all at once, and asks for what `annotations` need; the first failure is that of all. The
+  // handlers are called on the link's thread. Unavailable: the service does not answer.
+  Ticket Render(std::vector<FrameRequest> frames, const Annotations& annotations, Duration deadline, Handlers handlers);
   // Any thread. As Render; `done` is called on the link's thread, once, unless the ticket was cancelled before.
   Ticket Ask(Question question, Duration deadline, AnswerHandler done);
   // Any thread. The handlers may still be called if they are about to be.
@@ -50,15 +56,16 @@ class ServiceLink {
     std::vector<FrameRequest> frames;
     Duration deadline{};
     Handlers handlers;
-    std::optional<Question> question;  // instead of frames
+    std::optional<Question> question;  // instead of frames, or about the key of the first one
     AnswerHandler answered;
   };
   struct OpenTask {
     Handlers handlers;
-    std::vector<RequestId> requests;  // of each frame
-    std::vector<Picture> pictures;    // of each frame
-    std::size_t left = 0;             // frames that are not finished
-    AnswerHandler answered;           // of a question, instead of `handlers`
+    std::vector<RequestId> requests;  // of each frame, and of the question
+    FrameRequest first;               // frame
+    Rendered rendered;
+    std::size_t left = 0;    // requests that are not finished
+    AnswerHandler answered;  // of a question alone, instead of `handlers`
   };
 
   Ticket Post(Task task);

@@ -12,7 +12,6 @@
 #include "client/image_io/composed_picture.h"
 #include "client/movie/turntable.h"
 #include "gateway/requests_under_way.h"
-#include "gateway/service_link.h"
 
 namespace slabstream {
 namespace {
@@ -45,19 +44,24 @@ Status TurntableMovie::RenderAndEncode() {
   const auto request = [&](int index) {
     FrameRequest frame = request_.render.frame;
     frame.view.azimuth_degrees = TurntableAzimuth(frame.view.azimuth_degrees, request_.turns, index, request_.frames);
-    const auto done = [this, index](Result<std::vector<Picture>> pictures) {
+    const auto done = [this, index](Result<ServiceLink::Rendered> rendered) {
       const std::lock_guard lock(mutex_);
-      pictures_.emplace(index, pictures.ok() ? Result<Picture>(std::move(pictures->front())) : pictures.status());
+      pictures_.emplace(index, std::move(rendered));
       changed_.notify_one();
     };
-    link.Render({std::move(frame)}, kAnswerDeadline, {.progress = {}, .done = done});
+    // All frames have the key of the first.
+    const Annotations annotations = index == 0 ? request_.render.format.annotations : Annotations();
+    link.Render({std::move(frame)}, annotations, kAnswerDeadline, {.progress = {}, .done = done});
   };
+  PictureKey key;
   for (int i = 0, requested = 0; i < request_.frames; ++i) {
     while (requested < std::min(i + kInFlight, request_.frames)) request(requested++);
-    const Result<Picture> picture = Take(i);
-    if (!picture.ok()) return picture.status();
-    metrics_.CountFrame(picture->statistics, picture->latency);
-    const auto composed = ComposedPicture::Make(picture->image, picture->size, request_.render.format, picture->geometry);
+    const Result<ServiceLink::Rendered> rendered = Take(i);
+    if (!rendered.ok()) return rendered.status();
+    if (i == 0) key = rendered->key;
+    const Picture& picture = rendered->pictures.front();
+    metrics_.CountFrame(picture.statistics, picture.latency);
+    const auto composed = ComposedPicture::Make(picture.image, picture.size, request_.render.format, picture.geometry, key);
     if (!composed.ok()) return composed.status();
     const std::vector<std::byte> frame = MovieFrame(*composed);
     // Not before there is a frame: so an error of the service comes before the first byte.
@@ -87,7 +91,7 @@ Status TurntableMovie::StartEncoder() {
   return Status::Ok();
 }
 
-Result<Picture> TurntableMovie::Take(int index) {
+Result<ServiceLink::Rendered> TurntableMovie::Take(int index) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return abandoned_ || pictures_.contains(index); });
   if (abandoned_) return Status::Cancelled("nobody reads it");

@@ -17,6 +17,7 @@
 #include "common/transport/context.h"
 #include "gateway/http.h"
 #include "gateway/metrics.h"
+#include "gateway/service_link.h"
 
 namespace slabstream {
 
@@ -45,7 +46,7 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   Status RenderAndEncode();
   Status StartEncoder();
   // Waits for the frame. Errors are the service's; Cancelled: it is no longer read.
-  Result<Picture> Take(int index);
+  Result<ServiceLink::Rendered> Take(int index);
   void ReadSome();
   void Answer(Result<std::string> part);
 
@@ -62,8 +63,8 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   // Shared.
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::unique_ptr<MovieEncoder> encoder_;    // made and ended by Make's thread
-  std::map<int, Result<Picture>> pictures_;  // that have come, and were not taken yet
+  std::unique_ptr<MovieEncoder> encoder_;                  // made and ended by Make's thread
+  std::map<int, Result<ServiceLink::Rendered>> pictures_;  // that have come, and were not taken yet
   bool abandoned_ = false;
 };
 

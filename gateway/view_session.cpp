@@ -150,15 +150,15 @@ void ViewSession::Render(std::uint64_t seq, double scale) {
   rendering.view.format = std::move(job->format);
   rendering.view.timeline = view_->timeline;
   const auto self = shared_from_this();
-  rendering.ticket = link_->Render(std::move(job->frames), kDeadline,
+  rendering.ticket = link_->Render(std::move(job->frames), rendering.view.format.annotations, kDeadline,
                                    {.progress =
                                         [self, order](const FrameProgress& progress) {
                                           asio::post(self->around_.io, [self, order, progress] { self->OnProgress(order, progress); });
                                         },
                                     .done =
-                                        [self, order](Result<std::vector<Picture>> pictures) {
-                                          asio::post(self->around_.io, [self, order, pictures = std::move(pictures)]() mutable {
-                                            self->OnFrames(order, std::move(pictures));
+                                        [self, order](Result<ServiceLink::Rendered> rendered) {
+                                          asio::post(self->around_.io, [self, order, rendered = std::move(rendered)]() mutable {
+                                            self->OnFrames(order, std::move(rendered));
                                           });
                                         }});
   rendering_ = std::move(rendering);
@@ -177,15 +177,16 @@ void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress)
                           {"read_percent", progress.read_percent}}));
 }
 
-void ViewSession::OnFrames(std::uint64_t order, Result<std::vector<Picture>> pictures) {
+void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered) {
   if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
   Rendering rendering = *std::exchange(rendering_, std::nullopt);
-  if (!pictures.ok()) {
-    if (pictures.status().code() == StatusCode::kUnavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
-    SendError(rendering.view.seq, pictures.status());
+  if (!rendered.ok()) {
+    if (rendered.status().code() == StatusCode::kUnavailable) return Do(machine_.OnUnavailable(MonotonicNow()));
+    SendError(rendering.view.seq, rendered.status());
     return Do(machine_.OnRefused(MonotonicNow()));
   }
-  RenderedView view = JoinPictures(*std::move(pictures), rendering.size);
+  RenderedView view = JoinPictures(std::move(rendered->pictures), rendering.size);
+  view.key = std::move(rendered->key);
   view.seq = rendering.view.seq;
   view.scale = rendering.view.scale;
   view.format = std::move(rendering.view.format);

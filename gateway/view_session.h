@@ -45,7 +45,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void Handle(ViewMessage view);
   void Do(const ViewMachine::Actions& actions);
   void Render(std::uint64_t seq, double scale);
-  void OnFrames(std::uint64_t order, Result<std::vector<Picture>> pictures);
+  void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void Encode(bool final, int quality);
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);

@@ -86,9 +86,10 @@ class FrameLoop {
     open_.erase(found);
     display_.FrameDone(int(index));
     failed_in_a_row_ = 0;
+    std::vector<RankReport> reports = std::exchange(picture.statistics.reports, {});  // many, which the sink does not need
     FrameRecord& record = records_[index];
-    record = {jobs_[index].output, picture.latency, std::move(picture.statistics), IsEmpty(picture.image)};
-    if (!options_.keep_reports) record.statistics.reports = {};
+    record = {jobs_[index].output, picture.latency, picture.statistics, IsEmpty(picture.image)};
+    if (options_.keep_reports) record.statistics.reports = std::move(reports);
     if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
     return Status::Ok();
   }

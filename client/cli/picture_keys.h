@@ -9,7 +9,7 @@ namespace slabstream {
 
 // Asks the service for what annotations need, of pictures like that of `request`. Empty if they need nothing.
 inline Result<PictureKey> KeyFor(Client& client, const Annotations& annotations, const FrameRequest& request) {
-  if (!annotations.color_bar && !annotations.legend) return PictureKey();
+  if (!annotations.needs_key()) return PictureKey();
   const Result<SummaryReply> summary = client.Summarize(request.dataset, request.transfer);
   if (!summary.ok()) return summary.status();
   return KeyOf(request, *summary);

@@ -86,9 +86,9 @@ RecordedFrame ReadFrame(const JsonValue& value) {
 
 }  // namespace
 
-RecordedFrame Record(const FrameStatistics& statistics, const RendererKind& renderer, Duration latency) {
+RecordedFrame Record(const FrameStatistics& statistics, Duration latency) {
   RecordedFrame frame;
-  frame.renderer = &renderer;
+  frame.renderer = RequireRenderer(statistics.renderer).value();
   frame.grid = statistics.grid;
   frame.workers = statistics.workers;
   frame.display = statistics.display;

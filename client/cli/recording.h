@@ -35,7 +35,7 @@ struct RecordedRank {
 };
 
 struct RecordedFrame {
-  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
+  const RendererKind* renderer = &DefaultRenderer();
   PixelBounds grid;  // of the frame that was rendered and combined
   std::uint32_t workers = 1;
   WorkerId display = 0;
@@ -48,7 +48,7 @@ struct RecordedFrame {
 };
 
 // The statistics must contain the reports. Ranks without a report draw nothing and cost nothing.
-RecordedFrame Record(const FrameStatistics& statistics, const RendererKind& renderer, Duration latency);
+RecordedFrame Record(const FrameStatistics& statistics, Duration latency);
 
 nlohmann::ordered_json RecordingJson(std::span<const RecordedFrame> frames);
 

@@ -103,7 +103,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
     if (Status status = WriteTextFile(options.stats_path, StatsJson(options, *frames)); !status.ok()) return status;
   }
   if (!options.trace_path.empty()) {
-    if (Status status = WriteTextFile(options.trace_path, TraceJson(options, *frames)); !status.ok()) return status;
+    if (Status status = WriteTextFile(options.trace_path, TraceJson(*frames)); !status.ok()) return status;
   }
   return frames;
 }

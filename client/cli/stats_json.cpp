@@ -53,7 +53,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
 
 std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord>& frames) {
   Json json = {{"source", options.source},
-               {"renderer", options.request.renderer},
+               {"renderer", frames.empty() ? options.request.renderer : frames.back().statistics.renderer},
                {"size", {options.request.size.width, options.request.size.height}}};
   std::uint64_t voxel_bytes = 0, image_bytes = 0;
   Json list = Json::array();

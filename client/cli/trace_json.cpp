@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "client/cli/recording.h"
-#include "common/renderers/registry.h"
 
 namespace slabstream {
 namespace {
@@ -43,7 +42,7 @@ Json Complete(const std::string& name, std::uint32_t process, std::uint32_t thre
 
 }  // namespace
 
-std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord>& frames) {
+std::string TraceJson(const std::vector<FrameRecord>& frames) {
   std::int64_t origin = 0;
   for (const FrameRecord& frame : frames) {
     origin = origin == 0 ? frame.statistics.begin_ns : std::min(origin, frame.statistics.begin_ns);
@@ -80,8 +79,7 @@ std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord
   }
   std::vector<RecordedFrame> recorded;
   recorded.reserve(frames.size());
-  for (const FrameRecord& frame : frames)
-    recorded.push_back(Record(frame.statistics, *FindRenderer(options.request.renderer), frame.latency));
+  for (const FrameRecord& frame : frames) recorded.push_back(Record(frame.statistics, frame.latency));
   const Json json = {{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}, {kRecordingKey, RecordingJson(recorded)}};
   return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -10,10 +10,9 @@
 #include <vector>
 
 #include "client/cli/frame_loop.h"
-#include "client/cli/options.h"
 
 namespace slabstream {
 
-std::string TraceJson(const FrameOptions& options, const std::vector<FrameRecord>& frames);
+std::string TraceJson(const std::vector<FrameRecord>& frames);
 
 }  // namespace slabstream

@@ -36,7 +36,8 @@ struct Annotations {
   std::optional<std::string> color_bar;  // its caption, such as a unit; "": none
   bool legend = false;
 
-  bool any() const { return scale_bar || orientation_marker || !title.empty() || color_bar || legend; }
+  bool any() const { return scale_bar || orientation_marker || !title.empty() || needs_key(); }
+  bool needs_key() const { return color_bar || legend; }
   friend bool operator==(const Annotations&, const Annotations&) = default;
 };
 

@@ -21,6 +21,12 @@ std::string NameOf(const CLI::Option& option) {
   return names.empty() ? option.get_name() : names.front();
 }
 
+// "CAPTION" of "[=CAPTION]".
+std::string NameOfOptional(std::string type) {
+  std::erase_if(type, [](char c) { return c == '[' || c == '=' || c == ']'; });
+  return type;
+}
+
 // In order of their names: CLI11 keeps them in order of their addresses.
 Json NamesOf(const std::set<CLI::Option*>& options) {
   std::set<std::string> names;
@@ -35,9 +41,11 @@ Json DescribeRenderers() {
                  {"title", kind->title()},
                  {"purpose", kind->purpose()},
                  {"abilities", Json::array()},
-                 {"parameters", Json::array()}};
+                 {"parameters", Json::object()}};
     for (const std::string_view ability : kind->AbilityNames()) json["abilities"].push_back(ability);
-    for (const RendererParameter& parameter : kind->parameters()) json["parameters"].push_back(parameter.name);
+    for (const RendererParameter& parameter : kind->parameters()) {
+      json["parameters"][std::string(parameter.name)] = TextOf(parameter, parameter.standard);
+    }
     renderers.push_back(std::move(json));
   }
   return renderers;
@@ -59,7 +67,9 @@ Json DescribeWindows() {
 
 Json Describe(CLI::Option& option) {
   Json json = {{"name", NameOf(option)}, {"group", option.get_group()}};
-  if (option.get_items_expected_max() > 0) json["type"] = option.get_type_name();
+  const bool alone = option.get_items_expected_max() == 0;
+  if (!alone) json["type"] = option.get_type_name();
+  if (alone && !option.get_type_name().empty()) json["optional_value"] = NameOfOptional(option.get_type_name());
   if (!option.get_default_str().empty()) json["default"] = option.get_default_str();
   const OptionDomain domain = DomainOf(option);
   if (!domain.choices.empty()) json["choices"] = domain.choices;
@@ -77,7 +87,10 @@ Json Describe(CLI::Option& option) {
     if (!field->unit.empty()) json["unit"] = field->unit;
     if (!field->ability.empty()) json["ability"] = field->ability;
     if (field->same_picture) json["same_picture"] = true;
-    if (field->path == "renderer") json["renderers"] = DescribeRenderers();
+    if (field->path == "renderer") {
+      json["renderers"] = DescribeRenderers();
+      json["automatic"] = {{"volumes", DefaultRenderer(false).name()}, {"grids", DefaultRenderer(true).name()}};
+    }
     if (option.get_type_name() == "TRANSFER") json["presets"] = DescribePresets();
   }
   if (NameOf(option) == "window") json["windows"] = DescribeWindows();

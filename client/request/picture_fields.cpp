@@ -13,7 +13,9 @@
 namespace slabstream {
 namespace {
 
-bool IsFlag(const CLI::Option& option) { return option.get_expected_max() == 0; }
+// Its value may be left out: a flag has none, but --color-bar may have one.
+bool MayStandAlone(const CLI::Option& option) { return option.get_expected_max() == 0; }
+bool IsFlag(const CLI::Option& option) { return MayStandAlone(option) && option.get_type_name().empty(); }
 
 // The options, and where their values go.
 struct RenderOptionsApp {
@@ -46,12 +48,12 @@ Status AddArgument(CLI::App& app, const PictureField& field, std::vector<std::st
   const bool proper = !field.name.empty() && field.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
   const CLI::Option* const option = proper ? app.get_option_no_throw(name) : nullptr;
   if (option == nullptr) return Status::InvalidArgument(fmt::format("there is no option '{}'", Printable(field.name.substr(0, 64))));
-  if (IsFlag(*option)) {
-    if (field.text != "true" && field.text != "false" && !field.text.empty()) {
-      return Status::InvalidArgument(fmt::format("{} '{}' is neither true nor false", name, Printable(field.text.substr(0, 64))));
-    }
+  if (MayStandAlone(*option) && (field.text == "true" || field.text == "false" || field.text.empty())) {
     if (field.text != "false") arguments.push_back(name);
     return Status::Ok();
+  }
+  if (IsFlag(*option)) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither true nor false", name, Printable(field.text.substr(0, 64))));
   }
   if (field.text.empty()) return Status::InvalidArgument(fmt::format("{} has no value", name));
   arguments.push_back(fmt::format("{}={}", name, field.text));

@@ -16,7 +16,7 @@ namespace slabstream {
 
 struct PictureField {
   std::string name;  // of an option, without dashes
-  std::string text;  // a flag: "true", "false", or empty for "true"
+  std::string text;  // of a flag, or of an option whose value is left out: "true", "false", or empty for "true"
 };
 using PictureFields = std::vector<PictureField>;
 

@@ -81,8 +81,7 @@ void AddPictureFormat(CLI::App& app, PictureFormat& format) {
   AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
 }
 
-// `here`: whoever draws the picture asks for its key.
-void AddAnnotationOptions(CLI::App& app, Annotations& annotations, bool here) {
+void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
   app.option_defaults()->group("Annotations (drawn onto the picture)");
   app.add_flag("--scale-bar", annotations.scale_bar,
                "A scale bar: mm for patients, else the unit of the file or voxels; under perspective it holds at the depth of the target");
@@ -93,7 +92,6 @@ void AddAnnotationOptions(CLI::App& app, Annotations& annotations, bool here) {
       [](const std::string& option, const std::string& text) { return TextIf(CheckTitle(option, text), text); },
       fmt::format("A line of at most {} characters at the top", kMaxTitleCharacters))
       ->type_name("TITLE");
-  if (!here) return;
   AddOptionalValue(
       app, "--color-bar", annotations.color_bar, "",
       [](const std::string& option, const std::string& text) -> Result<std::optional<std::string>> {
@@ -134,7 +132,7 @@ void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat
   AddWholeViews(app, request.view, files != nullptr);
   if (files != nullptr) AddLayerFiles(app, *files, &request);
   AddPictureFormat(app, format);
-  AddAnnotationOptions(app, format.annotations, files != nullptr);
+  AddAnnotationOptions(app, format.annotations);
 }
 
 void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* files) {
@@ -184,7 +182,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
   app.get_option("--transfer")->excludes(window)->default_str("window");
   app.get_option("--size")->group("Plane");
   AddPictureFormat(app, slice.format);
-  if (files != nullptr) AddAnnotationOptions(app, slice.format.annotations, true);
+  AddAnnotationOptions(app, slice.format.annotations);
 }
 
 Result<ViewParameters> ParseCamera(const std::string& text) {

@@ -135,6 +135,11 @@ Json GeometryJson(const PictureGeometry& geometry) {
           {"target", VectorJson(geometry.target)}, {"target_depth", geometry.target_depth}, {"pixel_size", geometry.pixel_size}};
 }
 
+FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
+  if (!statistics.renderer.empty()) request.renderer = statistics.renderer;
+  return request;
+}
+
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers) {
   Json made = Json::parse(RequestToJson(request));

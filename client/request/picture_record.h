@@ -18,6 +18,7 @@
 #include "client/request/request_options.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
+#include "common/wire/client_messages.h"
 #include "data/layers/layer_reader.h"
 
 namespace slabstream {
@@ -33,6 +34,9 @@ struct PictureRecord {
 
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);
+
+// The request of a picture with the renderer that has made it, so that its record names that one. Of a preview: the request as it is.
+FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics);
 
 // ASCII, one line.
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,

@@ -54,6 +54,8 @@ Choices ChoicesOf(const std::string& list) {
   if (list == "balance modes") add_all(BalanceModes());
   if (list == "presets") add_all(TransferPresets());
   if (list == "renderers") {
+    choices.Add(kAutomatic,
+                fmt::format("{} for volumes, {} for unstructured grids", DefaultRenderer(false).name(), DefaultRenderer(true).name()));
     for (const RendererKind* kind : Renderers()) choices.Add(kind->name(), kind->purpose());
   }
   if (list == "combining schemes") {
@@ -102,25 +104,34 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
 
 // Any renderer's parameters, by name. Whether the chosen renderer has one is checked with the request.
 void AddParameters(const std::string& group, std::vector<RequestOption>& table) {
-  std::map<std::string_view, std::pair<const RendererParameter*, std::string>> parameters;  // and the renderers with this parameter
+  struct Entry {
+    const RendererParameter* parameter = nullptr;
+    std::string renderers;  // with this parameter
+    std::string standard;   // that of the first, and those that differ from it
+  };
+  std::map<std::string_view, Entry> parameters;
   for (const RendererKind* kind : Renderers()) {
     for (const RendererParameter& parameter : kind->parameters()) {
-      auto& [entry, renderers] = parameters[parameter.name];
-      entry = &parameter;
+      auto& [first, renderers, standard] = parameters[parameter.name];
+      if (first == nullptr) {
+        first = &parameter;
+        standard = TextOf(parameter, parameter.standard);
+      } else if (parameter.standard != first->standard) {
+        standard += fmt::format(", {}: {}", kind->name(), TextOf(parameter, parameter.standard));
+      }
       renderers += (renderers.empty() ? "" : ", ") + std::string(kind->name());
     }
   }
   for (const auto& [name, entry] : parameters) {
-    const auto& [parameter, renderers] = entry;
+    const auto& [parameter, renderers, standard] = entry;
     const bool choice = !parameter->choices.empty();
-    RequestOption& option = table.emplace_back(RequestOption{
-        .name = std::string(name),
-        .path = fmt::format("{}.{}", kParameters, name),
-        .group = group,
-        .help = fmt::format("{}; for --renderer {}", parameter->purpose, renderers),
-        .value = choice ? "NAME" : "NUMBER",
-        .standard = choice ? std::string(parameter->choices[std::size_t(parameter->standard)]) : fmt::format("{:g}", parameter->standard),
-        .choices = {parameter->choices.begin(), parameter->choices.end()}});
+    RequestOption& option = table.emplace_back(RequestOption{.name = std::string(name),
+                                                             .path = fmt::format("{}.{}", kParameters, name),
+                                                             .group = group,
+                                                             .help = fmt::format("{}; for --renderer {}", parameter->purpose, renderers),
+                                                             .value = choice ? "NAME" : "NUMBER",
+                                                             .standard = standard,
+                                                             .choices = {parameter->choices.begin(), parameter->choices.end()}});
     if (!choice) option.range = NumberRange{parameter->least, parameter->most};
   }
 }

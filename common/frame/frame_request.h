@@ -25,6 +25,7 @@ inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
 inline constexpr std::size_t kMaxNameBytes = 256;
+inline constexpr std::string_view kAutomatic = "auto";  // in place of a name: the service chooses
 
 // kAuto: z, or the longest axis of slabs (SlabAxis), so that turning the view never moves voxels. kView: the axis along which the slices of
 // the frame are traversed, so that no slice is divided. Each of the three axes then has its own layout; workers fetch its voxels when a
@@ -71,12 +72,11 @@ struct OverlayChoice {
 // Values of a renderer's parameters (RendererKind::parameters), by name, as a user types them. Missing ones have their defaults.
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
-inline constexpr std::string_view kDefaultRenderer = SLABSTREAM_DEFAULT_RENDERER;  // common/renderers/CMakeLists.txt
 
 struct FrameRequest {
-  std::string dataset;                     // a name of the catalogue, 1 ... kMaxNameBytes
-  std::string renderer{kDefaultRenderer};  // a name of Renderers() (common/renderers/registry.h)
-  ParameterTexts parameters;               // of the renderer
+  std::string dataset;               // a name of the catalogue, 1 ... kMaxNameBytes
+  std::string renderer{kAutomatic};  // a name of Renderers() (common/renderers/registry.h), or kAutomatic: by the dataset (RenderersFor)
+  ParameterTexts parameters;         // of the renderer
   ImageSize size;
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn

@@ -12,8 +12,6 @@
 
 namespace slabstream {
 
-inline constexpr std::string_view kAutomatic = "auto";
-
 // Whether a name is left to ChoosePolicy. Plans and layouts need policies without such names.
 inline bool LeavesChoice(const Policy& policy) {
   return policy.decomposition == kAutomatic || policy.assignment == kAutomatic || policy.combine == kAutomatic;

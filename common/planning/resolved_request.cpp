@@ -104,8 +104,11 @@ void Brighten(double factor, TransferFunction& transfer) {
 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
   const VolumeGeometry& geometry = summary->description.geometry;
-  const RendererKind* const renderer = FindRenderer(request.renderer);
+  const RendererKind* const renderer =
+      request.renderer == kAutomatic ? &DefaultRenderer(!summary->cells.empty()) : FindRenderer(request.renderer);
+  request.renderer = renderer->name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
+  if (const auto parameters = ParseParameters(*renderer, request.parameters); !parameters.ok()) return parameters.status();
   if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();

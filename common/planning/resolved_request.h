@@ -1,6 +1,6 @@
-// ResolvedRequest: a request in which all that it says about its dataset has been looked up: transfer function, clip region, labels and
-// policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they meet no unknown
-// name.
+// ResolvedRequest: a request in which all that it says about its dataset has been looked up: renderer, transfer function, clip region,
+// labels and policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they meet
+// no unknown name.
 #pragma once
 
 #include <memory>
@@ -16,14 +16,15 @@
 namespace slabstream {
 
 struct ResolvedRequest {
-  FrameRequest frame;                            // with a settled policy (SettledPolicy)
+  FrameRequest frame;                            // with the name of its renderer and a settled policy (SettledPolicy)
   ClassifiedVolume volume;                       // how it shows the dataset, whatever its view
   std::shared_ptr<const VolumeSummary> summary;  // of the dataset; never null
   std::optional<ResolvedPolicy> policy;          // none: a choice is left (LeavesChoice)
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the
-// volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such preset.
+// renderer that kAutomatic means has no such parameter; the volume has no slice with the slab's index, or no such layer, or there is no
+// such label; NotFound: no such preset.
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/check.h"
 #include "common/base/parse_number.h"
 
 // Each renderer's folder defines Kind() in a namespace with the renderer's name.
@@ -30,6 +31,16 @@ Result<double> ParseParameter(const RendererParameter& parameter, const std::str
   if (value && *value >= parameter.least && *value <= parameter.most) return *value;
   return Status::InvalidArgument(
       fmt::format("{} is '{}', but must be a number in [{}, {}]", parameter.name, text, parameter.least, parameter.most));
+}
+
+Status NoSuchRenderer(std::string_view name, std::string_view others) {
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but must be one of: {}{}", name, others, fmt::join(RendererNames(), ", ")));
+}
+
+// Null: the renderer does not have it.
+const RendererParameter* FindParameter(const RendererKind& kind, std::string_view name) {
+  const auto found = std::ranges::find(kind.parameters(), name, &RendererParameter::name);
+  return found == kind.parameters().end() ? nullptr : &*found;
 }
 
 }  // namespace
@@ -62,26 +73,47 @@ const RendererKind* FindRenderer(std::string_view name) {
   return found == Renderers().end() ? nullptr : *found;
 }
 
+std::string TextOf(const RendererParameter& parameter, double value) {
+  return parameter.choices.empty() ? fmt::format("{:g}", value) : std::string(parameter.choices.at(std::size_t(value)));
+}
+
+const RendererKind& DefaultRenderer(bool has_cells) {
+  const auto draws_it = [&](const RendererKind* kind) { return kind->Can(Ability::kCells) == has_cells; };
+  const auto found = std::ranges::find_if(Renderers(), draws_it);
+  CHECK(found != Renderers().end());
+  return **found;
+}
+
 Result<const RendererKind*> RequireRenderer(std::string_view name) {
   if (const RendererKind* kind = FindRenderer(name)) return kind;
-  return Status::InvalidArgument(fmt::format("renderer is '{}', but must be one of: {}", name, fmt::join(RendererNames(), ", ")));
+  return NoSuchRenderer(name, "");
+}
+
+Result<std::vector<const RendererKind*>> RenderersFor(std::string_view name) {
+  if (name == kAutomatic) return std::vector{&DefaultRenderer(false), &DefaultRenderer(true)};
+  if (const RendererKind* kind = FindRenderer(name)) return std::vector{kind};
+  return NoSuchRenderer(name, fmt::format("{}, ", kAutomatic));
+}
+
+Status CheckParameters(std::string_view name, std::span<const RendererKind* const> renderers, const ParameterTexts& texts) {
+  for (const auto& [parameter, text] : texts) {
+    const RendererParameter* found = nullptr;
+    for (const RendererKind* kind : renderers) found = found != nullptr ? found : FindParameter(*kind, parameter);
+    if (found == nullptr) {
+      return Status::InvalidArgument(fmt::format("{} is '{}', but the renderer '{}' has no such parameter", parameter, text, name));
+    }
+    if (const Result<double> value = ParseParameter(*found, text); !value.ok()) return value.status();
+  }
+  return Status::Ok();
 }
 
 Result<std::vector<double>> ParseParameters(const RendererKind& kind, const ParameterTexts& texts) {
+  const RendererKind* const renderers[] = {&kind};
+  if (Status status = CheckParameters(kind.name(), renderers, texts); !status.ok()) return status;
   std::vector<double> values;
   for (const RendererParameter& parameter : kind.parameters()) {
     const auto text = texts.find(parameter.name);
-    if (text == texts.end()) {
-      values.push_back(parameter.standard);
-      continue;
-    }
-    Result<double> value = ParseParameter(parameter, text->second);
-    if (!value.ok()) return value.status();
-    values.push_back(*value);
-  }
-  for (const auto& [name, text] : texts) {
-    if (std::ranges::find(kind.parameters(), name, &RendererParameter::name) != kind.parameters().end()) continue;
-    return Status::InvalidArgument(fmt::format("{} is '{}', but the renderer '{}' has no such parameter", name, text, kind.name()));
+    values.push_back(text == texts.end() ? parameter.standard : ParseParameter(parameter, text->second).value());
   }
   return values;
 }

@@ -6,13 +6,13 @@
 namespace slabstream {
 
 // The first parameter of each.
-inline RendererParameter SamplingRate() {
-  return {.name = "sampling-rate", .purpose = "Samples along a ray in each voxel length", .standard = 1, .least = 0.1, .most = 16};
+inline RendererParameter SamplingRate(double standard = 1) {
+  return {.name = "sampling-rate", .purpose = "Samples along a ray in each voxel length", .standard = standard, .least = 0.1, .most = 16};
 }
 
 // Its value, of CostBasis::parameters.
-inline double SamplingRateOf(std::span<const double> parameters) {
-  return parameters.empty() ? SamplingRate().standard : parameters.front();
+inline double SamplingRateOf(std::span<const double> parameters, double standard = 1) {
+  return parameters.empty() ? standard : parameters.front();
 }
 
 }  // namespace slabstream

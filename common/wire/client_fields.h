@@ -1,6 +1,7 @@
 // Messages of the client plane.
 #pragma once
 
+#include "common/renderers/registry.h"
 #include "common/wire/request_fields.h"
 #include "slabstream/v1/client.pb.h"
 
@@ -47,6 +48,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Any(m.workers, &P::workers, &P::set_workers);
   io.Any(m.groups, &P::groups, &P::set_groups);
   io.Any(m.attempts, &P::attempts, &P::set_attempts);
+  io.Text("renderer", m.renderer, &P::renderer, &P::mutable_renderer, 0, kMaxNameBytes);
   io.Text("decomposition", m.decomposition, &P::decomposition, &P::mutable_decomposition, 0, kMaxNameBytes);
   io.Text("axis", m.axis, &P::axis, &P::mutable_axis, 0, kMaxNameBytes);
   io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 0, kMaxNameBytes);
@@ -93,6 +95,7 @@ void Fields(auto& io, Is<FrameReply> auto& m) {
   io.Check([&](Checker& check) {
     const PixelBounds picture = {0, 0, m.size.width, m.size.height};
     check.That(picture.Contains(m.runs.image.bounds), "runs.image.bounds", "not inside the picture");
+    if (m.groups_done == m.group_count) check.Adopt(RequireRenderer(m.statistics.renderer).status());
   });
 }
 

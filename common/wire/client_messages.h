@@ -66,6 +66,7 @@ struct FrameProgress {
 // What the frame's plan was and what it cost; reports of all groups.
 struct FrameStatistics {
   std::uint32_t workers = 0, groups = 0, attempts = 0;
+  std::string renderer;                                                       // its name, never kAutomatic
   std::string decomposition, balance_by, axis, assignment, balance, combine;  // axis: "x", "y" or "z"
   std::int64_t queued_ns = 0;                                                 // arrival to plan
   std::int64_t begin_ns = 0, end_ns = 0;                                      // plan to last byte at the coordinator, MonotonicNow() clock

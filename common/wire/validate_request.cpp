@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <set>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -18,8 +19,9 @@ namespace {
 // What the schema says of values, one by one. Only the first failure counts.
 class SchemaCheck {
  public:
-  // `renderer`: null, then what it can do is not asked for.
-  SchemaCheck(std::string path, const RendererKind* renderer) : path_(std::move(path)), renderer_(renderer) {}
+  // `renderers`: those of `name` (RenderersFor), which must all be able to do what is asked for; none: that is not checked.
+  explicit SchemaCheck(std::string path, std::string name = {}, std::span<const RendererKind* const> renderers = {})
+      : path_(std::move(path)), name_(std::move(name)), renderers_(renderers) {}
 
   template <class Struct>
   Status Of(const Struct& value) {
@@ -112,9 +114,8 @@ class SchemaCheck {
     const auto found = std::ranges::find(kAbilityNames, name);
     CHECK(found != kAbilityNames.end()) << name;
     const auto ability = Ability(found - kAbilityNames.begin());
-    if (renderer_ == nullptr || renderer_->Can(ability)) return;
-    Keep(Status::InvalidArgument(
-        fmt::format("renderer is '{}', but {} needs one of: {}", renderer_->name(), what, NamesOfAble(NameOf(ability)))));
+    if (std::ranges::all_of(renderers_, [&](const RendererKind* kind) { return kind->Can(ability); })) return;
+    Keep(Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", name_, what, NamesOfAble(NameOf(ability)))));
   }
 
   void Keep(const Status& status) {
@@ -122,13 +123,14 @@ class SchemaCheck {
   }
 
   std::string path_;
-  const RendererKind* renderer_;
+  std::string name_;
+  std::span<const RendererKind* const> renderers_;
   Status status_;
 };
 
 template <class T>
 Status CheckSchema(const char* path, const T& value) {
-  return SchemaCheck(path, nullptr).Of(value);
+  return SchemaCheck(path).Of(value);
 }
 
 // ---- what holds between values
@@ -229,10 +231,10 @@ Status Validate(const Clipping& clipping) { return ValidatePart("clipping", clip
 Status Validate(const Shading& shading) { return ValidatePart("shading", shading); }
 
 Status Validate(const FrameRequest& request) {
-  const Result<const RendererKind*> renderer = RequireRenderer(request.renderer);
-  if (!renderer.ok()) return renderer.status();
-  if (const auto parameters = ParseParameters(**renderer, request.parameters); !parameters.ok()) return parameters.status();
-  if (Status s = SchemaCheck("", *renderer).Of(request); !s.ok()) return s;
+  const Result<std::vector<const RendererKind*>> renderers = RenderersFor(request.renderer);
+  if (!renderers.ok()) return renderers.status();
+  if (Status s = CheckParameters(request.renderer, *renderers, request.parameters); !s.ok()) return s;
+  if (Status s = SchemaCheck("", request.renderer, *renderers).Of(request); !s.ok()) return s;
   if (Status s = CheckRules(request.size); !s.ok()) return s;
   if (Status s = CheckRules(request.view); !s.ok()) return s;
   if (Status s = CheckRules(request.clipping); !s.ok()) return s;

@@ -6,7 +6,8 @@
 
 namespace slabstream {
 
-// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames).
+// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames). If the renderer is kAutomatic, all
+// that it may mean must be able to do what is asked for; whether the one that it means has the parameters turns out later (ResolveRequest).
 Status Validate(const FrameRequest& request);
 
 // The same of its parts.

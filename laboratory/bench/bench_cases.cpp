@@ -52,8 +52,8 @@ BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind*
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
   const std::string dataset = SphereName(sphere);
-  return {.name = fmt::format("{}{}{}", renderer == FindRenderer(kDefaultRenderer) ? std::string() : std::string(renderer->name()) + "-",
-                              dataset, opacity == kOpaqueSphere && !points ? "-opaque" : ""),
+  return {.name = fmt::format("{}{}{}", renderer == &DefaultRenderer() ? std::string() : std::string(renderer->name()) + "-", dataset,
+                              opacity == kOpaqueSphere && !points ? "-opaque" : ""),
           .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
                                  sphere.size, sphere.occupancy * 100, opacity, renderer->title()),
           .dataset = dataset,

@@ -19,7 +19,7 @@ struct BenchCase {
   std::string purpose;                              // one line for --list
   std::string dataset;                              // the volume's name: cases of one volume share it, and at a service it is the dataset's
   std::variant<SphereRequest, std::string> volume;  // made here, or a file's path (unused at a service)
-  const RendererKind* renderer = FindRenderer(kDefaultRenderer);
+  const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
 };
@@ -27,9 +27,9 @@ struct BenchCase {
 const std::vector<BenchCase>& StandardBenchCases();
 
 // A sphere whose occupied voxels have this opacity.
-BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer = &DefaultRenderer());
 // With the occupancy of its class, 5 or 40 %. A renderer that shows surfaces gets an opaque one.
-BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer = FindRenderer(kDefaultRenderer));
+BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer = &DefaultRenderer());
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 // The MRI brain of Debian's package mricron-data.
 BenchCase BrainCase();

@@ -55,7 +55,7 @@ std::vector<BenchCase> VolumesOf(const ExperimentOptions& options, int size) {
   const auto add_with = [&](const RendererKind* renderer) {
     const std::size_t begin = volumes.size();
     if (own.cases.empty()) {
-      const RendererKind* const kind = renderer != nullptr ? renderer : FindRenderer(kDefaultRenderer);
+      const RendererKind* const kind = renderer != nullptr ? renderer : &DefaultRenderer();
       for (const SphereClass sphere : {SphereClass::kHollow, SphereClass::kFilled}) volumes.push_back(StandardSphere(sphere, size, kind));
       if (!options.quick || !named.empty()) std::ranges::move(RealVolumes(named), std::back_inserter(volumes));
     } else {

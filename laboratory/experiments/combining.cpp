@@ -126,7 +126,7 @@ double CombiningSeconds(const Combining& c, std::uint64_t seed, const MachineMod
   VolumeSummary summary;
   summary.description.geometry.size = {8, 8, c.ranks};
   plan.setup.description = summary.description;
-  SetRenderer(*FindRenderer(kDefaultRenderer), plan.setup);
+  SetRenderer(DefaultRenderer(), plan.setup);
   plan.setup.sheets.width = plan.setup.sheets.height = c.side;
   plan.slots = std::uint32_t(c.ranks);
   plan.display = 1;

@@ -237,7 +237,7 @@ Result<Sweep> ParseSweep(const std::string& path, std::string_view text, SweepPl
     if (!mistake && !from_service && !json.contains(needed)) mistake = fmt::format("'{}' is missing", needed);
   }
   if (sweep.title.empty()) sweep.title = "Sweep";
-  if (sweep.renderers.empty()) sweep.renderers = {{.name = std::string(kDefaultRenderer)}};
+  if (sweep.renderers.empty()) sweep.renderers = {{.name = std::string(DefaultRenderer().name())}};
   if (sweep.views.empty()) sweep.views = {{"view 1", BenchView(Projection::kOrthographic, 1, 12)}};
   if (sweep.links.empty() && place == SweepPlace::kHere) sweep.links = {{"10gbit", *ParseLink("link", "10gbit")}};
   CheckNamesDiffer(sweep.volumes, "volumes", mistake);

@@ -23,7 +23,7 @@ inline constexpr std::size_t kMaxSweepCases = 10000;
 
 struct SweepRenderer {
   std::string name;
-  const RendererKind* kind = FindRenderer(kDefaultRenderer);
+  const RendererKind* kind = &DefaultRenderer();
   FrameRequest look = {};  // as FrameCase has it
 };
 struct SweepPolicy {

@@ -56,6 +56,7 @@ class Statistics:
     workers: int
     groups: int
     attempts: int                # above 1: workers were lost
+    renderer: str                # that made the picture, never "auto"
     decomposition: str
     axis: str
     combine: str
@@ -102,6 +103,7 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
         workers=message.workers,
         groups=message.groups,
         attempts=message.attempts,
+        renderer=message.renderer,
         decomposition=message.decomposition,
         axis=message.axis,
         combine=message.combine,

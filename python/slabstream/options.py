@@ -33,7 +33,7 @@ class Option:
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
     same_picture: bool      # it never changes the finished picture
-    renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, parameters of each
+    renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
     windows: dict[str, tuple[float, float]]  # of the option window: width and level by name
 
 

@@ -89,6 +89,7 @@ Answer ReplyTo(RequestId request, std::uint32_t groups_done = 1, std::uint32_t g
   for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i % 4 == 3 ? 0.5F : 0.001F * float(i % 97);
   RunImage runs = EncodeRuns(image, {0, 32 * 24}, 32);
   FrameReply reply{.request = request, .size = {32, 24}, .groups_done = groups_done, .group_count = group_count};
+  reply.statistics.renderer = "raycast";
   reply.statistics.decomposition = "slab";
   reply.statistics.axis = "z";
   reply.statistics.combine = "fan-in";

@@ -47,6 +47,7 @@ TEST(CoordinatorFrames, FrameRunsGroupByGroupToItsPicture) {
   EXPECT_EQ(replies[0].to, kClient);
   EXPECT_EQ(replies[0].payload.span().data(), payload.span().data()) << "not a copy";
   const FrameStatistics& statistics = replies[0].message.statistics;
+  EXPECT_EQ(statistics.renderer, "splat") << "which the request leaves to the service";
   EXPECT_EQ(statistics.workers, 2U);
   EXPECT_EQ(statistics.groups, 3U);
   EXPECT_EQ(statistics.attempts, 1U);

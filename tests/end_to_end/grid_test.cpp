@@ -93,6 +93,30 @@ TEST_F(GridTest, AnyNumberOfWorkersDrawsTheSameCells) {
   MustRun({"down"});
 }
 
+TEST_F(GridTest, ItsCellsAreDrawnUnlessARequestNamesARenderer) {
+  MakeSphere("ball.nrrd", 2, 16);
+  const auto render = [&](const std::string& source, const std::string& output, std::vector<std::string> more) {
+    std::vector<std::string> arguments = {"render", source, "-o", output, "--local=2", "--size", "64", "--azimuth", "30"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadFile(output);
+  };
+  const std::string cells = render("grid.vtu", "cells.png", {"--stats", "cells.json", "--trace", "trace.json"});
+  EXPECT_EQ(cells, render("grid.vtu", "sliced.png", {"--renderer", "slice"})) << "with their records";
+  const std::string pixels = render("grid.vtu", "pixels.png", {"--no-record"});
+  EXPECT_EQ(pixels, render("grid.vtu", "eight.png", {"--no-record", "--sampling-rate", "8"}));
+  EXPECT_NE(pixels, render("grid.vtu", "one.png", {"--no-record", "--sampling-rate", "1"}));
+  EXPECT_EQ(json::parse(ReadFile("cells.json"))["renderer"], "slice");
+  EXPECT_EQ(json::parse(ReadFile("trace.json"))["slabstream"]["frames"][0]["renderer"], "slice");
+  EXPECT_THAT(MustRun({"info", "cells.png"}).out, HasSubstr("--renderer slice"));
+  EXPECT_EQ(render("ball.nrrd", "ball.png", {"--renderer", "auto"}), render("ball.nrrd", "splat.png", {"--renderer", "splat"}));
+  ExpectEachRefused({"render", "-o", "x.png", "--local=1"},
+                    {{{"ball.nrrd", "--sampling-rate", "2"}, "sampling-rate is '2', but the renderer 'splat' has no such parameter"},
+                     {{"grid.vtu", "--sampling-rate", "17"}, "sampling-rate"},
+                     {{"grid.vtu", "--kernel", "linear"}, "kernel is 'linear', but the renderer 'auto' has no such parameter"},
+                     {{"grid.vtu", "--isovalue", "1"}, "renderer is 'auto', but isovalue needs one of: zbuffer, raycast"}});
+}
+
 TEST_F(GridTest, WhatCannotBeDrawnIsRefused) {
   MakeSphere("ball.nrrd", 2, 16);
   ExpectEachRefused({"render", "-o", "x.png", "--local=1", "--renderer", "slice"},

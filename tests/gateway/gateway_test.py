@@ -130,19 +130,35 @@ class HttpTest(WithService):
             ("render", {"eye": "-40,-50,10", "look-at": "1,2,3", "up": "0,1,1", "shading": "none", "termination": 0}),
             ("slice", {"plane": "zyx"}),
             ("slice", {"plane": "x", "index": 3, "window": 2, "level": 1, "background": "white"}),
+            ("render", {"size": 200, "color-bar": "true", "brightness": 0.5, "transfer": "viridis"}),
+            ("render", {"size": 200, "color-bar": "Density, kg/m³", "title": "Both", "scale-bar": "true", "transfer": "auto", "renderer": "raycast",
+                        "isovalue": "1:blue:0.5", "legend": "true"}),
+            ("slice", {"size": 160, "plane": "zyx", "color-bar": "T", "title": "Planes", "scale-bar": "true", "orientation-marker": "true"}),
+            ("slice", {"size": 160, "label-mode": "tint", "legend": "true", "dataset": "c"}),
         ]
         for kind, options in cases:
             with self.subTest(kind=kind, **{k.replace("-", "_"): v for k, v in options.items()}):
-                options.setdefault("size", "48")
-                arguments = [f"--{name}={value}" for name, values in options.items() for value in (values if isinstance(values, list) else [values])]
-                self.programs.run(kind, "a", "--endpoint", self.endpoint, "-o", "file.png", *arguments)
+                options = {"size": "48", "dataset": "a", **options}
+                arguments = [f"--{name}={value}" for name, values in options.items() if name != "dataset" for value in (values if isinstance(values, list) else [values])]
+                self.programs.run(kind, options["dataset"], "--endpoint", self.endpoint, "-o", "file.png", *arguments)
                 file = (self.programs.folder / "file.png").read_bytes()
-                status, headers, body = self.get(f"/api/v1/{kind}.png", dataset="a", **options)
+                status, headers, body = self.get(f"/api/v1/{kind}.png", **options)
                 self.assertEqual(status, 200, body)
                 self.assertEqual(headers["Content-Type"], "image/png")
                 self.assertEqual(body, file)
-                posted = self.gateway.request(f"/api/v1/{kind}.png", method="POST", body=json.dumps({"dataset": "a", **options}))
+                posted = self.gateway.request(f"/api/v1/{kind}.png", method="POST", body=json.dumps(options))
                 self.assertEqual(posted[2], file)
+
+    def test_a_colour_bar_has_a_caption_or_none(self):
+        options = {"dataset": "a", "size": 200}
+        plain, bare, named = (self.get("/api/v1/render.png", **options, **bar)[2] for bar in ({}, {"color-bar": ""}, {"color-bar": "K"}))
+        self.assertEqual(self.get("/api/v1/render.png", **options, **{"color-bar": "false"})[2], plain)
+        for value, same in ((True, bare), (False, plain), ("K", named), ("", bare)):
+            body = json.dumps({**options, "color-bar": value})
+            self.assertEqual(self.gateway.request("/api/v1/render.png", method="POST", body=body)[2], same, value)
+        self.assertEqual(len({plain, bare, named}), 3)
+        _, command = self.gateway.json("/api/v1/command?" + urllib.parse.urlencode({**options, "color-bar": "K", "legend": "true"}))
+        self.assertIn("--color-bar=K --legend", command["command"])
 
     def test_a_color_map_may_be_sent(self):
         color_map = [{"Name": "m", "RGBPoints": [0, 0, 0, 1, 5, 1, 1, 0], "Points": [0, 0, 0.5, 0, 5, 1, 0.5, 0]}]
@@ -449,7 +465,7 @@ class ViewTest(WithService):
         self.assertEqual(page.receive()["type"], "hello")
         self.assertEqual(page.text("status")["service"], "ready")
         for options in ({"azimuth": 30, "renderer": "raycast"}, {"clip-box": ":,:,3:", "scale-bar": True}, {"renderer": "mip", "size": "64x40"},
-                        {"clip-box": "500:600,:,:"}):
+                        {"clip-box": "500:600,:,:"}, {"size": 160, "color-bar": "K", "legend": True, "renderer": "zbuffer", "isovalue": 1, "transfer": "auto"}):
             options = {"dataset": "a", "size": 48, **options}
             header, data, count = page.final(page.view(options))
             self.assertEqual(count, 2)  # one that moves, and the still one
@@ -458,6 +474,9 @@ class ViewTest(WithService):
         options = {"dataset": "a", "size": 40, "plane": "zyx", "background": "#204060"}
         header, data, _ = page.final(page.view(options, picture="slice"))
         self.assertEqual(whole(header, data, b"\x20\x40\x60\xff"), png_pixels(self.get("/api/v1/slice.png", **options)[2]))
+        options.update({"size": 160, "color-bar": "", "title": "Planes", "scale-bar": "true"})
+        header, data, _ = page.final(page.view(options, picture="slice"))
+        self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/slice.png", **options)[2]))
 
     def test_moving_pictures_are_jpeg_of_what_shows(self):
         page = self.page()
@@ -595,6 +614,11 @@ class TurntableTest(unittest.TestCase):
             self.assertIn(part, arguments)
         posted = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**fields, "frames": 5, "turns": 2}))
         self.assertEqual(posted[2], body)
+        marked = {**fields, "size": "160x120", "color-bar": "K"}
+        movie = gateway.request("/api/v1/turntable.mp4?" + urllib.parse.urlencode({**marked, "frames": 2}))[2]
+        frames = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**marked, "azimuth": azimuth}))[2]))
+                  for azimuth in (350, 170)]
+        self.assertEqual(movie, b"".join(frames))
         # To clients of HTTP/1.0 the end of the connection is the movie's.
         old = gateway.raw(f"GET /api/v1/turntable.mp4?dataset=a&size=16&frames=2&token={gateway.token} HTTP/1.0\r\nHost: {gateway.authority}\r\n\r\n".encode())
         self.assertEqual(len(old.split(b"\r\n\r\n", 1)[1]), 2 * 16 * 16 * 3)

@@ -38,6 +38,7 @@ class AtAService(WithAService):
         self.assertEqual((image.geometry.world, image.geometry.unit), ("patient", "millimetre"))
         np.testing.assert_allclose(image.geometry.right, (0, 1, 0), atol=1e-12)
         self.assertEqual((image.statistics.workers, image.statistics.attempts, image.statistics.decomposition), (2, 1, "slab"))
+        self.assertEqual(image.statistics.renderer, "splat")
         self.assertGreater(image.statistics.worker_seconds["splat"], 0)
         self.assertGreaterEqual(image.statistics.latency_seconds, image.statistics.frame_seconds)
 
@@ -186,8 +187,8 @@ class AtAService(WithAService):
     def test_the_services_sentence_is_the_exceptions(self) -> None:
         for options, kind, sentence in (
             ({"dataset": "foot"}, ss.NotFound, "foot"),
-            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"),
-            ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'splat', but isovalue needs one of: zbuffer, raycast"),
+            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'auto', but shading 'depth-gradient' needs one of: zbuffer"),
+            ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'auto', but isovalue needs one of: zbuffer, raycast"),
             ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
         ):
             with self.subTest(options=options), self.assertRaises(kind) as caught:

@@ -81,13 +81,13 @@ inline float LargestDifference(const LocalImage& a, const LocalImage& b, ImageSi
 
 // Accumulated opacity differs by rounding and by what termination hides; pictures of other formats are identical.
 inline float AllowedDifference(const FrameRequest& request) {
-  const PixelFormat format = FindRenderer(request.renderer)->format();
+  const PixelFormat format = RenderersFor(request.renderer).value().front()->format();
   return format == PixelFormat::kRgba ? 2e-5F + float(request.termination) : 0.0F;
 }
 
 // The least alpha that the most opaque pixel of a test picture has: opacity accumulates, but a projection shows that of one value.
 inline double ExpectedAlpha(const FrameRequest& request) {
-  const PixelFormat format = FindRenderer(request.renderer)->format();
+  const PixelFormat format = RenderersFor(request.renderer).value().front()->format();
   return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
 }
 

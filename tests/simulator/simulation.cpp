@@ -88,7 +88,7 @@ void Simulation::StartCoordinator() {
 void Simulation::Submit(ModelClient& client, RequestId request) {
   ++requests_made_;
   SubmitFrame submit = RandomRequest(random_, world_.policy, request, kDeadlineMs);
-  if (cells_.present() && random_.Chance(0.5)) submit.frame.renderer = FindRenderer("slice")->name();
+  if (cells_.present() && random_.Chance(0.5)) submit.frame.renderer = DefaultRenderer(false).name();  // else the cells are drawn
   client.Submit(submit);
 }
 

@@ -3,17 +3,18 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, toggle } from "./controls";
 import { h } from "./dom";
-import { can, limitsOf, type Offer, parametersOf, rendererThatCan, renderers, titleOf, titlesThatCan, words } from "./offers";
+import { automaticRenderer, can, limitsOf, type Offer, parametersOf, rendererThatCan, renderers, settled, titleOf, titlesThatCan, words } from "./offers";
 import { projectionOf } from "./options";
 import { LOOK, type State, type Store, type Surface } from "./state";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
 
 const MOST_SURFACES = 8, MOST_LIGHTS = 4;
 
-// Those that draw cells come first, and only for datasets that have cells.
+// Those that draw cells come before the others, and only for datasets that have cells.
 function rendererChoices(cells: boolean): (readonly [string, string])[] {
   const [drawCells, others] = [true, false].map(draws => renderers().filter(each => each.abilities.includes("cells") === draws));
-  return [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);
+  const named = [...(cells ? drawCells ?? [] : []), ...(others ?? [])].map(each => [each.name, titleOf(each)] as const);
+  return [[automaticRenderer(), words(automaticRenderer())], ...named];
 }
 
 // What the chosen renderer has of its own, as the service describes it.
@@ -34,7 +35,7 @@ function parameterRows(store: Store): { element: HTMLElement; set(state: State):
   return {
     element,
     set: state => {
-      if (state.renderer !== renderer) { renderer = state.renderer; element.replaceChildren(); made = parametersOf(renderer).map(make); }
+      if (settled(state.renderer) !== renderer) { renderer = settled(state.renderer); element.replaceChildren(); made = parametersOf(renderer).map(make); }
       for (const { name, standard, set } of made) set(state.parameters[name] ?? standard);
     },
   };
@@ -156,6 +157,7 @@ export function lightSection(context: Context): HTMLElement {
     for (const child of adders.children) (child as HTMLButtonElement).disabled = lights.length >= MOST_LIGHTS;
   };
   store.subscribe(update, LOOK);
+  context.onVolume(update);
   update();
   return element;
 }

@@ -20,7 +20,7 @@ import { measureSection } from "./measure_section";
 import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { can, loadOffers, renderers } from "./offers";
+import { automaticRenderer, can, loadOffers, noteKind } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
@@ -119,6 +119,7 @@ class Page {
 
   private forgetVolume(): void {
     this.volume = null;
+    noteKind(0);
     for (const listener of this.volumeListeners) listener(null);
   }
 
@@ -132,6 +133,7 @@ class Page {
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
       if (!this.volume) return;
+      noteKind(this.volume.cells);
       if (this.starts) this.store.update(startOf(world));
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();
@@ -276,7 +278,7 @@ const token = takeToken();
 const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
 if (token) {
   loadOffers().then(() => {
-    INITIAL.renderer = renderers()[0]?.name ?? "";
+    INITIAL.renderer = automaticRenderer();
     new Page(token);
   }).catch((error: unknown) => showAlone(`The gateway does not answer: ${error instanceof Error ? error.message : String(error)}`));
 } else {

@@ -59,7 +59,7 @@ export interface State {
   machine: boolean;
 }
 
-// `renderer`: the first one that the gateway offers.
+// `renderer`: the gateway's default.
 export const INITIAL: State = {
   dataset: "",
   ...PATIENT_START, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",

@@ -30,7 +30,11 @@ export class Viewer {
     });
     this.handles = new ClipHandles(clipBox => this.change({ clipBox }, "handle"));
     this.pane.element.append(this.handles.element);
-    context.onVolume(() => { if (this.pane.shown) this.resolveFit(this.pane.shown); this.annotate(); });
+    context.onVolume(volume => {
+      if (this.pane.shown) this.resolveFit(this.pane.shown);
+      this.annotate();
+      if (volume && Object.keys(context.store.state.parameters).length > 0) this.later(); // by now it is known which of them apply
+    });
     measuring.onChange(() => this.annotate());
     labels.onChange(() => this.annotate());
     context.store.subscribe(() => this.later());

@@ -10,11 +10,14 @@
 namespace slabstream::slice {
 namespace {
 
+// Planes in a voxel length. Fewer show stripes where values change within a cell or two, as on flat sides of a grid (docs/rendering.md).
+constexpr double kPlanes = 8;
+
 // Every tetrahedron that may show is cut, even if it is hidden: time grows with their number and with samples in drawn voxels of the
 // lattice. Those of a brick lie evenly in its voxels, as far as is known.
 class SliceCost : public AnalyticCost {
  public:
-  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
+  explicit SliceCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters, kPlanes)) {
     const VolumeSummary& summary = *basis.summary;
     const Index3 cells = OccupancyCells(drawn_.size);
     tetrahedra_.resize(drawn_.cells.size());
@@ -55,7 +58,7 @@ class SliceKind : public RendererKind {
                       .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture, without lights",
                       .abilities = {Ability::kPerspective, Ability::kCells, Ability::kTransfer},
                       .stages = {Stage::kTransform, Stage::kSample},
-                      .parameters = {SamplingRate()}}) {}
+                      .parameters = {SamplingRate(kPlanes)}}) {}
 
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SliceCost>(basis); }
 };

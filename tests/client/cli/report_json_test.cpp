@@ -22,6 +22,7 @@ std::vector<FrameRecord> TwoFrames() {
     frame.statistics.workers = 2;
     frame.statistics.groups = 3;
     frame.statistics.attempts = 1;
+    frame.statistics.renderer = "shear";
     frame.statistics.decomposition = "slab";
     frame.statistics.balance_by = "occupied";
     frame.statistics.axis = "z";
@@ -73,6 +74,7 @@ TEST(StatsJsonTest, HasThePromisedFields) {
                                  {"assignment", "greedy"},
                                  {"balance", "dynamic"},
                                  {"combine", "fan-in"}}));
+  EXPECT_EQ(stats["renderer"], "shear") << "which the request left to the service";
   EXPECT_EQ(stats["bytes"], (json{{"voxels", 2000}, {"images", 200}}));
   ASSERT_EQ(stats["frames"].size(), 2U);
   const json& second = stats["frames"][1];
@@ -91,7 +93,7 @@ TEST(StatsJsonTest, TextThatIsNotUtf8DoesNotBreakIt) {
 }
 
 TEST(TraceJsonTest, HasOneProcessAWorkerAndKeepsThreadsApart) {
-  const json trace = json::parse(TraceJson(FrameOptions(), TwoFrames()));
+  const json trace = json::parse(TraceJson(TwoFrames()));
   std::map<std::pair<int, int>, std::set<std::string>> names;  // by process and thread
   std::set<int> named;
   for (const json& event : trace["traceEvents"]) {

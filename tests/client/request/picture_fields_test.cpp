@@ -41,6 +41,8 @@ const std::vector<PictureFields> kFields = {
     {{"clip-box", "0:1,:,-3:v"}, {"clip-plane", "1,0,0,5"}, {"clip-plane", "0,-1,0,5"}, {"clip-mode", "cut-away"}},
     {{"light", "-1,0,0"}, {"light", "0,1,0"}, {"shading", "none"}, {"termination", "0"}},
     {{"background", "#102030"}, {"depth", "16"}, {"title", "A & B = \"C\" --size=1"}, {"scale-bar", ""}},
+    {{"color-bar", "K"}, {"legend", "true"}, {"orientation-marker", ""}},
+    {{"color-bar", ""}, {"legend", ""}},
     {{"renderer", "raycast"}, {"label-mode", "surface"}, {"labels-shown", "1,5-9"}, {"overlay-transfer", "gray-ramp"}},
     {{"decomposition", "kd-tree"}, {"groups", "auto"}, {"combine", "radix-k:2x2"}, {"pixel-error", "1e-4"}},
 };
@@ -88,6 +90,8 @@ TEST(PictureFieldsTest, NoFieldNamesAFile) {
                                               {{"zoom=2", ""}},
                                               {{"zoom", ""}},
                                               {{"fit", "maybe"}},
+                                              {{"legend", "maybe"}},
+                                              {{"color-bar", "a\nb"}},
                                               {{"zoom", "x"}},
                                               {{"view", "top"}, {"azimuth", "3"}},
                                               {{"up", "0,0,1"}},

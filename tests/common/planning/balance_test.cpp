@@ -65,7 +65,7 @@ TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
 struct World {
   Index3 size{128, 128, 256};
   VolumeSummary summary = FullSummary(size);
-  ClassifiedVolume volume{1, std::get<TransferFunction>(SomeRequest().transfer.choice), FindRenderer(kDefaultRenderer)};
+  ClassifiedVolume volume{1, std::get<TransferFunction>(SomeRequest().transfer.choice), &DefaultRenderer()};
   OccupancyGrid grid{size, std::vector<CellOccupancy>(16 * 16 * 32, FullCell({{0, 0, 0}, {8, 8, 8}}))};
   Policy policy{.decomposition = "kd-tree", .groups = 1, .balance = "dynamic"};
   mutable ResolvedPolicy resolved;  // of the last Request

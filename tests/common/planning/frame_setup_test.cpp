@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "common/combining/travel.h"
+#include "common/renderers/registry.h"
 #include "common/view/clip_corners.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/planning/plan_support.h"
@@ -12,6 +13,29 @@
 
 namespace slabstream {
 namespace {
+
+TEST(ResolveRequest, TheAutomaticRendererDrawsTheCellsOfGridsAndTheVoxelsOfVolumes) {
+  for (const bool grid : {false, true}) {
+    const VolumeSummary summary = grid ? FullGridSummary({20, 20, 20}) : FullSummary({20, 20, 20});
+    FrameRequest request = SomeRequest();
+    EXPECT_EQ(request.renderer, kAutomatic);
+    const ResolvedRequest resolved = Resolved(request, summary);
+    EXPECT_EQ(resolved.volume.renderer(), &DefaultRenderer(grid));
+    EXPECT_EQ(resolved.volume.renderer()->Can(Ability::kCells), grid);
+    EXPECT_EQ(resolved.frame.renderer, resolved.volume.renderer()->name());
+    request.renderer = resolved.frame.renderer;
+    EXPECT_EQ(SetupOf(request, summary), SetupOf(SomeRequest(), summary));
+  }
+}
+
+TEST(ResolveRequest, ParametersMustBeThoseOfTheRendererThatTheDatasetGets) {
+  FrameRequest request = SomeRequest();
+  request.parameters = {{"sampling-rate", "2.5"}};
+  ASSERT_TRUE(Validate(request).ok()) << "grids have it";
+  EXPECT_EQ(SetupOf(request, FullGridSummary({20, 20, 20})).parameters, std::vector{2.5});
+  const auto of_volume = ResolveRequest(request, 1, std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20})));
+  EXPECT_EQ(of_volume.status(), Status::InvalidArgument("sampling-rate is '2.5', but the renderer 'splat' has no such parameter"));
+}
 
 TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   FrameRequest request = SomeRequest();

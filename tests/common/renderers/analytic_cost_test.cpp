@@ -168,7 +168,8 @@ TEST(AnalyticCost, FollowsTheSamplingRate) {
       parameters.front() = rate;
       return renderer->MakeCost({&grid, &summary, &transfer, parameters})->Seconds({{0, 0, 0}, grid.size}, {});
     };
-    EXPECT_EQ(at_rate(1), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
+    const double standard = parameters.front();
+    EXPECT_EQ(at_rate(standard), renderer->MakeCost({&grid, &summary, &transfer})->Seconds({{0, 0, 0}, grid.size}, {})) << "the default";
     // Shears resample slices once, and slicing sets up each cell once, whatever the rate.
     EXPECT_GT(at_rate(2) / at_rate(1), renderer->Can(Ability::kCells) ? 1.05 : 1.3);
     EXPECT_LT(at_rate(2) / at_rate(1), 2.2);

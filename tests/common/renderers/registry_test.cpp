@@ -14,7 +14,6 @@ namespace {
 
 TEST(Renderers, HaveNamesOfTheirOwn) {
   ASSERT_FALSE(Renderers().empty());
-  EXPECT_EQ(Renderers().front()->name(), kDefaultRenderer);
   std::set<std::string_view> names;
   for (const RendererKind* kind : Renderers()) {
     EXPECT_TRUE(names.insert(kind->name()).second) << kind->name();
@@ -27,6 +26,16 @@ TEST(Renderers, HaveNamesOfTheirOwn) {
     EXPECT_GT(kind->footprint(), 0);
     EXPECT_NE(kind->format(), PixelFormat::kRgbaDepth) << "finished pictures do not combine";
   }
+}
+
+TEST(Renderers, OneDrawsVolumesAndOneDrawsGridsUnlessARequestNamesOne) {
+  EXPECT_EQ(&DefaultRenderer(false), Renderers().front());
+  EXPECT_FALSE(DefaultRenderer(false).Can(Ability::kCells));
+  EXPECT_TRUE(DefaultRenderer(true).Can(Ability::kCells));
+  EXPECT_EQ(*RenderersFor(kAutomatic), (std::vector{&DefaultRenderer(false), &DefaultRenderer(true)}));
+  for (const RendererKind* kind : Renderers()) EXPECT_EQ(*RenderersFor(kind->name()), std::vector{kind});
+  EXPECT_EQ(FindRenderer(kAutomatic), nullptr) << "no renderer has this name";
+  EXPECT_EQ(RenderersFor("teapot").status().message().find("renderer is 'teapot', but must be one of: auto, "), 0U);
 }
 
 TEST(Renderers, NameEachAbilityOnce) {

@@ -327,6 +327,11 @@ TEST(FieldChecks, Clients) {
        },
        "FrameReply.geometry.target_depth: -1 is not a finite number above 0"},
       {[](auto& e) { e.mutable_frame_reply()->clear_geometry(); }, "FrameReply.geometry.world: not set"},
+      {[](auto& e) {
+         e.mutable_frame_reply()->set_groups_done(e.frame_reply().group_count());
+         e.mutable_frame_reply()->clear_statistics();
+       },
+       "FrameReply: renderer is '', but must be one of: splat, "},
   });
   Check<FrameProgress>(
       {{[](auto& e) { e.mutable_frame_progress()->set_groups_done(1); }, "FrameProgress.groups_done: 1 is not in [0, 0]"}});

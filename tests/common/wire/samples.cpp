@@ -304,8 +304,8 @@ std::vector<FrameProgress> SamplesOf() {
 
 template <>
 std::vector<FrameReply> SamplesOf() {
-  const FrameStatistics statistics{kMax32,  kMax32,    kMax32,    "slab",   "occupied", "x",           kLongName,
-                                   kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
+  const FrameStatistics statistics{kMax32,    kMax32,  kMax32,    "shear",   "slab",   "occupied", "x",
+                                   kLongName, kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   FrameStatistics predicted = statistics;
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
   const PictureGeometry of_patient{World::kPatient,

@@ -34,8 +34,9 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
   const Wrong cases[] = {
       {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
       {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
-      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: splat, zbuffer"},
-      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but the renderer 'splat' has no such parameter"},
+      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: auto, splat, zbuffer"},
+      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but the renderer 'auto' has no such parameter"},
+      {[](auto& r) { r.parameters.emplace("sampling-rate", "17"); }, "sampling-rate is '17', but must be a number in [0.1, 16]"},
       {[](auto& r) { r.size.width = 0; }, "size.width is 0"},
       {[](auto& r) { r.view.zoom = kNan; }, "view.zoom is nan"},
       {[](auto& r) { r.transfer.choice = ""; }, "transfer.preset has 0 bytes"},
@@ -48,7 +49,7 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
          r.view.projection = Projection::kPerspective;
        },
        "renderer is 'shear', but projection 'perspective' needs one of: splat, zbuffer, raycast, mip"},
-      {[](auto& r) { r.labels.emplace(); }, "renderer is 'splat', but labels needs one of: zbuffer, raycast"},
+      {[](auto& r) { r.labels.emplace(); }, "renderer is 'auto', but labels needs one of: zbuffer, raycast"},
       {[&](auto& r) {
          r.renderer = "raycast";
          r.labels = LabelChoice{.shown = {{2, 5}, {.name = long_name}}};

@@ -124,7 +124,7 @@ TEST(Replay, FramesOfTheServiceCanBeReplayed) {
     request.view.azimuth_degrees = 40.0 * i;
     request.policy.groups = 2;
     const Picture picture = client.Render(request).value();
-    frames.push_back(Record(picture.statistics, *FindRenderer(request.renderer), picture.latency));
+    frames.push_back(Record(picture.statistics, picture.latency));
     const RecordedFrame& frame = frames.back();
     ASSERT_EQ(frame.groups.size(), 2U);
     EXPECT_FALSE(frame.grid.empty());
