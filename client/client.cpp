@@ -97,8 +97,8 @@ struct Client::Impl {
 
   void Submit(const SubmitFrame& message);
 
-  // Sends due messages, waits for a message, a wakeup, the next due time or `limit`, and handles what has come. True: a wakeup ended the
-  // wait.
+  // Sends due messages, waits for a message, a wakeup, a signal, the next due time or `limit`, and handles what has come. True: a wakeup or
+  // a signal ended the wait.
   bool Pump(Time limit);
 
   Status NoAnswer(Duration timeout) const {
@@ -183,10 +183,9 @@ bool Client::Impl::Pump(Time limit) {
   if (ready) return false;  // this may be what the caller waits for
   const std::array<Socket*, 1> sockets = {&socket};
   now = MonotonicNow();
-  const bool notified = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
-  // A message may come together with a notification, which is told all the same: nobody notifies twice. Without both it was a signal.
-  const bool came = Receive();
-  return notified || (!came && MonotonicNow() < limit);
+  const bool woken = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
+  Receive();  // a message may come together with a wakeup, which is told all the same: nobody notifies twice
+  return woken;
 }
 
 bool Client::Impl::Receive() {

@@ -380,12 +380,15 @@ bool Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout) {
   if (wakeup != nullptr) items.push_back({nullptr, wakeup->file_descriptor(), ZMQ_POLLIN, 0});
   // Rounded up: a wait that ends before its time would be called again and again.
   const auto milliseconds = std::chrono::ceil<std::chrono::milliseconds>(std::max(timeout, Duration::zero()));
+  bool signalled = false;
   try {
     zmq::poll(items, milliseconds);
   } catch (const zmq::error_t& error) {
-    CHECK_EQ(error.num(), EINTR);  // a signal: the caller looks round
+    CHECK_EQ(error.num(), EINTR);
+    signalled = true;
   }
-  return wakeup != nullptr && wakeup->Drain();
+  const bool notified = wakeup != nullptr && wakeup->Drain();
+  return notified || signalled;
 }
 
 }  // namespace slabstream

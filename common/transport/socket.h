@@ -112,8 +112,8 @@ class Wakeup {
   int file_descriptor_ = -1;  // an eventfd
 };
 
-// Returns when a socket may have a message, the wakeup was notified, a signal was handled, or the timeout is over (zero: at once).
-// True: the wakeup was notified; there may be messages, too.
+// Returns when a socket may have a message, the wakeup was notified, a signal was handled, or the timeout is over (zero: at once). It may
+// also return for nothing. True: the wakeup was notified or a signal was handled; there may be messages, too.
 bool Wait(std::span<Socket* const> sockets, Wakeup* wakeup, Duration timeout);
 
 }  // namespace slabstream
