@@ -34,7 +34,8 @@ Status NoneNamed(const std::string& name, const LabelTable& table) {
                                              more));
 }
 
-Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table) {
+// `slice`: of a slice, which keeps the grey values of hidden labels.
+Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& table, bool slice) {
   LabelLook look{.mode = choice.mode == LabelMode::kHighlight ? LabelMode::kTint : choice.mode, .tint = choice.tint};
   for (const Label& label : table.labels) {
     look.entries.push_back({.color = {label.color[0], label.color[1], label.color[2]}, .opacity = 1, .shown = choice.shown.empty()});
@@ -59,7 +60,7 @@ Result<LabelLook> ResolveLabels(const LabelChoice& choice, const LabelTable& tab
     look.entries[i].opacity = float(opacity);
   }
   for (LabelLook::Entry& entry : look.entries) {
-    if (choice.mode == LabelMode::kTint && !entry.shown) entry = {.color = entry.color, .opacity = 0};
+    if (choice.mode == LabelMode::kTint && !slice && !entry.shown) entry = {.color = entry.color, .opacity = 0};
   }
   return look;
 }
@@ -69,7 +70,7 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
   LayerLooks looks;
   if (request.labels) {
     if (summary.labels == nullptr) return Missing(request, "labels", "--label-mode, --label-tint, --label-opacity or --labels-shown");
-    Result<LabelLook> labels = ResolveLabels(*request.labels, *summary.label_table);
+    Result<LabelLook> labels = ResolveLabels(*request.labels, *summary.label_table, request.clipping.slab.has_value());
     if (!labels.ok()) return labels.status();
     looks.labels = *std::move(labels);
   }

@@ -49,7 +49,7 @@ class LabelsTest : public EndToEndTest {
 };
 
 // The labels meet in the middle of the picture.
-TEST_F(LabelsTest, SlicesShowTheValuesOfLabelsThatAreNotHighlighted) {
+TEST_F(LabelsTest, SlicesShowTheValuesOfLabelsThatAreNotShown) {
   const std::vector<std::string> across = {"--plane", "y"};
   const auto with = [&](std::vector<std::string> more) {
     more.insert(more.end(), across.begin(), across.end());
@@ -60,9 +60,7 @@ TEST_F(LabelsTest, SlicesShowTheValuesOfLabelsThatAreNotHighlighted) {
   const int half = plain.width / 2;
   EXPECT_LE(Difference(highlight, plain, 0, half - 1), 1 / 255.0 + 1e-6) << "as without labels";
   EXPECT_GT(Difference(highlight, plain, half + 1, plain.width), 0.1);
-  EXPECT_EQ(Difference(highlight, tint, half + 1, plain.width), 0);
-  EXPECT_EQ(tint.At(half / 2, half, 3), 0) << "tint takes hidden material away";
-  EXPECT_GT(plain.At(half / 2, half, 3), 0.99);
+  EXPECT_EQ(Difference(highlight, tint, 0, plain.width), 0) << "a slice has no material to take away";
 }
 
 TEST_F(LabelsTest, PicturesShowTheVolumeWhereALabelIsNotHighlighted) {
