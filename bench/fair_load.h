@@ -1,5 +1,5 @@
-// What a client that looks at small pictures gets beside another client's large requests, of another dataset or of the same; and what these
-// lose.
+// Measures two clients at the same time: one asks for small pictures, the other one for large ones, of another dataset or of the same. Says
+// how long the small pictures take, and what the large ones lose.
 #pragma once
 
 #include "common/base/status.h"
@@ -13,10 +13,13 @@ struct FairLoadOptions {
   int samples = 16;              // in each voxel length, of the intensity projection
 };
 
-// Large requests of three kinds (intensity projections of many samples; kd-trees; open policies) run alone, and then beside an endless loop
-// of frames of 64 x 64 pixels of another dataset; the first kind beside frames of its own dataset, too. Prints both. Unavailable: the small
-// frames take, in the median, more than three times their latency alone and 50 ms; or the workers are less than 0.9 as busy as with the
-// large request alone; or the small frames take more than half of the workers' time, and a tenth. Call before this process has threads.
+// Large requests of three kinds (intensity projections of many samples; kd-trees; open policies) run alone. Then they run beside an endless
+// loop of frames of 64 x 64 pixels of another dataset. The first kind also runs beside such frames of its own dataset. Prints the times
+// alone and beside each other. Unavailable, if one of these holds:
+// - The median latency of the small frames is more than three times their median latency alone, plus 50 ms.
+// - The workers are less than 0.9 times as busy as with the large requests alone.
+// - The small frames take more than 0.6 of the workers' time: half, and a tenth more.
+// Call before this process has threads.
 Status MeasureFairLoad(const FairLoadOptions& options);
 
 }  // namespace slabstream

@@ -1,6 +1,7 @@
 // FramesInFlight: the frames that run now, oldest first, and which earlier ones are over. The window (common/planning/frame_window.h)
-// limits the running frames and their groups. But no client waits because of the frames of others: beyond the window, a client without a
-// frame may have one as far as memory allows, and a client without a group on its way may have one. Workers share their time among clients.
+// limits the running frames and their groups. But no client waits because of the frames of others. A client without a frame may have one
+// frame beyond the window, as far as memory allows. A client without a group on its way may have one group beyond the window. Workers share
+// their time among clients.
 #pragma once
 
 #include <list>
@@ -22,19 +23,20 @@ class FramesInFlight {
 
   // The oldest frame that may hand out a group to `workers` workers; null: none may.
   RunningFrame* NextToHandOut(std::size_t workers);
-  // The oldest frame that has suspects: until it has none, nothing else is handed out or started. Null: there is none.
+  // The oldest frame that has suspects. As long as it has any, no other frame is handed out or started. Null: no frame has suspects.
   RunningFrame* OnTrial();
   // Whether any frame but this one waits for workers.
   bool OthersWait(const RunningFrame& frame) const;
   // How many more frames `workers` workers may have under way, whoever asks for them.
   std::size_t Room(std::size_t workers) const;
-  // Whether they may be given another frame, of this client and plan.
+  // Whether `workers` workers may be given another frame, of this client and plan.
   bool MayStart(PeerToken client, const PlanMade& plan, std::size_t workers);
   // Whether the workers' memory has room for a frame of this plan beside those that run.
   bool HasRoomFor(const PlanMade& plan) const;
   bool RunsFor(PeerToken client) const;
 
-  // Frames that workers may forget: all before finished_before(), and cancelled(): of later ones that are over, the newest kMaxCancelled.
+  // Frames that workers may forget: all before finished_before(), and those in cancelled(). These are the newest kMaxCancelled of the later
+  // frames that are over.
   FrameId finished_before() const { return frames_.empty() ? next_id() : frames_.front().id(); }
   const std::vector<FrameId>& cancelled() const { return over_; }
 

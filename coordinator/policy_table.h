@@ -1,12 +1,13 @@
 // PolicyTable: the choices made for open policies ("auto"), and what was predicted of their frames.
 //
-// Choosing takes long (ChoosePolicy), and no frame waits for it. The first frames of a volume, transfer function, renderer, policy and set
-// of workers follow FirstPolicy, until a choice is made beside them. Its partition then stays for all views, so turning the view moves no
-// voxels. Combining moves none, so the scheme is chosen anew for each kind of view. When costs are first measured, the choice is made once
-// more: another partition must then be predicted to gain kRevisitGain. Measured render times correct later predictions.
+// Choosing takes long (ChoosePolicy), and no frame waits for it. A choice holds for one volume, transfer function, renderer, policy and set
+// of workers. The first frames of these follow FirstPolicy, until a choice is made on another thread. The partition of that choice then
+// stays for all views, so turning the view moves no voxels. A change of the scheme moves no voxels either, so the scheme is chosen anew for
+// each kind of view. When costs are measured for the first time, the choice is made once more. It takes another partition only if this one
+// is predicted to gain kRevisitGain. Measured render times correct later predictions.
 //
-// Find notes what is to be chosen, and Choose chooses. The last few choices are kept. The least recently used go first. Any thread may call
-// it; nobody waits while a choice is made.
+// Find notes what is to be chosen, and Choose chooses. The table keeps the last few choices, and drops the least recently used ones first.
+// Any thread may call it; nobody waits while a choice is made.
 #pragma once
 
 #include <list>
@@ -36,14 +37,15 @@ class PolicyTable {
   static constexpr std::size_t kMaxKinds = 16;       // kinds of views, for each choice
   static constexpr double kRevisitGain = 0.1;        // share of a frame's latency
   static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many came before it
-  static constexpr int kMostFramesAPrediction = 64;  // it is made anew after 1, 2, 4 ... frames, later after every so many
+  static constexpr int kMostFramesAPrediction = 64;  // predictions are made anew after 1, 2, 4 ... frames, later after every so many
 
-  // The policy for the frame of `request`, which leaves a choice. `machine`: of its workers. `layouts`: the source of measured costs.
+  // The policy for the frame of `request`, whose own policy leaves a choice. `machine` models the workers. Measured costs come from
+  // `layouts`.
   ChosenPolicy Find(const PlanRequest& request, const MachineModel& machine, LayoutTable& layouts);
 
   // Whether Find has noted something to choose for a frame of this client.
   bool WantsChoice(PeerToken client);
-  // Makes one such choice, unless it is told to stop; it is then noted again when a frame needs it. Does nothing if there is none.
+  // Makes one such choice; does nothing if there is none. If it is told to stop, Find notes the choice again when a frame needs it.
   void Choose(PeerToken client, LayoutTable& layouts, const std::stop_token& stop);
 
   // Learns from a finished frame, if it had a prediction.

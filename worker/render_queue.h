@@ -1,11 +1,11 @@
-// RenderQueue: the ranks that this worker has yet to render, and those that it renders. The ranks of a client are rendered one after the
-// other, in order of frame, group and rank; the first one with a complete padded box is next. The clients take turns of at least kTurn: the
-// next turn belongs to the client that has used least of this worker's time (FairTurns), for rendering and combining. The render of a
-// client whose turn is over pauses, and goes on in its next turn. So a frame that takes seconds holds up nobody.
+// RenderQueue: the ranks that this worker has yet to render, and those that it is rendering. The ranks of a client are rendered one after
+// the other, in order of frame, group and rank. The next one is the first whose padded box is complete. The clients take turns of at least
+// kTurn. The next turn belongs to the client that has used least of this worker's time for rendering and combining (FairTurns). When a
+// client's turn is over, its render pauses. The render goes on in the client's next turn. So a frame that takes seconds holds up nobody.
 //
-// A render that pauses stops only between two of its pieces, and one that is cancelled only soon, so others run beside it for a moment.
-// Renders of several clients use the same padded box at a time, paused ones included, as long as there is room for what each of them
-// derives. Each job pins its padded box.
+// A render that is told to pause stops only between two of its pieces. A render that is cancelled ends soon, but not at once. So other
+// renders run beside it for a moment. Renders of several clients, paused ones included, use the same padded box at the same time, as long
+// as there is room for what each of them derives. Each job pins its padded box.
 #pragma once
 
 #include <map>
@@ -33,16 +33,16 @@ class RenderQueue {
   void DropGroup(const GroupKey& key, Time now, WorkerActions& actions);  // its renders are cancelled
   // Gives the turn to the client that it belongs to.
   void StartNext(Time now, WorkerActions& actions);
-  // When StartNext may change something by itself; Time::max(): never.
+  // When to call StartNext although nothing else has happened. Time::max(): never.
   Time NextTurn() const;
-  // The client has used so much of this worker's time otherwise.
+  // The client has used this much of the worker's time for something other than rendering.
   void Charge(ClientId client, Duration used) { turns_.Charge(client, used); }
 
   // Call when a render ends. Returns the executor's report with identities and fetch figures filled in, or nothing if the group was dropped
   // (the image is then released).
   std::optional<RankReport> Finish(const RenderDone& done, WorkerId worker, Time now, WorkerActions& actions);
 
-  // Of waiting jobs, by client, the next one in turn first.
+  // The padded boxes of waiting jobs, a list for each client. The client that is next in turn comes first.
   std::vector<std::vector<BoxFetcher::Generation>> BoxesInTurn() const;
   std::set<GroupKey> GroupsOn(BoxFetcher::Generation padded) const;
   bool AnyPaused() const { return begun_.size() > (turn_ ? 1U : 0U); }
@@ -54,7 +54,7 @@ class RenderQueue {
     std::shared_ptr<const FrameSetup> setup;
     std::shared_ptr<const OcclusionMask> hidden;
     BoxFetcher::Generation padded = 0;
-    bool waited = false;  // for voxels: their fetch is reported with it
+    bool waited = false;  // for voxels: its report tells of their fetch
   };
   struct Begun {
     GroupKey key;
@@ -66,16 +66,16 @@ class RenderQueue {
   struct TurnNow {
     ClientId client = 0;
     Time begin;    // of the turn
-    Time charged;  // what it took before is
+    Time charged;  // the time before this has been charged
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;
 
   bool Busy(ClientId client) const;
   bool OnlyTurns() const;                                 // nobody but the client whose turn it is has any job
-  Waiting::const_iterator NextOf(ClientId client) const;  // that can begin; end: none
+  Waiting::const_iterator NextOf(ClientId client) const;  // its first job that can begin; end: none
   bool WantsTurn(ClientId client) const;
   std::set<ClientId> Clients() const;
-  std::optional<ClientId> NextInTurn() const;  // but for the client whose turn it is
+  std::optional<ClientId> NextInTurn() const;  // never the client whose turn it is
   void ChargeTurn(Time now);
   void EndTurn(Time now);
   void Begin(ClientId client, Time now, WorkerActions& actions);
@@ -83,7 +83,7 @@ class RenderQueue {
   BoxFetcher& boxes_;
   ImageNames& names_;
   Waiting waiting_;
-  std::map<ClientId, Begun> begun_;  // one of a client; all are paused or dropped but that of the client whose turn it is
+  std::map<ClientId, Begun> begun_;  // at most one of a client; all but that of the client whose turn it is are paused or dropped
   std::optional<TurnNow> turn_;
   FairTurns<ClientId> turns_;
 };

@@ -1,5 +1,5 @@
-// StoredBox: a padded box as the executor stores it: its voxels and cells while they arrive, then what renders need. Any thread may call
-// it.
+// StoredBox: a padded box as the executor stores it. At first it holds the voxels and cells that have arrived. When all are there, it holds
+// what renders need. Any thread may call it.
 #pragma once
 
 #include <array>
@@ -28,13 +28,13 @@ class StoredBox {
 
   StoredBox(const BoxKey& key, std::vector<Copy> copies) : key_(key), copies_(std::move(copies)) {}
 
-  // DataLoss: it does not fit this padded box.
+  // DataLoss: the chunk does not fit this padded box.
   Status Store(const Chunk& chunk, const Bytes& payload);
 
-  // When all chunks are stored. The first call copies the voxels that other padded boxes hold, and says so: true.
+  // Call when all chunks are stored. The first call copies the voxels that other padded boxes hold. True: this call copied some.
   bool Assemble();
 
-  // What a render of this client renders from, and derives: no other render uses it meanwhile.
+  // The BoxData that a render of one client reads from and derives into. No other render uses it during the lease.
   class Lease {
    public:
     Lease(StoredBox& box, BoxData& data) : box_(box), data_(data) {}
@@ -47,25 +47,25 @@ class StoredBox {
     StoredBox& box_;
     BoxData& data_;
   };
-  // After Assemble.
+  // Call after Assemble.
   Lease Lend(ClientId client) { return {*this, DataFor(client)}; }
 
-  // Memory, with what was derived; as of the end of each render.
+  // Memory, with what renders derived. Derived data counts as it was at the end of its last render.
   std::size_t bytes() const;
 
  private:
-  // Those that were not lent for so many renders are dropped.
+  // Derived data that was not lent during so many leases is dropped.
   static constexpr std::uint64_t kMostUnused = 16;
   struct Derived {
     explicit Derived(std::shared_ptr<BoxVoxels> voxels) : data(std::move(voxels)) {}
     BoxData data;
     ClientId client = 0;  // of the last render
     bool lent = false;
-    std::uint64_t last_use = 0;  // when it was returned: leases until then
+    std::uint64_t last_use = 0;  // how many leases there had been when it was returned
     std::size_t bytes = 0;
   };
 
-  BrickedVoxels& Arriving(Layer layer);  // the first call makes room for them
+  BrickedVoxels& Arriving(Layer layer);  // the layer's voxels; the first call makes room for them
   std::shared_ptr<BoxVoxels> Assembled();
   BoxData& DataFor(ClientId client);
   void Return(BoxData& data);

@@ -1,6 +1,6 @@
-// FairTasks: tasks of several owners that may take long, on threads of their own (BackgroundTasks). One task of an owner runs at a time, in
-// the order in which they were posted; the next task is of the owner that has used least time (FairTurns). So neither many tasks nor a long
-// one delay those of another owner, as long as no more than `most_threads` owners have long ones.
+// FairTasks: tasks of several owners, on threads of their own (BackgroundTasks). Tasks may take long. The tasks of one owner run one at a
+// time, in the order in which they were posted. The next task belongs to the owner that has used least time (FairTurns). So neither many
+// tasks of one owner nor a long one delay the tasks of another owner, as long as fewer than `most_threads` owners have long tasks.
 #pragma once
 
 #include <cstddef>
@@ -34,7 +34,7 @@ class FairTasks {
   FairTasks(const FairTasks&) = delete;
   FairTasks& operator=(const FairTasks&) = delete;
 
-  // The tasks of one owner, for those who post and know nothing of owners.
+  // Posts the tasks of one owner, for code that knows nothing of owners.
   struct OfOwner {
     FairTasks& tasks;
     Owner owner;
@@ -51,7 +51,7 @@ class FairTasks {
       const std::lock_guard lock(shared_->mutex);
       if (!shared_->waiting.contains(owner) && !shared_->running.contains(owner)) shared_->turns.Join(owner);
       std::list<std::function<void()>>& waiting = shared_->waiting[owner];
-      waiting.splice(waiting.end(), one);  // does not throw: nobody finds an owner that waits without a task
+      waiting.splice(waiting.end(), one);  // does not throw, so no owner's list stays empty
     }
     threads_.Post([shared = shared_] { RunTasks(*shared); });
   }
@@ -64,7 +64,7 @@ class FairTasks {
     FairTurns<Owner> turns;
   };
 
-  // Until nothing waits but tasks of owners that have one running: their threads will come to those.
+  // Runs tasks until all that wait belong to owners with a running task. The threads of those owners will come to them.
   static void RunTasks(Shared& shared) {
     std::unique_lock lock(shared.mutex);
     while (true) {

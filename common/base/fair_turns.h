@@ -1,8 +1,10 @@
-// FairTurns: whose turn it is, among members that share something that only one of them uses at a time: a service, a thread, processors.
-// Start-time fair queueing (P. Goyal, H. M. Vin, H. Cheng, 1996): the next turn belongs to the member that has used least time. So a member
-// that always wants more gets an equal share, one that wants less than that hardly waits, and what a turn takes need not be known before.
+// FairTurns: whose turn it is. The members share a service, threads or processors, which are too few for all at a time. The rule is
+// start-time fair queueing (P. Goyal, H. M. Vin, H. Cheng, 1996): the next turn belongs to the member that has used least time. So a member
+// that always wants more gets an equal share, and a member that wants less than an equal share hardly waits. How long a turn takes need not
+// be known before it begins.
 //
-// A member that had nothing to do has not saved up time: it continues with what the last member in turn had used when that turn began.
+// A member that had nothing to do has not saved up time. It counts as if it had used at least as much as the last member in turn had used
+// when that turn began.
 // Pure; one thread.
 #pragma once
 
@@ -18,10 +20,10 @@ namespace slabstream {
 template <class Member>
 class FairTurns {
  public:
-  // When it is a member's turn: the smallest one is next.
+  // A member's place in the order of turns. The smallest one is next.
   struct Turn {
     Duration used{};
-    std::uint64_t last = 0;  // counts Join and Take
+    std::uint64_t last = 0;  // number of the last Join or Take
     friend auto operator<=>(const Turn&, const Turn&) = default;
   };
 
@@ -37,13 +39,13 @@ class FairTurns {
     used_by_last_ = TurnOf(member).used;
     turns_[member] = {used_by_last_, ++count_};
   }
-  // It has used so much; less than none: it was charged too much before. A member that was forgotten is charged nothing.
+  // The member has used this much. Negative: it was charged too much before. A member that was forgotten is charged nothing.
   void Charge(const Member& member, Duration used) {
     if (const auto known = turns_.find(member); known != turns_.end()) known->second.used += used;
   }
 
   void Forget(const Member& member) { turns_.erase(member); }
-  // Forgets members that have nothing to do and nothing to make up for: to remember them would change no turn.
+  // Forgets members that have nothing to do and have used no more than the last one in turn: to remember them would change no turn.
   template <class Busy>
   void ForgetIdle(Busy&& busy) {
     std::erase_if(turns_, [&](const auto& entry) { return entry.second.used <= used_by_last_ && !busy(entry.first); });

@@ -1,5 +1,5 @@
-// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it; renders of the same
-// box at a time have a BoxData each, of the same voxels.
+// BoxData: the voxels of a padded box, its layers, and what renderers derived from them. One thread at a time uses it. If several renders
+// use the same box at the same time, each has a BoxData of its own, and these share the voxels.
 #pragma once
 
 #include <concepts>
@@ -37,12 +37,12 @@ class BoxData {
   // All voxels as one block. If there are only bricks, the first call turns them into a block; after that any thread may call.
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return samples_.view(); }
-  // Between renders it lets go of the voxels: another one may store them otherwise.
+  // Between renders it lets go of the voxels, so that another BoxData may have them stored in the other way.
   void TakeVoxels() { samples_ = voxels_->samples(); }
   void LeaveVoxels() { samples_ = {}; }
 
   const BoxLayers& layers() const { return voxels_->layers(); }
-  // Of volume and layers, the type whose samples take most.
+  // The types of volume and layers: the one whose samples take most bytes.
   ScalarType widest_type() const;
 
   // The range of samples of each brick.
@@ -64,7 +64,7 @@ class BoxData {
 
  private:
   const std::shared_ptr<BoxVoxels> voxels_;
-  mutable BoxVoxels::Samples samples_;  // of them; empty between renders
+  mutable BoxVoxels::Samples samples_;  // of voxels_; empty between renders
   std::optional<BrickRanges> ranges_;
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;

@@ -1,5 +1,5 @@
-// BoxVoxels: the voxels of a padded box and its layers, for all renders of it. They never change, but may be stored otherwise. Any thread
-// may call it.
+// BoxVoxels: the voxels of a padded box and its layers. All renders of the box share them. Their values never change, but the way in which
+// they are stored may. Any thread may call it.
 #pragma once
 
 #include <cstddef>
@@ -16,12 +16,12 @@ namespace slabstream {
 // nullopt, null: the dataset has no such layer.
 struct BoxLayers {
   std::optional<BrickedVoxels> labels, overlay;
-  std::shared_ptr<const Mesh> cells;  // those that touch the box, in the order of the whole grid; perhaps others
+  std::shared_ptr<const Mesh> cells;  // those that touch the box, and perhaps others, in the order of the whole grid
 };
 
 class BoxVoxels {
  public:
-  // The same samples, stored in one of two ways; the other one is null. Whoever holds them may read them.
+  // Samples, stored in one of two ways; the pointer of the other way is null. Whoever holds a Samples may read them.
   struct Samples {
     std::shared_ptr<const VoxelBlock> block;
     std::shared_ptr<const BrickedVoxels> bricks;

@@ -1,5 +1,6 @@
-// RenderControl: how others tell a render to pause, to go on, or to end. A render looks at it between its pieces (ForEachPiece): tiles or
-// bands of the image, which take milliseconds. While it pauses, it keeps what it has made, and takes no thread but the one that renders.
+// RenderControl: how others tell a render to pause, to go on, or to end. A render looks at it between two of its pieces (ForEachPiece). A
+// piece is a tile or band of the image and takes milliseconds. While the render pauses, it keeps what it has made, and it holds no thread
+// but the one that renders.
 #pragma once
 
 #include <atomic>
@@ -10,7 +11,7 @@ namespace slabstream {
 
 class RenderControl {
  public:
-  // ---- any thread. The render goes on at first; it never does once it is cancelled.
+  // ---- any thread. At first the render is going. Once it is cancelled, it never goes on.
   void Pause() {
     State going = State::kGoing;
     state_.compare_exchange_strong(going, State::kPaused);
@@ -25,7 +26,7 @@ class RenderControl {
   }
 
   // ---- any thread of the render
-  bool going() const { return state_.load(std::memory_order_relaxed) == State::kGoing; }  // else no other piece may begin
+  bool going() const { return state_.load(std::memory_order_relaxed) == State::kGoing; }  // false: no other piece may begin
   bool cancelled() const { return state_.load(std::memory_order_relaxed) == State::kCancelled; }
 
   // ---- the thread that renders, while no piece is being made
@@ -34,12 +35,12 @@ class RenderControl {
     state_.wait(State::kPaused);
     paused_ += MonotonicNow() - begin;
   }
-  Duration paused() const { return paused_; }  // for so long altogether
+  Duration paused() const { return paused_; }  // how long the render has paused altogether
 
  private:
   enum class State { kGoing, kPaused, kCancelled };
   std::atomic<State> state_ = State::kGoing;
-  mutable Duration paused_{};  // the thread that renders knows it alone
+  mutable Duration paused_{};  // only the thread that renders uses it
 };
 
 }  // namespace slabstream
