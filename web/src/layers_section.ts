@@ -9,14 +9,15 @@ import { LOOK, ONE_COLOR } from "./state";
 import { rounded } from "./vec";
 
 // A row for each label: whether it shows, its colour, its name, its opacity.
-function labelList({ store }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
+function labelList({ store, volume }: Context, labels: Labels): { element: HTMLElement; refresh(): void } {
   const element = h("div", { class: "labels", role: "group", "aria-label": "Labels" });
   let made: readonly LabelName[] = [];
-  // The opacity 0 hides one of all labels and, but for highlights, what is in it; a list of what is shown is changed as such.
+  // A list names what is shown. Where not all labels are known, it would hide the others, too: there the opacity 0 hides one of them, but
+  // not in slices, and for highlights not its material alone.
   const setShown = (label: LabelName, on: boolean): void => {
     const { labels: mode, labelsShown, labelOpacities } = store.state;
     if (!isListed(labelsShown, label)) return store.update({ labelsShown: `${labelsShown},${label.value}` }, "label");
-    if (!on && mode === "highlight") {
+    if (!on && (mode === "highlight" || labels.names.length === volume()?.labels)) {
       const rest = listOf(labels.names.filter(known => known !== label && isListed(labelsShown, known)), labels.names);
       return store.update(rest ? { labelsShown: rest } : { labels: "off" }, "label");
     }
