@@ -2,7 +2,7 @@
 // take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, up to kCountsAtOnce count occupied voxels,
 // each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open policies. None waits for
 // another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as
-// events for the machines. Plans that are dropped stop soon, as do the choices for clients that have left.
+// events for the machines. A plan that is dropped stops soon. So does a choice if its client has left.
 //
 // One thread uses an object of this class: the one that runs the machines.
 #pragma once

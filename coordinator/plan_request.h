@@ -33,8 +33,8 @@ struct PlanRequest {
 struct PlannedFrame {
   PlanRequest asked;
   ResolvedPolicy policy = {};  // policy that the plan was made by
-  std::optional<FramePrediction> prediction =
-      {};                   // none: the policy was not open or is not chosen yet, or the frame is too much to simulate
+  // None: the policy was not open or is not chosen yet, or the frame is too much to simulate.
+  std::optional<FramePrediction> prediction = {};
   double render_scale = 1;  // used for the prediction (PolicyTable)
   FramePlan plan = {};
 

@@ -61,7 +61,6 @@ class RunningFrame {
   const std::shared_ptr<const PlannedFrame>& planned() const { return planned_; }  // for the first attempt
   int fit() const { return fit_; }                                                 // FramesThatFit, of the present plan
   void SetFit(int fit) { fit_ = fit; }
-  Time attempt_begin() const { return attempt_begin_; }
   std::uint32_t attempt() const { return std::uint32_t(displays_.size()); }  // from 1
   WorkerId display() const { return plan_.display; }
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
@@ -88,8 +87,8 @@ class RunningFrame {
   bool AttemptDue(Time now) const;
   bool between_attempts() const { return std::holds_alternative<BetweenAttempts>(state_); }
   // Begins the next attempt over `roster` (same number of slots), without workers that could not do their part. If nobody is left, nothing
-  // changes; the Status is the last such worker's reason, or Unavailable if there is none. Suspects are not tried on `busy` workers if
-  // there are others.
+  // changes; the Status is the last such worker's reason, or Unavailable if there is none. A `busy` worker does not try a suspect if there
+  // is another worker for it.
   Status BeginAttempt(const Roster& roster, const std::set<WorkerId>& busy, Time now);
   // While it has suspects, no other frame may have anything under way.
   bool has_suspects() const { return suspects_.any(); }

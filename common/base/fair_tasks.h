@@ -42,8 +42,8 @@ class FairTasks {
   };
   OfOwner Of(Owner owner) { return {*this, owner}; }
 
-  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory or no thread; the
-  // task then runs with a later one, or never.
+  // Tasks report their own failures: an exception that leaves one is only logged. Post itself throws if it gets no memory; the task then
+  // runs when a later one is posted, or never.
   void Post(Owner owner, std::function<void()> task) {
     std::list<std::function<void()>> one;
     one.push_back(std::move(task));

@@ -31,9 +31,8 @@ class FairTurns {
   void Join(const Member& member) { turns_[member] = {TurnOf(member).used, ++count_}; }
   Turn TurnOf(const Member& member) const {
     const auto known = turns_.find(member);
-    return known == turns_.end() ? Turn{used_by_last_, 0} : AtLeastLast(known->second);
+    return known == turns_.end() ? Turn{used_by_last_, 0} : Turn{std::max(known->second.used, used_by_last_), known->second.last};
   }
-  Turn AtLeastLast(Turn turn) const { return {std::max(turn.used, used_by_last_), turn.last}; }
 
   void Take(const Member& member) {  // its turn begins
     used_by_last_ = TurnOf(member).used;

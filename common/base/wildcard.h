@@ -9,7 +9,8 @@
 
 namespace slabstream {
 
-// Characters are those of UTF-8; a byte that begins none counts as one. Takes at most the product of both lengths, whatever the pattern.
+// Characters are those of UTF-8; a byte that begins no character counts as one. Whatever the pattern is, the number of steps is at most
+// about the product of both lengths.
 inline bool MatchesPattern(std::string_view name, std::string_view pattern) {
   const auto after = [&](std::size_t at) { return at + std::max<std::size_t>(1, Utf8CharacterBytes(name.substr(at))); };
   std::size_t n = 0, p = 0, last_star = std::string_view::npos, taken = 0;  // `taken`: what the last star stands for ends here

@@ -3,13 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <string>
-#include <utility>
+
+#include "common/base/find_named.h"
 
 namespace slabstream {
 namespace {
 
 // The first name of a unit is the one that is written.
-constexpr std::array<std::pair<std::string_view, LengthUnit>, 16> kUnitNames = {{
+struct UnitName {
+  std::string_view name;
+  LengthUnit unit;
+};
+constexpr std::array<UnitName, 16> kUnitNames = {{
     {"mm", LengthUnit::kMillimetre},
     {"millimetre", LengthUnit::kMillimetre},
     {"um", LengthUnit::kMicrometre},
@@ -34,12 +39,10 @@ std::optional<LengthUnit> LengthUnitNamed(std::string_view name) {
   std::string one(name);
   if (one.ends_with('s')) one.pop_back();
   if (const std::size_t at = one.find("meter"); at != std::string::npos) one.replace(at, 5, "metre");
-  const auto* const found = std::ranges::find(kUnitNames, one, [](const auto& entry) { return entry.first; });
-  return found == kUnitNames.end() ? std::nullopt : std::optional(found->second);
+  const UnitName* const found = FindNamed(kUnitNames, one);
+  return found == nullptr ? std::nullopt : std::optional(found->unit);
 }
 
-std::string_view FileNameOf(LengthUnit unit) {
-  return std::ranges::find(kUnitNames, unit, [](const auto& entry) { return entry.second; })->first;
-}
+std::string_view FileNameOf(LengthUnit unit) { return std::ranges::find(kUnitNames, unit, &UnitName::unit)->name; }
 
 }  // namespace slabstream

@@ -90,8 +90,8 @@ TEST(FairTurns, MembersThatAlwaysWantMoreGetTheSameWhateverOthersDo) {
   }
 }
 
-// Small demands of one member beside any number of greedy ones: as long as it takes half of its share, it waits for the turn at hand and
-// no other one.
+// One member wants little; the others always want more. If that one takes no more than half of its share, it waits for the end of the
+// present turn and for no other turn.
 TEST(FairTurns, WhoWantsLittleWaitsForOneTurnOnly) {
   Random random(12);
   SCOPED_TRACE(random.trace());
