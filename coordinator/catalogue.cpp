@@ -94,7 +94,7 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
 
 // Finds out what the argument names, a path that exists.
 Status AddNamed(FoundData& found, const DataArgument& argument) {
-  const Result<VolumeSource> source = ParseVolumeSource(argument.path);
+  const Result<SourceText> source = ParseSourceText(argument.path);
   if (!source.ok()) return source.status();
   std::error_code error;
   if (!fs::exists(source->path, error)) return Status::NotFound("does not exist");
@@ -145,7 +145,7 @@ void LeaveOutMost(FoundData& found) {
 
 // The files of a source, by its headers.
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
-  const Result<VolumeSource> source = ParseVolumeSource(data.path);
+  const Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   Result<std::vector<std::string>> files = CheckVolumeHeaders(source->path, source->options);
   if (!files.ok() || !data.layers.any()) return files;
@@ -156,7 +156,7 @@ Result<std::vector<std::string>> FilesOf(const DataSource& data) {
 }
 
 Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<void(int)>& tell) {
-  Result<VolumeSource> source = ParseVolumeSource(data.path);
+  Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   ReadProgress progress(tell);
   source->options.progress = &progress;

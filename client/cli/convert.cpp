@@ -41,7 +41,7 @@ std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const Loade
 }  // namespace
 
 Status RunConvert(const ConvertOptions& options) {
-  Result<VolumeSource> source = ParseVolumeSource(options.source);
+  Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
   // --type is also that of raw samples, unless they have one of their own.
   const VolumeFormat* const from = FindFormat(source->path, source->options);

@@ -30,7 +30,7 @@ std::string RemarkOn(const DicomSeries& series) {
 }  // namespace
 
 Result<std::vector<DicomSeries>> SeriesAt(const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
   if (!IsDicom(parsed->path)) return std::vector<DicomSeries>();
   Result<std::vector<DicomSeries>> all = ListDicomSeries(parsed->path);
@@ -39,7 +39,7 @@ Result<std::vector<DicomSeries>> SeriesAt(const std::string& source) {
 }
 
 bool NeedsChoice(const std::vector<DicomSeries>& all, const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   return parsed.ok() && parsed->options.series.empty() &&
          std::ranges::count_if(all, [](const DicomSeries& series) { return series.other.empty(); }) > 1;
 }

@@ -205,7 +205,7 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
 
 Status RunInfo(const InfoOptions& options) {
   if (IsPicturePath(options.path)) return RunPictureInfo(options);
-  if (const auto source = ParseVolumeSource(options.path); source.ok() && LooksLikeMesh(source->path)) return RunMeshInfo(options);
+  if (const auto source = ParseSourceText(options.path); source.ok() && LooksLikeMesh(source->path)) return RunMeshInfo(options);
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;
   const Result<std::vector<DicomSeries>> series = SeriesAt(options.path);
   if (!series.ok()) return series.status();

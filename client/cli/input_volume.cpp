@@ -5,17 +5,17 @@
 namespace slabstream {
 
 Status CheckInputVolume(const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   return parsed.ok() ? CheckInputVolume(*parsed) : Status(parsed.status().code(), "SOURCE " + parsed.status().message());
 }
 
-Status CheckInputVolume(const VolumeSource& source) {
+Status CheckInputVolume(const SourceText& source) {
   const Status status = CheckVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }
 
 Status CheckInputHeaders(const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
   if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
   return AsInput(CheckVolumeHeaders(parsed->path, parsed->options).status());
@@ -24,12 +24,12 @@ Status CheckInputHeaders(const std::string& source) {
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
 
 Result<LoadedVolume> ReadInputVolume(const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
   return ReadInputVolume(*parsed);
 }
 
-Result<LoadedVolume> ReadInputVolume(const VolumeSource& source) {
+Result<LoadedVolume> ReadInputVolume(const SourceText& source) {
   Result<LoadedVolume> loaded = ReadVolume(source.path, source.options);
   if (!loaded.ok()) return AsInput(loaded.status());
   return loaded;

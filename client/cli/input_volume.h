@@ -13,7 +13,7 @@ namespace slabstream {
 // NotFound: no such file. InvalidArgument: not a volume by its name (names the known endings), or an option that it does not take. Reads no
 // samples.
 Status CheckInputVolume(const std::string& source);
-Status CheckInputVolume(const VolumeSource& source);
+Status CheckInputVolume(const SourceText& source);
 
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
 Status CheckInputHeaders(const std::string& source);
@@ -23,6 +23,6 @@ Status AsInput(const Status& status);
 
 // ReadVolume with such failures.
 Result<LoadedVolume> ReadInputVolume(const std::string& source);
-Result<LoadedVolume> ReadInputVolume(const VolumeSource& source);
+Result<LoadedVolume> ReadInputVolume(const SourceText& source);
 
 }  // namespace slabstream

@@ -78,7 +78,7 @@ Status RunMeshInfo(const InfoOptions& options) {
     return Status::InvalidArgument(
         fmt::format("SOURCE '{}' is an unstructured grid; transfer functions and layers are for volumes", options.path));
   }
-  const Result<VolumeSource> source = ParseVolumeSource(options.path);
+  const Result<SourceText> source = ParseSourceText(options.path);
   if (!source.ok()) return source.status();
   const Result<LoadedMesh> loaded = ReadMesh(source->path, {.array = source->options.array});
   if (!loaded.ok()) return AsInput(loaded.status());

@@ -41,7 +41,7 @@ std::string DatasetName(const std::filesystem::path& path) {
 
 bool IsVolumeFile(const std::string& source) {
   std::error_code error;
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   return parsed.ok() && std::filesystem::exists(parsed->path, error);
 }
 
@@ -68,7 +68,7 @@ std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
 // What the viewer shows first: of several times of a file the first one.
 std::string ShownDataset(const std::string& source) {
   const std::string name = DatasetName(std::filesystem::absolute(source.substr(0, source.find('?'))));
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   const bool several = parsed.ok() && parsed->options.time && parsed->options.time->count() > 1;
   return several ? NameAtTime(name, parsed->options.time->first) : name;
 }

@@ -19,7 +19,7 @@ using TransferText = std::variant<std::string, TransferFunction>;
 
 // Options are checked with the volume.
 bool Exists(const std::string& volume) {
-  const Result<VolumeSource> source = ParseVolumeSource(volume);
+  const Result<SourceText> source = ParseSourceText(volume);
   std::error_code error;
   return source.ok() && std::filesystem::exists(source->path, error);
 }

@@ -181,7 +181,7 @@ Result<Layers> LabelLayer(const Volume& labels, const ColorTable& colors, const 
 }
 
 Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& layers) {
-  const Result<VolumeSource> source = ParseVolumeSource(files.labels);
+  const Result<SourceText> source = ParseSourceText(files.labels);
   if (!source.ok()) return source.status();
   const Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
@@ -198,7 +198,7 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
 }
 
 Status AddOverlay(const std::string& file, const VolumeGeometry& grid, Layers& layers) {
-  const Result<VolumeSource> source = ParseVolumeSource(file);
+  const Result<SourceText> source = ParseSourceText(file);
   if (!source.ok()) return source.status();
   const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
   if (!read.ok()) return read.status();
@@ -216,7 +216,7 @@ Status AddOverlay(const std::string& file, const VolumeGeometry& grid, Layers& l
 void SetLabelFiles(const std::string& text, LayerFiles& files) {
   const std::size_t colon = text.rfind(':');
   const auto exists = [](const std::string& volume) {
-    const Result<VolumeSource> source = ParseVolumeSource(volume);
+    const Result<SourceText> source = ParseSourceText(volume);
     return source.ok() && IsFile(source->path);
   };
   files.labels = text;
@@ -233,7 +233,7 @@ std::string LabelText(const LayerFiles& files) {
 Result<std::vector<std::string>> CheckLayerHeaders(const LayerFiles& files) {
   std::vector<std::string> all;
   const auto check = [&](const std::string& text, std::string_view what) {
-    const Result<VolumeSource> source = ParseVolumeSource(text);
+    const Result<SourceText> source = ParseSourceText(text);
     if (!source.ok()) return Prefixed(what, source.status());
     const Result<std::vector<std::string>> read = CheckVolumeHeaders(source->path, source->options);
     if (!read.ok()) return Prefixed(what, read.status());
@@ -242,7 +242,7 @@ Result<std::vector<std::string>> CheckLayerHeaders(const LayerFiles& files) {
   };
   if (!files.labels.empty()) {
     if (Status status = check(files.labels, kLabels); !status.ok()) return status;
-    const LabelFilesFound found = FindLabelFiles(files, ParseVolumeSource(files.labels)->path);
+    const LabelFilesFound found = FindLabelFiles(files, ParseSourceText(files.labels)->path);
     if (const Result<ColorTable> colors = ReadColors(found); !colors.ok()) return Prefixed(kLabels, colors.status());
     for (const std::string& file : {found.colors, found.names}) {
       if (!file.empty()) all.push_back(file);

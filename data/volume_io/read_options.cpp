@@ -171,8 +171,8 @@ std::vector<OptionText> OptionsFrom(const std::string& text, std::size_t begin) 
 
 }  // namespace
 
-Result<VolumeSource> ParseVolumeSource(const std::string& text) {
-  VolumeSource source{text, {}};
+Result<SourceText> ParseSourceText(const std::string& text) {
+  SourceText source{text, {}};
   const std::size_t begin = OptionsBegin(text);
   if (begin == std::string::npos) return source;
   source.path = text.substr(0, begin - 1);

@@ -5,7 +5,7 @@
 //
 // ReadOptionList() is the only list. Commands that read files have the same options: --time 3 says what ?time=3 says.
 //
-// Pure, but for ParseVolumeSource, which looks for the file.
+// Pure, but for ParseSourceText, which looks for the file.
 #pragma once
 
 #include <cstdint>
@@ -61,18 +61,18 @@ struct ReadOption {
 };
 const std::vector<ReadOption>& ReadOptionList();
 
-struct VolumeSource {
+struct SourceText {
   std::string path;
   ReadOptions options;
 };
 
 // PATH or PATH?NAME=VALUE,NAME=VALUE... A text that is a file's name as a whole is its path. Does not check that the file exists.
 // InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take.
-Result<VolumeSource> ParseVolumeSource(const std::string& text);
+Result<SourceText> ParseSourceText(const std::string& text);
 
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
-// The source at one time; times that it names are replaced. `source` is right (ParseVolumeSource).
+// The source at one time; times that it names are replaced. `source` is right (ParseSourceText).
 std::string AtTime(const std::string& source, int time);
 
 }  // namespace slabstream

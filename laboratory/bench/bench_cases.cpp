@@ -100,7 +100,7 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   bench_case.volume = argument->volume;
   bench_case.dataset = argument->volume;
   if (!at_service) {
-    const Result<VolumeSource> source = ParseVolumeSource(argument->volume);
+    const Result<SourceText> source = ParseSourceText(argument->volume);
     if (!source.ok()) return Status(source.status().code(), "CASE " + source.status().message());
     const Status known = CheckVolume(source->path, source->options);
     if (known.code() == StatusCode::kNotFound) {

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 Result<Json> GridJson(const BenchCase& c, const Volume& volume) {
   const auto* text = std::get_if<std::string>(&c.volume);
   if (text == nullptr || volume.cells == nullptr || !c.renderer->Can(Ability::kCells)) return Json();
-  const Result<VolumeSource> source = ParseVolumeSource(*text);
+  const Result<SourceText> source = ParseSourceText(*text);
   if (!source.ok()) return source.status();
   std::error_code error;
   const std::filesystem::path path = std::filesystem::absolute(source->path, error);

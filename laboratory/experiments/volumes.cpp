@@ -25,7 +25,7 @@ Json SphereJson(const SphereRequest& sphere) {
 
 // `source`: a path, with options for reading it or without.
 std::string CanonicalSource(const std::string& source) {
-  const Result<VolumeSource> parsed = ParseVolumeSource(source);
+  const Result<SourceText> parsed = ParseSourceText(source);
   std::error_code error;
   const std::filesystem::path canonical = parsed.ok() ? std::filesystem::canonical(parsed->path, error) : "";
   return !parsed.ok() || error ? source : canonical.string() + source.substr(parsed->path.size());  // the reader reports the error

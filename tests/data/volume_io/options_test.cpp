@@ -10,8 +10,8 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(VolumeSource, IsAPathWithOptionsBehindIt) {
-  const Result<VolumeSource> source = ParseVolumeSource("ct.raw?dims=512,256,300,type=int16,spacing=0.7,0.7,1.25,endian=big,offset=128");
+TEST(SourceText, IsAPathWithOptionsBehindIt) {
+  const Result<SourceText> source = ParseSourceText("ct.raw?dims=512,256,300,type=int16,spacing=0.7,0.7,1.25,endian=big,offset=128");
   ASSERT_TRUE(source.ok()) << source.status().message();
   EXPECT_EQ(source->path, "ct.raw");
   EXPECT_EQ(source->options.dims, (Index3{512, 256, 300}));
@@ -20,23 +20,23 @@ TEST(VolumeSource, IsAPathWithOptionsBehindIt) {
   EXPECT_EQ(source->options.big_endian, true);
   EXPECT_EQ(source->options.offset, 128);
   EXPECT_FALSE(source->options.time);
-  EXPECT_EQ(ParseVolumeSource("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
-  EXPECT_EQ(ParseVolumeSource("head.nii.gz?channel=luminance")->options.channel, kLuminance);
-  EXPECT_EQ(ParseVolumeSource("head.nii.gz")->path, "head.nii.gz");
-  EXPECT_EQ(ParseVolumeSource("what?")->path, "what?") << "no option stands behind the question mark";
+  EXPECT_EQ(ParseSourceText("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
+  EXPECT_EQ(ParseSourceText("head.nii.gz?channel=luminance")->options.channel, kLuminance);
+  EXPECT_EQ(ParseSourceText("head.nii.gz")->path, "head.nii.gz");
+  EXPECT_EQ(ParseSourceText("what?")->path, "what?") << "no option stands behind the question mark";
 }
 
-TEST(VolumeSource, MayBeAFileWithAQuestionMark) {
+TEST(SourceText, MayBeAFileWithAQuestionMark) {
   const TemporaryDirectory directory;
   const std::string odd = directory / "a?time=1";
   WriteFile(odd, "x");
-  EXPECT_EQ(ParseVolumeSource(odd)->path, odd);
-  const Result<VolumeSource> with_option = ParseVolumeSource(odd + "?time=2");
+  EXPECT_EQ(ParseSourceText(odd)->path, odd);
+  const Result<SourceText> with_option = ParseSourceText(odd + "?time=2");
   EXPECT_EQ(with_option->path, odd);
   EXPECT_EQ(with_option->options.time, (TimeRange{2, 2}));
 }
 
-TEST(VolumeSource, SaysWhatIsWrong) {
+TEST(SourceText, SaysWhatIsWrong) {
   const std::pair<const char*, const char*> cases[] = {
       {"v?tine=3", "'tine' is no option for reading a file, which are time, channel"},
       {"v?time=", "'v?time=': time '' must be a whole number"},
@@ -56,14 +56,14 @@ TEST(VolumeSource, SaysWhatIsWrong) {
       {"v?channel=red", "channel 'red' must be luminance or a whole number"},
   };
   for (const auto& [text, why] : cases) {
-    const Result<VolumeSource> source = ParseVolumeSource(text);
+    const Result<SourceText> source = ParseSourceText(text);
     ASSERT_FALSE(source.ok()) << text;
     EXPECT_EQ(source.status().code(), StatusCode::kInvalidArgument);
     EXPECT_THAT(source.status().message(), HasSubstr(why));
   }
 }
 
-TEST(VolumeSource, TimesAreOneOrARangeWithBothEnds) {
+TEST(SourceText, TimesAreOneOrARangeWithBothEnds) {
   EXPECT_EQ(ParseTimeRange("--time", "3")->count(), 1);
   EXPECT_EQ(ParseTimeRange("--time", "3")->last, 3);
   const TimeRange range = ParseTimeRange("--time", "0:19").value();
@@ -75,19 +75,19 @@ TEST(VolumeSource, TimesAreOneOrARangeWithBothEnds) {
   }
 }
 
-TEST(VolumeSource, IsNamedAtAnotherTime) {
+TEST(SourceText, IsNamedAtAnotherTime) {
   EXPECT_EQ(AtTime("v.nii", 3), "v.nii?time=3");
   EXPECT_EQ(AtTime("v.nii?time=0:9", 3), "v.nii?time=3");
   EXPECT_EQ(AtTime("v.npy?spacing=1,1,2,time=0:9", 3), "v.npy?spacing=1,1,2,time=3");
   EXPECT_EQ(AtTime("v.raw?time=0,dims=2,2,2", 3), "v.raw?dims=2,2,2,time=3");
 }
 
-TEST(VolumeSource, TakesOptionsOneByOne) {
+TEST(SourceText, TakesOptionsOneByOne) {
   std::string source = "v.raw";
   source = WithReadOption(source, "dims", "1,2,3");
   source = WithReadOption(source, "type", "uint8");
   EXPECT_EQ(source, "v.raw?dims=1,2,3,type=uint8");
-  EXPECT_EQ(ParseVolumeSource(source)->options.dims, (Index3{1, 2, 3}));
+  EXPECT_EQ(ParseSourceText(source)->options.dims, (Index3{1, 2, 3}));
 }
 
 }  // namespace

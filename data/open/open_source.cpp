@@ -1,0 +1,31 @@
+#include "data/open/open_source.h"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace slabstream {
+
+const std::vector<SourceFormat>& SourceFormats() {
+  static const std::vector<SourceFormat> kFormats = {};
+  return kFormats;
+}
+
+const SourceFormat* FindSourceFormat(const std::string& path) {
+  const auto found = std::ranges::find_if(SourceFormats(), [&](const SourceFormat& format) { return format.recognises(path); });
+  return found == SourceFormats().end() ? nullptr : &*found;
+}
+
+Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
+  const SourceFormat* const format = FindSourceFormat(path);
+  if (format == nullptr) return Status::InvalidArgument(path + ": is no volume that can be read in parts");
+  for (const ReadOption& option : ReadOptionList()) {
+    if (option.given(options) && std::ranges::find(format->options, option.name) == format->options.end()) {
+      return Status::InvalidArgument(path + ": " + std::string(format->name) + " takes no option " + std::string(option.name));
+    }
+  }
+  return format->open(path, options, context);
+}
+
+}  // namespace slabstream

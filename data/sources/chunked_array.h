@@ -1,0 +1,56 @@
+// ChunkedArray: what a format knows of one array that is stored in chunks, such as one level of a pyramid. A format reads metadata, finds
+// chunks and decodes them; ChunkedSource makes boxes of voxels of them, whatever the format.
+//
+// The array has any number of axes. Element order within a chunk: the last axis varies fastest ("C order"); what a format stores in another
+// order it says as another order of axes. Chunks lie at multiples of `chunk`; those at the end reach beyond the array, or are cut off there
+// (`cut_at_end`).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/status.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxArrayAxes = 8;
+inline constexpr std::uint64_t kMostChunkBytes = std::uint64_t{1} << 30;  // of a decoded chunk
+
+struct ArrayShape {
+  std::vector<std::uint64_t> size;   // elements along each axis, each at least 1; at most kMaxArrayAxes axes
+  std::vector<std::uint64_t> chunk;  // of a chunk, each at least 1; the product times the bytes of an element is at most kMostChunkBytes
+  SampleType type = SampleType::kUint8;
+  bool cut_at_end = false;
+  std::vector<std::byte> fill = {};  // one element, in this machine's byte order: of chunks that are not there
+
+  std::uint64_t chunk_bytes() const {  // of a whole one, decoded
+    std::uint64_t bytes = BytesPerSample(type);
+    for (const std::uint64_t along : chunk) bytes *= along;
+    return bytes;
+  }
+};
+
+class ChunkedArray {
+ public:
+  ChunkedArray() = default;
+  virtual ~ChunkedArray() = default;
+  ChunkedArray(const ChunkedArray&) = delete;
+  ChunkedArray& operator=(const ChunkedArray&) = delete;
+
+  virtual const ArrayShape& shape() const = 0;
+
+  // The elements of a chunk, decoded, in this machine's byte order. nullopt: it is not there, so all are `fill`.
+  using ChunkDone = std::function<void(Result<std::optional<Bytes>>)>;
+  // Calls `done` exactly once, on any thread, perhaps before this returns. `index`: of the chunk along each axis, inside the array. Any
+  // thread. Unavailable: it cannot be read. DataLoss: it is damaged, or has another number of bytes. Both name store, object and cause.
+  virtual void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) = 0;
+};
+
+}  // namespace slabstream

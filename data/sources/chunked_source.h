@@ -1,0 +1,41 @@
+// ChunkedSource: a VolumeSource of arrays that are stored in chunks, one for each level. A format says which axes of the arrays are x, y
+// and z, at which index of the others the volume lies, and where the voxels of each level are.
+//
+// Samples are kept as in volume_reader.h, but as their type alone says, since nobody has seen all values: int8 and int16 are shifted into
+// the unsigned type; integers of more bits and float64 become float32.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "data/sources/chunked_array.h"
+#include "data/sources/source_format.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+struct PyramidLevel {
+  std::shared_ptr<ChunkedArray> array;
+  // Axes of the array that are x, y and z; -1: it has no such axis, so the volume is one voxel thick there.
+  std::array<int, 3> axes = {2, 1, 0};
+  std::vector<std::uint64_t> at;  // index along each axis of the array; along x, y and z it does not matter
+  Vec3 spacing = {1, 1, 1};       // > 0, finite
+  Vec3 origin;                    // of the centre of the first voxel, in the world of level 0 whose axes are x, y and z
+};
+
+struct Pyramid {
+  std::vector<PyramidLevel> levels;  // finest first
+  Orientation orientation = {};      // of all levels, but for the origin, which each has itself
+  ValueMapping rescale = {};         // from stored values to data values
+  SourceInfo info = {};              // without its levels and file_type
+};
+
+// InvalidArgument, naming `name`: no level; one whose sides are out of [1, kMaxVolumeSide]; levels of different types; a spacing that is
+// not above 0 and finite.
+Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name, Pyramid pyramid, const SourceContext& context);
+
+}  // namespace slabstream

@@ -1,0 +1,34 @@
+// ReadContext: what all sources of a process share: threads that decode, memory for chunks under way, and a cache of decoded chunks.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+namespace slabstream {
+
+class ReadContext {
+ public:
+  struct Limits {
+    std::size_t decode_threads = 0;                            // 0: as many as there are cores
+    std::uint64_t under_way_bytes = std::uint64_t{128} << 20;  // of chunks that are read or decoded; one chunk may always be
+    std::uint64_t cache_bytes = std::uint64_t{64} << 20;       // of decoded chunks that may be needed again
+  };
+  explicit ReadContext(const Limits& limits);
+  ~ReadContext();
+  ReadContext(const ReadContext&) = delete;
+  ReadContext& operator=(const ReadContext&) = delete;
+
+  // Runs `task` on a thread that decodes. Any thread.
+  void PostDecode(std::function<void()> task);
+  // Runs `task` at once or when there is room for so many bytes, in order. It must see to it that Release is called once for them.
+  void Admit(std::uint64_t bytes, std::function<void()> task);
+  void Release(std::uint64_t bytes);
+
+ private:
+  struct State;
+  const std::shared_ptr<State> state_;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,70 @@
+// VolumeSource: a volume at one or more levels of resolution, which is read box by box. Nobody needs to hold all of it.
+//
+//   Store (bytes by key)  ->  ChunkedArray (decoded chunks)  ->  VolumeSource (boxes of voxels)
+//
+// Level 0 is the finest one. A level need not have half as many voxels as the one before it along every axis. Positions in the world are
+// the same at all levels: the geometry of each says where its voxels lie.
+//
+// Any thread may call a source. It answers on threads of its own (ReadContext).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/volume/summary.h"
+#include "common/volume/volume.h"
+
+namespace slabstream {
+
+struct SourceLevel {
+  VolumeDescription description;  // type, mapping and axes are the same at all levels
+  // Voxels along each axis of what one read of the source brings at least. Such blocks lie at multiples of it. Whoever cuts boxes there
+  // reads no voxel twice.
+  Index3 block;
+};
+
+struct SourceInfo {
+  std::vector<SourceLevel> levels;         // at least one
+  std::string format;                      // "OME-Zarr 0.5"
+  std::string file_type;                   // of samples as they are stored: "int16"
+  bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
+  int times = 1;                           // that the source holds, of which it shows one
+  std::optional<ValueRange> window = {};   // data values that its author shows
+  std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
+};
+
+class VolumeSource {
+ public:
+  VolumeSource() = default;
+  virtual ~VolumeSource() = default;
+  VolumeSource(const VolumeSource&) = delete;
+  VolumeSource& operator=(const VolumeSource&) = delete;
+
+  virtual const SourceInfo& info() const = 0;
+
+  using ReadDone = std::function<void(Status)>;
+  // Fills `out` with the samples of `box`, x fastest: exactly box.voxel_count() of the level's type. `box` is not empty and lies inside the
+  // level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay until then. Once `stop` is told to stop,
+  // what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of ChunkedArray::ReadChunk; ResourceExhausted.
+  virtual void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) = 0;
+
+  // Waits.
+  Status ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop = {});
+
+  // Since it was opened: bytes that were read as they are stored, and chunks that were decoded.
+  struct Counts {
+    std::uint64_t stored_bytes = 0, chunks = 0;
+  };
+  virtual Counts counts() const = 0;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,65 @@
+// Store: bytes by key. A store is a folder, a zip archive, or whatever else keeps objects under names: "0/c/1/2/3". Readers of chunked
+// volumes (data/sources) ask it for objects and parts of them; none of them knows where they lie.
+//
+// Any thread may call a store. It answers on threads of its own, so a slow one holds up nobody who asks.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/status.h"
+
+namespace slabstream {
+
+// Part of an object: `bytes` from `begin` on, or its last `bytes`.
+struct ByteRange {
+  static constexpr std::uint64_t kAll = std::numeric_limits<std::uint64_t>::max();
+
+  std::uint64_t begin = 0;
+  std::uint64_t bytes = kAll;
+  bool from_end = false;  // `begin` is 0
+};
+
+class Store {
+ public:
+  Store() = default;
+  virtual ~Store() = default;
+  Store(const Store&) = delete;
+  Store& operator=(const Store&) = delete;
+
+  // The bytes, or why there are none. An object that ends before the range does gives fewer; callers check.
+  using Done = std::function<void(Result<Bytes>)>;
+  // Calls `done` exactly once, on any thread, perhaps before this returns. NotFound: there is no such object. InvalidArgument: the key is
+  // no name of an object ("", "..", a part that is empty). Unavailable, DataLoss: it cannot be read; names store and key.
+  // ResourceExhausted: more than `most` bytes; nothing is read then.
+  virtual void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) = 0;
+
+  // Names of what lies in a folder of the store ("" is the store itself), sorted; those of folders end in "/". Waits. Unimplemented: the
+  // store cannot list.
+  virtual Result<std::vector<std::string>> List(const std::string& folder) = 0;
+
+  // For messages: "/data/scan.ome.zarr". With a key behind it it names an object.
+  virtual const std::string& name() const = 0;
+};
+
+inline constexpr std::uint64_t kMostMetadataBytes = std::uint64_t{16} << 20;
+
+// Waits for a whole object. Errors of Store::Read.
+Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most = kMostMetadataBytes);
+
+// A folder of the file system; links that lead out of it are not followed. Does not check that it exists.
+std::shared_ptr<Store> FolderStore(const std::string& path);
+// The objects in a zip archive that are stored or deflated. Reads its directory. NotFound, InvalidArgument, DataLoss, ResourceExhausted.
+Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
+// One file: its only object has the key "file". Does not check that it exists.
+std::shared_ptr<Store> FileStore(const std::string& path);
+
+// Folder, zip archive (.zip, .ozx) or file. NotFound: there is nothing. Errors of ZipStore.
+Result<std::shared_ptr<Store>> OpenStore(const std::string& path);
+
+}  // namespace slabstream
