@@ -315,8 +315,10 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed || !version.ok()) continue;
     if (!survey.ok()) return survey.status();
+    // Other processes may run in other folders.
+    const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
     return std::optional(
-        OpenedSource{*std::move(source), *std::move(survey), data.path, *version, std::make_shared<const FileStamp>(*stamp)});
+        OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
   }
   return BeingWritten(data);
 }

@@ -11,6 +11,7 @@
 #include "common/base/printable.h"
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
 
 namespace slabstream {
 namespace {
