@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "data/positional/positional_source.h"
+
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {};
+  static const std::vector<SourceFormat> kFormats = {UncompressedFile()};
   return kFormats;
 }
 

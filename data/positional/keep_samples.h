@@ -1,0 +1,25 @@
+// From samples as a file has them to those that are kept, wherever either lie in memory.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "common/math/vec.h"
+#include "data/volume_io/sample_type.h"
+
+namespace slabstream {
+
+// Samples of a box in memory. They need not be aligned.
+template <class Byte>
+struct PlacedSamples {
+  Byte* first = nullptr;
+  std::array<std::int64_t, 3> steps{};  // bytes from a sample to the next one along each axis; may be negative
+};
+
+// Converts (KeptByType) the samples of a box of `size` voxels. `swapped`: those of the file are in the other byte order than this
+// machine's.
+void KeepSamples(SampleType type, bool swapped, const Index3& size, const PlacedSamples<const std::byte>& from,
+                 const PlacedSamples<std::byte>& to);
+
+}  // namespace slabstream
