@@ -4,9 +4,26 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 
 namespace slabstream {
 namespace {
+
+template <class T>
+using Kept = std::conditional_t<(sizeof(T) > 2), float, std::conditional_t<sizeof(T) == 1, std::uint8_t, std::uint16_t>>;
+template <class T>
+constexpr bool kIsShifted = std::is_signed_v<T> && sizeof(T) <= 2;
+
+template <class T>
+Kept<T> Keep(T sample) {
+  if constexpr (kIsShifted<T>) {
+    // Adding half of the type's range, modulo that range, turns the sign bit around.
+    return Kept<T>(Kept<T>(sample) ^ Kept<T>(Kept<T>{1} << (8 * sizeof(T) - 1)));
+  } else {
+    return Kept<T>(sample);
+  }
+}
 
 template <class T, bool kSwapped>
 T SampleAt(const std::byte* at) {
@@ -18,15 +35,14 @@ T SampleAt(const std::byte* at) {
 
 template <class T, bool kSwapped>
 void KeepRow(std::int32_t count, const std::byte* from, std::int64_t from_step, std::byte* to, std::int64_t to_step) {
-  using By = KeptByType<T>;
   const auto keep = [&](std::int64_t in_step, std::int64_t out_step) {
     for (std::int32_t x = 0; x < count; ++x) {
-      const typename By::Kept kept = By::Keep(SampleAt<T, kSwapped>(from + x * in_step));
+      const Kept<T> kept = Keep(SampleAt<T, kSwapped>(from + x * in_step));
       std::memcpy(to + x * out_step, &kept, sizeof kept);
     }
   };
   // With steps that the compiler knows it uses vectors.
-  constexpr std::int64_t kFrom = sizeof(T), kTo = sizeof(typename By::Kept);
+  constexpr std::int64_t kFrom = sizeof(T), kTo = sizeof(Kept<T>);
   if (from_step == kFrom && to_step == kTo) {
     keep(kFrom, kTo);
   } else {
@@ -37,7 +53,7 @@ void KeepRow(std::int32_t count, const std::byte* from, std::int64_t from_step, 
 template <class T, bool kSwapped>
 void KeepAll(const Index3& size, const PlacedSamples<const std::byte>& from, const PlacedSamples<std::byte>& to) {
   // Voxels a side of a tile: what is read and written of it stays in a cache, whichever axis runs fastest on either side.
-  const std::int32_t along = to.steps[0] == std::int64_t(sizeof(typename KeptByType<T>::Kept)) ? size.x : 32;
+  const std::int32_t along = to.steps[0] == std::int64_t(sizeof(Kept<T>)) ? size.x : 32;
   const Index3 tile = {along, 32, 32};
   const auto at = [](const auto& placed, std::int32_t x, std::int32_t y, std::int32_t z) {
     return placed.first + x * placed.steps[0] + y * placed.steps[1] + z * placed.steps[2];
@@ -57,6 +73,13 @@ void KeepAll(const Index3& size, const PlacedSamples<const std::byte>& from, con
 }
 
 }  // namespace
+
+KeptSampleType KeptSampleTypeOf(SampleType type) {
+  return VisitSampleType(type, []<class T>(const T*) {
+    constexpr auto kType = sizeof(T) > 2 ? ScalarType::kFloat32 : sizeof(T) == 1 ? ScalarType::kUint8 : ScalarType::kUint16;
+    return KeptSampleType{kType, kIsShifted<T> ? double(std::numeric_limits<T>::min()) : 0};
+  });
+}
 
 void KeepSamples(SampleType type, bool swapped, const Index3& size, const PlacedSamples<const std::byte>& from,
                  const PlacedSamples<std::byte>& to) {

@@ -9,6 +9,7 @@
 
 #include "common/base/check.h"
 #include "common/base/printable.h"
+#include "data/positional/keep_samples.h"
 #include "data/positional/stored_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/volume_reader.h"
@@ -171,7 +172,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
   Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(header, *payload, options.channel.value_or(0));
   if (!samples.ok()) return samples.status();
 
-  const auto [type, shift] = KeptTypeOf(header.type);
+  const auto [type, shift] = KeptSampleTypeOf(header.type);
   // value = scale * (stored + shift) + offset
   const auto [scale, offset] = header.rescale;
   const VolumeDescription description = {placed->geometry, type, {scale, scale * shift + offset}};

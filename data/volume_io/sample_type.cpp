@@ -23,10 +23,12 @@ std::span<T> SamplesOf(AlignedVector<std::byte>& bytes) {
   return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
 }
 
+// Adding half of the type's range to a two's complement integer, modulo that range, turns its sign bit around.
 template <class Signed, class Unsigned>
 KeptSamples ShiftSign(AlignedVector<std::byte> bytes, ScalarType type) {
-  for (Unsigned& sample : SamplesOf<Unsigned>(bytes)) sample = KeptByType<Signed>::Keep(Signed(sample));
-  return {type, KeptByType<Signed>::kShift, true, std::move(bytes)};
+  constexpr auto kSignBit = Unsigned(Unsigned{1} << (8 * sizeof(Unsigned) - 1));
+  for (Unsigned& sample : SamplesOf<Unsigned>(bytes)) sample = Unsigned(sample ^ kSignBit);
+  return {type, double(std::numeric_limits<Signed>::min()), true, std::move(bytes)};
 }
 
 template <class T>
@@ -123,14 +125,6 @@ KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) {
     case SampleType::kFloat64: break;
   }
   return Narrow<double>(std::move(bytes));
-}
-
-KeptType KeptTypeOf(SampleType type) {
-  return VisitSampleType(type, []<class T>(const T*) {
-    using By = KeptByType<T>;
-    constexpr auto kType = !By::kSame ? ScalarType::kFloat32 : sizeof(T) == 1 ? ScalarType::kUint8 : ScalarType::kUint16;
-    return KeptType{kType, By::kShift};
-  });
 }
 
 }  // namespace slabstream

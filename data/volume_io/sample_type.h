@@ -3,11 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
 
 #include "common/base/aligned_buffer.h"
 #include "common/volume/volume.h"
@@ -53,30 +51,5 @@ struct KeptSamples {
 // Takes over `bytes`: aligned samples of `type` in this machine's byte order. Types of the same size are converted in place; wider ones
 // need the memory of the kept samples on top.
 KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes);
-
-// How samples of type T are kept by those who do not see all values first, so that the type alone decides: int8 and int16 are shifted into
-// the unsigned type; integers of more bits and float64 become float32.
-template <class T>
-struct KeptByType {
-  static constexpr bool kShifted = std::is_same_v<T, std::int8_t> || std::is_same_v<T, std::int16_t>;
-  static constexpr bool kSame = kShifted || std::is_same_v<T, std::uint8_t> || std::is_same_v<T, std::uint16_t>;
-  using Kept = std::conditional_t<!kSame, float, std::conditional_t<sizeof(T) == 1, std::uint8_t, std::uint16_t>>;
-
-  static constexpr double kShift = kShifted ? double(std::numeric_limits<T>::min()) : 0;  // value in the file = kept sample + shift
-  static constexpr Kept Keep(T sample) {
-    if constexpr (kShifted) {
-      // Adding half of the type's range, modulo that range, turns the sign bit around.
-      return Kept(Kept(sample) ^ Kept(Kept{1} << (8 * sizeof(T) - 1)));
-    } else {
-      return Kept(sample);
-    }
-  }
-};
-
-struct KeptType {
-  ScalarType type = ScalarType::kUint8;
-  double shift = 0;  // value in the file = kept sample + shift
-};
-KeptType KeptTypeOf(SampleType type);
 
 }  // namespace slabstream
