@@ -304,7 +304,8 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     Result<std::shared_ptr<VolumeSource>> source = OpenSource(parsed->path, parsed->options, ProcessReadContext());
     if (!source.ok()) return source.status();
     const SourceInfo& info = (*source)->info();
-    if (info.levels.size() == 1 && std::uint64_t(info.levels.front().description.voxel_bytes()) <= most_bytes) {
+    const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
+    if (info.levels.size() == 1 && info.levels.front().description.voxel_bytes() <= most) {
       return std::optional<OpenedSource>();
     }
     const Result<FileStamp> stamp = StampFiles(info.files);
@@ -317,8 +318,7 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     if (!survey.ok()) return survey.status();
     // Other processes may run in other folders.
     const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
-    return std::optional(
-        OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
+    return std::optional(OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
   }
   return BeingWritten(data);
 }

@@ -15,6 +15,7 @@
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/service.h"
+#include "data/open/any_volume.h"
 
 namespace slabstream {
 namespace {

@@ -4,7 +4,6 @@
 
 #include <map>
 #include <mutex>
-#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -48,7 +47,7 @@ struct StoredVoxels::Shared {
   std::mutex mutex;  // guards what follows
   std::function<void(MessageReceived)> deliver;
   std::map<std::pair<std::string, std::uint64_t>, Place> places;
-  std::set<ChunkName> reading;
+  std::map<ChunkName, int> reading;  // how often each was asked for: two boxes may need the same voxels
   BackgroundTasks opening{kOpensAtOnce};
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
@@ -71,8 +70,8 @@ struct StoredVoxels::Shared {
     });
     if (!packed.ok()) message.message = ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, packed};
     const std::lock_guard lock(mutex);
-    reading.erase({request.dataset, request.box, request.chunk});
-    if (deliver) deliver(std::move(message));
+    const auto asked = reading.extract({request.dataset, request.box, request.chunk});
+    for (int i = 0; deliver && i < asked.mapped(); ++i) deliver(message);
   }
 };
 
@@ -92,7 +91,7 @@ bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored) {
     const auto [place, is_new] = shared_->places.try_emplace({stored.source, stored.version});
     if (is_new) shared_->Find(stored, shared_);
     if (place->second.source == nullptr) return false;
-    if (!shared_->reading.insert({request.dataset, request.box, request.chunk}).second) return true;
+    if (++shared_->reading[{request.dataset, request.box, request.chunk}] > 1) return true;
     source = place->second.source;
   }
   const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);

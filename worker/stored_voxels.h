@@ -1,5 +1,5 @@
-// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds out
-// by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked.
+// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds
+// out by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked.
 //
 // One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
 #pragma once
@@ -21,7 +21,8 @@ class StoredVoxels {
   StoredVoxels(const StoredVoxels&) = delete;
   StoredVoxels& operator=(const StoredVoxels&) = delete;
 
-  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come. False: the coordinator must be asked.
+  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come for each call. False: the coordinator must be
+  // asked.
   bool Read(const ChunkRequest& request, const StoredAt& stored);
 
  private:

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "client/cli/cores.h"
@@ -87,9 +88,12 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
     const Result<MemoryShares> shares = ShareMemory(connection.local_memory, connection.local_workers);
     if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
     options.coordinator.machine.memory_bytes = shares->coordinator;
-    options.worker.memory_bytes = shares->worker;
+    // What a process takes before it does anything counts once.
+    const std::uint64_t of_workers = shares->worker * std::uint64_t(connection.local_workers);
+    options.worker.memory_bytes =
+        kIdleMemoryBytes + (of_workers - std::min(of_workers, kIdleMemoryBytes)) / std::uint64_t(connection.local_workers);
     LimitMemory(connection.local_memory);
-    SetReadMemory(shares->worker * std::uint64_t(connection.local_workers));
+    SetReadMemory(of_workers);
   }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();

@@ -12,7 +12,7 @@ namespace slabstream {
 template <std::ranges::range Entries>
 const std::ranges::range_value_t<Entries>* FindNamed(const Entries& entries, std::string_view name) {
   const auto found = std::ranges::find(entries, name, &std::ranges::range_value_t<Entries>::name);
-  return found == entries.end() ? nullptr : &*found;
+  return found == std::ranges::end(entries) ? nullptr : &*found;
 }
 
 // "slab, beam, subcube"

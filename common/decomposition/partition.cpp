@@ -44,9 +44,12 @@ Partition::Partition(const Box& bounds, std::vector<Node> nodes) : bounds_(bound
   CHECK(std::find(reached.begin(), reached.end(), false) == reached.end()) << "a node hangs from no plane";
 }
 
-Partition Partition::OfBlocks(const Index3& block, const Box& bounds) const {
+Partition Partition::OfBlocks(const Index3& block, const Box& bounds, std::int32_t before) const {
   std::vector<Node> nodes = nodes_;
-  for (Node& node : nodes) node.position *= block[node.axis];
+  for (Node& node : nodes) {
+    const std::int32_t thickness = block[node.axis];
+    node.position = node.position * thickness - (thickness > 2 * before ? before : 0);
+  }
   return Partition(bounds, std::move(nodes));
 }
 

@@ -31,9 +31,11 @@ class Partition {
   // `nodes[0]` is the root. CHECKs that the leaves tile `bounds`.
   Partition(const Box& bounds, std::vector<Node> nodes);
 
-  // The same partition of a volume that is cut in blocks: this one counts blocks of `block` voxels, and `bounds` holds as many, the last ones
-  // cut off.
-  Partition OfBlocks(const Index3& block, const Box& bounds) const;
+  // The same partition of a volume that is cut in blocks: this one counts blocks of `block` voxels, and `bounds` holds as many, the last
+  // ones cut off. Planes lie `before` voxels before the borders of blocks: then the box below a plane, with a halo as thick, touches no
+  // block beyond the border, and only the box above it touches blocks on both sides. Along axes whose blocks are not thicker than twice
+  // that, they lie at the borders.
+  Partition OfBlocks(const Index3& block, const Box& bounds, std::int32_t before) const;
 
   const Box& bounds() const { return bounds_; }
   std::span<const Box> boxes() const { return boxes_; }  // by BoxId

@@ -116,7 +116,7 @@ struct LayoutMaker::State {
                      .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
                      .together = int(std::min(slots, kMostBoxes)),
                      .axis = policy.axis})
-                   .OfBlocks(block, bounds);
+                   .OfBlocks(block, bounds, request.volume->renderer()->reach());
         if (stopped() || policy.groups > 0 || BoxesFit(*made)) return *std::move(made);
       }
     }

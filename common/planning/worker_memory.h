@@ -30,10 +30,10 @@ std::uint64_t PictureBytes(const FrameSetup& setup);
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary);
 
 // Of a limit: for chunks that a process reads and decodes.
-inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit / 8; }
+inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit / 4; }
 
 // Most bytes of the voxels of a padded box with which a worker of this limit (0: none) can hold two boxes of a frame at a time, so that it
-// reads one while it renders the other: kBoxBytesTarget, or a power of two below it.
+// reads one while it renders the other: kBoxBytesTarget or less, in few different sizes.
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit);
 
 // A worker that has a part in a frame, and its limit in bytes; 0: it has stated none.

@@ -153,6 +153,20 @@ class PiecesOf {
     });
   }
 
+  void AddSample(const VoxelBlock& piece) {
+    const Index3 size = piece.box.size();
+    tbb::parallel_for(0, size.z, [&](std::int32_t z) {
+      Part<T>& part = parts_.local();
+      BrickRow<T> row(size.x);
+      for (std::int32_t y = 0; y < size.y; ++y) {
+        const T* const samples = piece.samples<T>() + piece.Offset(piece.box.begin + Index3{0, y, z});
+        row.Fold(samples);
+        part.counts.Add(samples, size.x);
+      }
+      for (std::int32_t brick = 0; brick * kBrick < size.x; ++brick) part.range.Include(row.Brick(brick));
+    });
+  }
+
   // All pieces were added.
   void FindRange(VolumeSummary& summary) {
     const ValueMapping& mapping = summary.description.mapping;
@@ -220,6 +234,10 @@ PiecewiseSummary::~PiecewiseSummary() = default;
 
 void PiecewiseSummary::Add(const VoxelBlock& piece) {
   std::visit([&](auto& pieces) { pieces.Add(piece, state_->summary); }, state_->pieces);
+}
+
+void PiecewiseSummary::AddSample(const VoxelBlock& piece) {
+  std::visit([&](auto& pieces) { pieces.AddSample(piece); }, state_->pieces);
 }
 
 bool PiecewiseSummary::EndOfPieces() {

@@ -73,6 +73,8 @@ class PiecewiseSummary {
 
   // The box of a piece begins at multiples of kBrick, and ends at such or at the volume's border. No voxel is given twice.
   void Add(const VoxelBlock& piece);
+  // Counts for range and histogram alone; the piece may begin and end anywhere.
+  void AddSample(const VoxelBlock& piece);
   // True: the same pieces must be given once more.
   bool EndOfPieces();
   void AddAgain(const VoxelBlock& piece);

@@ -23,11 +23,10 @@ bool IsReadWhole(const std::string& path, const ReadOptions& options) {
   return FindFormat(path, options) != nullptr || FindSourceFormat(path) == nullptr;
 }
 
-// Half of it each for chunks under way and for those that may be needed again.
+// A quarter of the process' memory: at most 128 MiB for chunks under way, the rest for those that may be needed again.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
-  const std::uint64_t half = process_bytes / 16;
-  return {.under_way_bytes = std::clamp<std::uint64_t>(half, 16U << 20, 128U << 20),
-          .cache_bytes = std::clamp<std::uint64_t>(half, 16U << 20, 1U << 30)};
+  const std::uint64_t all = process_bytes / 4, under_way = std::clamp<std::uint64_t>(all / 4, 16U << 20, 128U << 20);
+  return {.under_way_bytes = under_way, .cache_bytes = std::max<std::uint64_t>(all - std::min(all, under_way), 16U << 20)};
 }
 
 std::atomic<std::uint64_t> process_memory = 0;  // 0: not said

@@ -13,8 +13,8 @@
 
 namespace slabstream {
 
-// Bytes [begin, begin + bytes) of the samples of `box`, x fastest; `box` lies inside the level, and the bytes inside the box. Whole slices
-// of the box are read. Calls `done` exactly once, on any thread, perhaps before this returns. Errors of VolumeSource::Read.
+// Bytes [begin, begin + bytes) of the samples of `box`, x fastest; `box` lies inside the level, and the bytes inside the box. Whole rows of
+// the box are read. Calls `done` exactly once, on any thread, perhaps before this returns. Errors of VolumeSource::Read.
 void ReadPart(const std::shared_ptr<VolumeSource>& source, int level, const Box& box, std::uint64_t begin, std::uint64_t bytes,
               std::function<void(Result<Bytes>)> done);
 

@@ -47,12 +47,22 @@ std::vector<Box> PiecesOf(const SourceLevel& level) {
   return pieces;
 }
 
-// At most `most` bytes of them, spread evenly.
-std::vector<Box> Sampled(const std::vector<Box>& pieces, const VolumeDescription& description, std::int64_t most) {
-  const double share = std::min(1.0, double(most) / double(description.voxel_bytes()));
-  const auto count = std::clamp<std::size_t>(std::size_t(share * double(pieces.size())), 1, pieces.size());
+// Blocks of the source, spread evenly, of about `most` bytes in all.
+std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
+  const Box bounds = level.description.geometry.bounds();
+  const Index3 blocks = {(bounds.end.x - 1) / level.block.x + 1, (bounds.end.y - 1) / level.block.y + 1,
+                         (bounds.end.z - 1) / level.block.z + 1};
+  const std::size_t all = CountIn(blocks);
+  const auto count = std::clamp<std::size_t>(std::size_t(double(most) / double(level.description.voxel_bytes()) * double(all)), 1, all);
   std::vector<Box> sample;
-  for (std::size_t i = 0; i < count; ++i) sample.push_back(pieces[std::size_t((double(i) + 0.5) * double(pieces.size()) / double(count))]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto number = std::size_t((double(i) + 0.5) * double(all) / double(count));
+    const Index3 block = {std::int32_t(number % std::size_t(blocks.x)),
+                          std::int32_t(number / std::size_t(blocks.x) % std::size_t(blocks.y)),
+                          std::int32_t(number / std::size_t(blocks.x) / std::size_t(blocks.y))};
+    const Index3 begin = {block.x * level.block.x, block.y * level.block.y, block.z * level.block.z};
+    sample.push_back(Intersection({begin, begin + level.block}, bounds));
+  }
   return sample;
 }
 
@@ -93,14 +103,14 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
     while (level + 1 < levels.size() && bytes(level) > kSurveyBytes) ++level;
   }
   const VolumeDescription& description = levels[level].description;
-  std::vector<Box> boxes = PiecesOf(levels[level]);
-  if (bytes(level) > kExactBytes) boxes = Sampled(boxes, description, kSurveyBytes);
+  const bool whole = bytes(level) <= kExactBytes;
+  const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], kSurveyBytes);
 
   PiecewiseSummary pieces(description);
   std::size_t done = 0;
   const auto count = [&] { tell(int(100 * ++done / boxes.size())); };
   Status read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) {
-    pieces.Add(block);
+    whole ? pieces.Add(block) : pieces.AddSample(block);
     count();
   });
   if (read.ok() && pieces.EndOfPieces()) {
