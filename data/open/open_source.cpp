@@ -4,11 +4,12 @@
 #include <filesystem>
 
 #include "data/positional/positional_source.h"
+#include "data/zarr/zarr.h"
 
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {UncompressedFile()};
+  static const std::vector<SourceFormat> kFormats = {Zarr(), UncompressedFile()};
   return kFormats;
 }
 

@@ -37,6 +37,12 @@ struct ArrayShape {
   }
 };
 
+// A chunk as it was read.
+struct StoredChunk {
+  Bytes elements;                  // decoded, in this machine's byte order
+  std::uint64_t stored_bytes = 0;  // that the store gave for it
+};
+
 class ChunkedArray {
  public:
   ChunkedArray() = default;
@@ -46,10 +52,11 @@ class ChunkedArray {
 
   virtual const ArrayShape& shape() const = 0;
 
-  // The elements of a chunk, decoded, in this machine's byte order. nullopt: it is not there, so all are `fill`.
-  using ChunkDone = std::function<void(Result<std::optional<Bytes>>)>;
-  // Calls `done` exactly once, on any thread, perhaps before this returns. `index`: of the chunk along each axis, inside the array. Any
-  // thread. Unavailable: it cannot be read. DataLoss: it is damaged, or has another number of bytes. Both name store, object and cause.
+  // nullopt: the chunk is not there, so all its elements are `fill`.
+  using ChunkDone = std::function<void(Result<std::optional<StoredChunk>>)>;
+  // Calls `done` exactly once, on any thread, perhaps before this returns. What `done` does takes as long as decoding, so it is called on a
+  // decoding thread (DecodeOn, decode_chunk.h), not on one of a store. `index`: of the chunk along each axis, inside the array. Any thread.
+  // Unavailable: it cannot be read. DataLoss: it is damaged, or has another number of bytes. Both name store, object and cause.
   virtual void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) = 0;
 };
 

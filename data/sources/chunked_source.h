@@ -24,12 +24,12 @@ struct PyramidLevel {
   std::array<int, 3> axes = {2, 1, 0};
   std::vector<std::uint64_t> at;  // index along each axis of the array; along x, y and z it does not matter
   Vec3 spacing = {1, 1, 1};       // > 0, finite
-  Vec3 origin;                    // of the centre of the first voxel, in the world of level 0 whose axes are x, y and z
+  Vec3 origin;                    // in the world, of the centre of the level's first voxel
 };
 
 struct Pyramid {
   std::vector<PyramidLevel> levels;  // finest first
-  Orientation orientation = {};      // of all levels, but for the origin, which each has itself
+  Orientation orientation = {};      // of all levels; its origin does not matter, since each level has its own
   ValueMapping rescale = {};         // from stored values to data values
   SourceInfo info = {};              // without its levels and file_type
 };

@@ -12,33 +12,41 @@ namespace slabstream {
 
 struct ReadContext::State {
   explicit State(const Limits& l)
-      : limits(l), decoders(l.decode_threads > 0 ? l.decode_threads : std::max<std::size_t>(1, std::thread::hardware_concurrency())) {}
+      : limits(l),
+        decoders(l.decode_threads > 0 ? l.decode_threads : std::max<std::size_t>(1, std::thread::hardware_concurrency())),
+        cache(l.cache_bytes) {}
 
   struct Waiting {
     std::uint64_t bytes = 0;
     std::function<void()> task;
   };
 
+  bool Fits(std::uint64_t bytes) const { return under_way == 0 || under_way + bytes <= limits.under_way_bytes; }
+
   const Limits limits;
+  std::mutex post_mutex;  // BackgroundTasks::Post wants one caller at a time
   BackgroundTasks decoders;
+  ChunkCache cache;
   std::mutex mutex;  // guards what follows
   std::uint64_t under_way = 0;
   std::deque<Waiting> waiting;
+  bool beginning = false;  // a thread runs tasks that have waited
 };
 
 ReadContext::ReadContext(const Limits& limits) : state_(std::make_shared<State>(limits)) {}
 ReadContext::~ReadContext() = default;
 
+ChunkCache& ReadContext::cache() { return state_->cache; }
+
 void ReadContext::PostDecode(std::function<void()> task) {
-  const std::lock_guard lock(state_->mutex);
+  const std::lock_guard lock(state_->post_mutex);
   state_->decoders.Post(std::move(task));
 }
 
 void ReadContext::Admit(std::uint64_t bytes, std::function<void()> task) {
   {
     const std::lock_guard lock(state_->mutex);
-    const bool fits = state_->under_way == 0 || state_->under_way + bytes <= state_->limits.under_way_bytes;
-    if (!state_->waiting.empty() || !fits) {
+    if (!state_->waiting.empty() || !state_->Fits(bytes)) {
       state_->waiting.push_back({bytes, std::move(task)});
       return;
     }
@@ -48,19 +56,21 @@ void ReadContext::Admit(std::uint64_t bytes, std::function<void()> task) {
 }
 
 void ReadContext::Release(std::uint64_t bytes) {
-  std::deque<State::Waiting> begun;
-  {
-    const std::lock_guard lock(state_->mutex);
-    state_->under_way -= bytes;
-    while (!state_->waiting.empty()) {
-      const State::Waiting& next = state_->waiting.front();
-      if (state_->under_way != 0 && state_->under_way + next.bytes > state_->limits.under_way_bytes) break;
-      state_->under_way += next.bytes;
-      begun.push_back(std::move(state_->waiting.front()));
-      state_->waiting.pop_front();
-    }
+  const std::shared_ptr<State> state = state_;  // a task may let go of the context
+  std::unique_lock lock(state->mutex);
+  state->under_way -= bytes;
+  // A task that ends at once calls this again. The loop that is under way then begins the next one, so calls do not nest deeper and deeper.
+  if (std::exchange(state->beginning, true)) return;
+  while (!state->waiting.empty() && state->Fits(state->waiting.front().bytes)) {
+    State::Waiting next = std::move(state->waiting.front());
+    state->waiting.pop_front();
+    state->under_way += next.bytes;
+    lock.unlock();
+    next.task();
+    next.task = nullptr;  // may destroy a source
+    lock.lock();
   }
-  for (State::Waiting& each : begun) each.task();
+  state->beginning = false;
 }
 
 }  // namespace slabstream

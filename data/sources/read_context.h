@@ -6,6 +6,8 @@
 #include <functional>
 #include <memory>
 
+#include "data/sources/chunk_cache.h"
+
 namespace slabstream {
 
 class ReadContext {
@@ -22,9 +24,12 @@ class ReadContext {
 
   // Runs `task` on a thread that decodes. Any thread.
   void PostDecode(std::function<void()> task);
-  // Runs `task` at once or when there is room for so many bytes, in order. It must see to it that Release is called once for them.
+  // Runs `task` at once or when there is room for so many bytes, in order. It must see to it that Release is called once for them. It
+  // throws nothing, and begins work rather than doing it, since it may run on the thread of another one that ends.
   void Admit(std::uint64_t bytes, std::function<void()> task);
   void Release(std::uint64_t bytes);
+
+  ChunkCache& cache();
 
  private:
   struct State;

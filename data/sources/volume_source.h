@@ -57,7 +57,7 @@ class VolumeSource {
   // what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of ChunkedArray::ReadChunk; ResourceExhausted.
   virtual void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) = 0;
 
-  // Waits.
+  // Waits, so not on a thread that decodes.
   Status ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop = {});
 
   // Since it was opened: bytes that were read as they are stored, and chunks that were decoded.

@@ -1,5 +1,6 @@
 #include "data/stores/store.h"
 
+#include <filesystem>
 #include <future>
 #include <utility>
 
@@ -10,6 +11,15 @@ Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) 
   std::future<Result<Bytes>> read = answer.get_future();
   store.Read(key, {}, most, [&answer](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); });
   return read.get();
+}
+
+Result<std::shared_ptr<Store>> OpenStore(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::file_status about = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(about)) return Status::NotFound(path + ": does not exist");
+  if (std::filesystem::is_directory(about)) return FolderStore(path);
+  if (path.ends_with(".zip") || path.ends_with(".ozx")) return ZipStore(path);
+  return FileStore(path);
 }
 
 }  // namespace slabstream

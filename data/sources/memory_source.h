@@ -1,0 +1,13 @@
+// A volume that is in memory already, as a source of one level: what a file that cannot be read in parts becomes.
+#pragma once
+
+#include <memory>
+
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+// `info`: its levels are made from the volume. Read copies on the thread that calls it. counts(): none, since nothing is stored.
+std::shared_ptr<VolumeSource> MakeMemorySource(std::shared_ptr<const Volume> volume, SourceInfo info);
+
+}  // namespace slabstream

@@ -1,0 +1,96 @@
+#include "data/zarr/metadata.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <utility>
+
+#include "common/base/printable.h"
+#include "data/sources/chunked_array.h"
+
+namespace slabstream::zarr {
+namespace {
+
+constexpr int kMostDepth = 64;
+
+}  // namespace
+
+Result<Json> ParseJson(const std::string& object, std::string_view text) {
+  bool too_deep = false;
+  const auto keep = [&](int depth, Json::parse_event_t, const Json&) {
+    too_deep = too_deep || depth > kMostDepth;
+    return !too_deep;
+  };
+  Json json = Json::parse(text, keep, false);
+  if (too_deep) return Status::DataLoss(fmt::format("{}: values nest more than {} deep", object, kMostDepth));
+  if (json.is_discarded()) return Status::DataLoss(object + ": damaged: not JSON");
+  return json;
+}
+
+Result<std::optional<Json>> ReadJson(Store& store, const std::string& key) {
+  const Result<Bytes> bytes = ReadNow(store, key);
+  if (bytes.status().code() == StatusCode::kNotFound) return std::optional<Json>();
+  if (!bytes.ok()) return bytes.status();
+  const std::string_view text(reinterpret_cast<const char*>(bytes->span().data()), bytes->size());
+  Result<Json> json = ParseJson(store.name() + "/" + key, text);
+  if (!json.ok()) return json.status();
+  return std::optional(*std::move(json));
+}
+
+std::string Join(std::string_view path, std::string_view name) {
+  return path.empty() ? std::string(name) : fmt::format("{}/{}", path, name);
+}
+
+Field Field::operator[](std::string_view name) const {
+  std::string place = place_.empty() ? std::string(name) : fmt::format("{}.{}", place_, name);
+  const Json* member = nullptr;
+  if (is_object()) {
+    const auto found = value_->find(name);
+    if (found != value_->end()) member = &*found;
+  }
+  return {object_, std::move(place), member};
+}
+
+Field Field::operator[](std::size_t number) const {
+  return {object_, fmt::format("{}[{}]", place_, number), is_array() && number < value_->size() ? &(*value_)[number] : nullptr};
+}
+
+Result<std::string> Field::Text() const {
+  if (!is_text()) return Wrong("a text");
+  return value_->get_ref<const std::string&>();
+}
+
+Result<double> Field::Number() const {
+  if (!given() || !value_->is_number() || !std::isfinite(value_->get<double>())) return Wrong("a number");
+  return value_->get<double>();
+}
+
+Result<std::uint64_t> Field::Whole(std::uint64_t least, std::uint64_t most) const {
+  const bool whole = given() && value_->is_number_unsigned();
+  const std::uint64_t number = whole ? value_->get<std::uint64_t>() : 0;
+  if (!whole || number < least || number > most) return Wrong(fmt::format("a whole number in [{}, {}]", least, most));
+  return number;
+}
+
+Result<std::vector<std::uint64_t>> Field::Counts(std::size_t axes) const {
+  const bool fits = axes > 0 ? size() == axes : size() >= 1 && size() <= kMaxArrayAxes;
+  if (!is_array() || !fits)
+    return Wrong(axes > 0 ? fmt::format("a list of {} numbers", axes) : fmt::format("a list of 1 to {} numbers", kMaxArrayAxes));
+  std::vector<std::uint64_t> counts;
+  for (std::size_t i = 0; i < size(); ++i) {
+    const Result<std::uint64_t> count = (*this)[i].Whole(1, kMostElements);
+    if (!count.ok()) return count.status();
+    counts.push_back(*count);
+  }
+  return counts;
+}
+
+Status Field::Wrong(std::string_view must_be) const {
+  constexpr std::size_t kMostShown = 80;
+  std::string shown = value_ == nullptr ? "missing" : value_->dump(-1, ' ', false, Json::error_handler_t::replace);
+  if (shown.size() > kMostShown) shown = shown.substr(0, kMostShown) + "...";
+  const std::string place = place_.empty() ? "the whole" : place_;
+  return Printable(Status::InvalidArgument(fmt::format("{}: {} is {}, must be {}", object_, place, shown, must_be)));
+}
+
+}  // namespace slabstream::zarr

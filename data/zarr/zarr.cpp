@@ -1,0 +1,43 @@
+#include "data/zarr/zarr.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "data/sources/chunked_source.h"
+#include "data/zarr/zarr_node.h"
+#include "data/zarr/zarr_pyramid.h"
+
+namespace slabstream {
+namespace zarr {
+namespace {
+
+bool IsArchive(const std::string& path) { return path.ends_with(".zip") || path.ends_with(".ozx"); }
+
+bool Recognises(const std::string& path) {
+  std::error_code error;
+  const auto is_there = [&](const char* name) { return std::filesystem::is_regular_file(std::filesystem::path(path) / name, error); };
+  if (std::filesystem::is_directory(path, error)) return is_there(kNode3) || is_there(kArray2) || is_there(kGroup2);
+  if (!IsArchive(path)) return false;
+  const Result<std::shared_ptr<Store>> archive = ZipStore(path);
+  const Result<std::vector<std::string>> names = archive.ok() ? (*archive)->List("") : archive.status();
+  const auto has = [&](const char* name) { return std::ranges::find(*names, name) != names->end(); };
+  return names.ok() && (has(kNode3) || has(kArray2) || has(kGroup2));
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  const Result<std::shared_ptr<Store>> store = OpenStore(path);
+  if (!store.ok()) return store.status();
+  Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
+  if (!pyramid.ok()) return pyramid.status();
+  return MakeChunkedSource(path, *std::move(pyramid), context);
+}
+
+}  // namespace
+}  // namespace zarr
+
+SourceFormat Zarr() {
+  return {.name = "Zarr", .recognises = zarr::Recognises, .options = {"time", "channel", "spacing", "array"}, .open = zarr::Open};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,130 @@
+#include "data/zarr/zarr_array.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
+#include <utility>
+
+#include "common/base/guarded.h"
+#include "data/sources/decode_chunk.h"
+#include "data/zarr/zarr_layout.h"
+
+namespace slabstream::zarr {
+namespace {
+
+constexpr std::uint64_t kIndexBytes = std::uint64_t{32} << 20;  // of shards' indices, for each source
+
+// Codecs may make bytes that they cannot pack a little longer.
+std::uint64_t MostStored(std::uint64_t bytes) { return bytes + bytes / 8 + (1 << 16); }
+
+class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
+ public:
+  Array(ArrayContext context, std::string path, ZarrLayout layout)
+      : context_(std::move(context)), path_(std::move(path)), layout_(std::move(layout)) {}
+
+  const ArrayShape& shape() const override { return layout_.shape; }
+
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+    if (layout_.sharding) return ReadFromShard(*layout_.sharding, index, std::move(done));
+    const std::string key = Join(path_, layout_.Key(index));
+    auto decode = [self = shared_from_this(), what = NameOf(key), done = std::move(done)](Result<Bytes> answer) mutable {
+      // A chunk that is much longer than any codec would make it is damaged.
+      if (answer.status().code() == StatusCode::kResourceExhausted) answer = Status::DataLoss("damaged: " + answer.status().message());
+      DecodeOn(self->context_.source, self->layout_.codecs, std::move(answer), self->shape().chunk_bytes(), std::move(what),
+               std::move(done));
+    };
+    context_.store->Read(key, {}, MostStored(shape().chunk_bytes()), std::move(decode));
+  }
+
+ private:
+  using Index = ShardIndices::Index;
+
+  std::string NameOf(const std::string& key) const { return context_.store->name() + "/" + key; }
+
+  void ReadFromShard(const Sharding& sharding, std::span<const std::uint64_t> index, ChunkDone done) {
+    std::array<std::uint64_t, kMaxArrayAxes> shard{};
+    std::uint64_t number = 0;
+    for (std::size_t i = 0; i < index.size(); ++i) {
+      shard.at(i) = index[i] / sharding.chunks[i];
+      number += index[i] % sharding.chunks[i] * sharding.strides[i];
+    }
+    const std::string key = Join(path_, layout_.Key(std::span(shard).first(index.size())));
+    auto with_index = [self = shared_from_this(), key, number, done = std::move(done)](Result<Index> answer) mutable {
+      if (!answer.ok()) return done(answer.status());
+      self->ReadIndexed(key, number, *answer, std::move(done));
+    };
+    if (context_.indices->Ask(key, std::move(with_index))) ReadIndex(sharding, key);
+  }
+
+  void ReadIndex(const Sharding& sharding, const std::string& key) {
+    const ByteRange range{.bytes = sharding.index_bytes, .from_end = sharding.index_at_end};
+    context_.store->Read(key, range, sharding.index_bytes, [self = shared_from_this(), key](Result<Bytes> answer) {
+      const Result<Index> index = Guarded("reading the index of a shard", [&] { return self->DecodeIndex(key, std::move(answer)); });
+      self->context_.indices->Put(key, index);
+    });
+  }
+
+  Result<Index> DecodeIndex(const std::string& key, Result<Bytes> answer) const {
+    if (answer.status().code() == StatusCode::kNotFound) return Index();
+    if (!answer.ok()) return answer.status();
+    constexpr std::uint64_t kPairBytes = 16;
+    const Sharding& sharding = *layout_.sharding;
+    Result<Bytes> numbers = DecodeChain(sharding.index_codecs, *std::move(answer), kPairBytes * sharding.chunk_count());
+    if (numbers.ok()) return Index(std::make_shared<const ShardIndex>(*std::move(numbers)));
+    return Status(numbers.status().code(), fmt::format("{}: index of the shard: {}", NameOf(key), numbers.status().message()));
+  }
+
+  void ReadIndexed(const std::string& key, std::uint64_t number, const Index& index, ChunkDone done) {
+    const std::optional<ByteRange> range = index == nullptr ? std::nullopt : index->Find(number);
+    if (!range) return done(std::optional<StoredChunk>());
+    std::string what = fmt::format("{}: chunk {} of the shard", NameOf(key), number);
+    // If it is damaged, its shard may have been replaced since the index was read.
+    auto decoded = [self = shared_from_this(), key, done = std::move(done)](Result<std::optional<StoredChunk>> chunk) {
+      if (!chunk.ok()) self->context_.indices->Forget(key);
+      done(std::move(chunk));
+    };
+    const std::uint64_t bytes = range->bytes, most = MostStored(shape().chunk_bytes());
+    if (bytes > most || range->begin > ~bytes) {
+      return decoded(Status::DataLoss(fmt::format("{}: damaged: the index says that it has {} bytes at {}", what, bytes, range->begin)));
+    }
+    auto decode = [self = shared_from_this(), what = std::move(what), bytes, decoded = std::move(decoded)](Result<Bytes> answer) mutable {
+      if (answer.status().code() == StatusCode::kNotFound) answer = Status::Unavailable(what + ": the shard is gone");
+      if (answer.ok() && answer->size() != bytes) {
+        answer = Status::DataLoss(fmt::format("{}: damaged: the shard ends after {} of its {} bytes", what, answer->size(), bytes));
+      }
+      DecodeOn(self->context_.source, self->layout_.codecs, std::move(answer), self->shape().chunk_bytes(), std::move(what),
+               std::move(decoded));
+    };
+    context_.store->Read(key, *range, most, std::move(decode));
+  }
+
+  const ArrayContext context_;
+  const std::string path_;
+  const ZarrLayout layout_;
+};
+
+}  // namespace
+
+ArrayContext MakeArrayContext(std::shared_ptr<Store> store, SourceContext source) {
+  return {std::move(store), std::move(source), std::make_shared<ShardIndices>(kIndexBytes)};
+}
+
+Result<ZarrArray> OpenArray(const ArrayContext& context, const ZarrNode& node) {
+  Result<ZarrLayout> layout = node.version == 2 ? ParseLayout2(node.metadata_field()) : ParseLayout3(node.metadata_field());
+  if (!layout.ok()) return layout.status();
+  ZarrArray opened{.from = layout->from, .dimension_names = layout->dimension_names};
+  opened.array = std::make_shared<Array>(context, node.path, *std::move(layout));
+  return opened;
+}
+
+Result<ZarrArray> OpenZarrArray(const ArrayContext& context, const std::string& path) {
+  const Result<std::optional<ZarrNode>> node = ReadNode(*context.store, path);
+  if (!node.ok()) return node.status();
+  if (!node->has_value() || !(*node)->array) {
+    return Status::NotFound(context.store->name() + (path.empty() ? "" : "/" + path) + ": no Zarr array is there");
+  }
+  return OpenArray(context, **node);
+}
+
+}  // namespace slabstream::zarr

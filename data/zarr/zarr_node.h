@@ -1,0 +1,36 @@
+// A node of a Zarr hierarchy: an array or a group, with its attributes.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "data/stores/store.h"
+#include "data/zarr/metadata.h"
+
+namespace slabstream::zarr {
+
+struct ZarrNode {
+  std::string path;           // in the store; "": its root
+  int version = 3;            // of Zarr: 2 or 3
+  bool array = false;         // else a group
+  Json metadata;              // of version 2: of an array .zarray, of a group nothing
+  std::string metadata_name;  // of the store and the object: "/data/scan.zarr/0/zarr.json"
+  Json attributes;
+  std::string attributes_name;
+  std::vector<std::string> keys = {};  // of the objects that were read
+
+  Field metadata_field() const { return {metadata_name, metadata}; }
+  // Of version 3 they are a member of the metadata, so their place in messages is "attributes".
+  Field attributes_field() const { return version == 3 ? metadata_field()["attributes"] : Field(attributes_name, attributes); }
+};
+
+// nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read. Waits.
+Result<std::optional<ZarrNode>> ReadNode(Store& store, const std::string& path);
+
+// The names of the objects of which a node has at least one.
+inline constexpr const char *kNode3 = "zarr.json", *kArray2 = ".zarray", *kGroup2 = ".zgroup", *kAttributes2 = ".zattrs";
+
+}  // namespace slabstream::zarr
