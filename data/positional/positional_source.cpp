@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <mutex>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/printable.h"
-#include "data/positional/keep_samples.h"
 #include "data/positional/stored_samples.h"
+#include "data/sources/copy_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/volume_reader.h"
 #include "data/volume_io/world_placement.h"
@@ -18,38 +19,10 @@
 namespace slabstream {
 namespace {
 
-// A box as it is read: where it lies by the stored axes, and where its samples belong.
-struct Wanted {
-  Box stored;
-  PlacedSamples<std::byte> to;  // by the stored axes
-
-  PlacedSamples<std::byte> Of(const Box& part) const {
-    PlacedSamples<std::byte> placed = to;
-    for (int i = 0; i < 3; ++i) placed.first += (part.begin[i] - stored.begin[i]) * to.steps[std::size_t(i)];
-    return placed;
-  }
-};
-
-// `size`: of the volume, turned like `box`.
-Wanted FindStored(const AxisTurn& turn, const Index3& size, const Box& box, std::byte* out, std::int64_t sample_bytes) {
-  Wanted wanted{.stored = {}, .to = {.first = out}};
-  std::int64_t step = sample_bytes;
-  for (int i = 0; i < 3; ++i) {
-    const int axis = turn.from[std::size_t(i)];
-    const bool flipped = turn.flipped[std::size_t(i)];
-    wanted.stored.begin[axis] = flipped ? size[i] - box.end[i] : box.begin[i];
-    wanted.stored.end[axis] = flipped ? size[i] - box.begin[i] : box.end[i];
-    wanted.to.steps[std::size_t(axis)] = flipped ? -step : step;
-    if (flipped) wanted.to.first += step * (box.size()[i] - 1);
-    step *= box.size()[i];
-  }
-  return wanted;
-}
-
 // A box on its way: ends when all parts have.
 struct Job {
   std::shared_ptr<StoredSamples> samples;
-  Wanted wanted;
+  TurnedBox box;
   std::stop_token stop;
   VolumeSource::ReadDone done;
   std::atomic<std::size_t> left;
@@ -60,18 +33,18 @@ struct Job {
     if (stop.stop_requested()) {
       Fail(Status::Cancelled("reading was cancelled"));
     } else if (!failed()) {
-      if (const Status status = samples->Read(part, wanted.Of(part)); !status.ok()) Fail(Printable(status));
+      if (const Status status = samples->Read(part, box); !status.ok()) Fail(Printable(status));
     }
   }
   void EndPart() {
     if (--left == 0) done(end);
   }
-
- private:
   void Fail(Status status) {
     const std::lock_guard lock(mutex);
     if (end.ok()) end = std::move(status);
   }
+
+ private:
   bool failed() {
     const std::lock_guard lock(mutex);
     return !end.ok();
@@ -91,22 +64,33 @@ class PositionalSource : public VolumeSource {
     const std::size_t sample_bytes = BytesPerSample(description.type);
     CHECK(level == 0 && !box.empty() && description.geometry.bounds().Contains(box)) << "a box outside the volume";
     CHECK(out.size() == std::size_t(box.voxel_count()) * sample_bytes) << out.size();
-    const Wanted wanted = FindStored(turn_, description.geometry.size, box, out.data(), std::int64_t(sample_bytes));
-    const std::vector<Box> parts = samples_->Parts(wanted.stored);
-    const std::shared_ptr<Job> job(new Job{samples_, wanted, std::move(stop), std::move(done), parts.size()});
+    const TurnedBox turned{turn_, description.geometry.size, box, out.data()};
+    const std::vector<Box> parts = samples_->Parts(turned.Stored());
+    const std::shared_ptr<Job> job(new Job{samples_, turned, std::move(stop), std::move(done), parts.size()});
     for (const Box& part : parts) {
-      const auto bytes = std::uint64_t(samples_->MemoryFor(part, wanted.Of(part)));
-      context_->Admit(bytes, [job, part, bytes, context = context_] {
-        context->PostDecode([job, part, bytes, context] {
-          job->Run(part);
-          context->Release(bytes);
-          job->EndPart();
-        });
-      });
+      const auto bytes = std::uint64_t(samples_->MemoryFor(part, turned));
+      context_->Admit(bytes, [job, part, bytes, context = context_] { Post(context, job, part, bytes); });
     }
   }
 
  private:
+  // Throws nothing.
+  static void Post(const SourceContext& context, const std::shared_ptr<Job>& job, const Box& part, std::uint64_t bytes) {
+    const auto end = [job, bytes, context] {
+      context->Release(bytes);
+      job->EndPart();
+    };
+    try {
+      context->PostDecode([job, part, end] {
+        job->Run(part);
+        end();
+      });
+    } catch (const std::exception& error) {
+      job->Fail(Status::ResourceExhausted(std::string("reading cannot begin: ") + error.what()));
+      end();
+    }
+  }
+
   const SourceInfo info_;
   const AxisTurn turn_;
   const std::shared_ptr<StoredSamples> samples_;
@@ -172,7 +156,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
   Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(header, *payload, options.channel.value_or(0));
   if (!samples.ok()) return samples.status();
 
-  const auto [type, shift] = KeptSampleTypeOf(header.type);
+  const auto [type, shift] = KeptTypeOf(header.type);
   // value = scale * (stored + shift) + offset
   const auto [scale, offset] = header.rescale;
   const VolumeDescription description = {placed->geometry, type, {scale, scale * shift + offset}};

@@ -10,6 +10,8 @@
 #include <system_error>
 #include <utility>
 
+#include "data/sources/copy_samples.h"
+
 namespace slabstream {
 namespace {
 
@@ -17,6 +19,28 @@ namespace {
 constexpr std::int64_t kGap = 4096;
 
 }  // namespace
+
+Box TurnedBox::Stored() const {
+  Box stored;
+  for (int i = 0; i < 3; ++i) {
+    const int axis = turn.from[std::size_t(i)];
+    const bool flipped = turn.flipped[std::size_t(i)];
+    stored.begin[axis] = flipped ? size[i] - box.end[i] : box.begin[i];
+    stored.end[axis] = flipped ? size[i] - box.begin[i] : box.end[i];
+  }
+  return stored;
+}
+
+Box TurnedBox::Turned(const Box& part) const {
+  Box turned;
+  for (int i = 0; i < 3; ++i) {
+    const int axis = turn.from[std::size_t(i)];
+    const bool flipped = turn.flipped[std::size_t(i)];
+    turned.begin[i] = flipped ? size[i] - part.end[axis] : part.begin[axis];
+    turned.end[i] = flipped ? size[i] - part.begin[axis] : part.end[axis];
+  }
+  return turned;
+}
 
 Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int channel) {
   FileDescriptor file(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
@@ -61,30 +85,44 @@ std::vector<Box> StoredSamples::Parts(const Box& box) const {
   return parts;
 }
 
-// Samples that are kept as they are in the file: rows of them need no memory on the way.
-bool StoredSamples::CanReadInto(const Box& part, const PlacedSamples<std::byte>& to) const {
+// Samples that are kept as they are in the file, in its order: rows of them need no memory on the way.
+bool StoredSamples::CanReadInto(const Box& part, const TurnedBox& to) const {
   const bool kept_as_stored =
       type_ == SampleType::kUint8 || ((type_ == SampleType::kUint16 || type_ == SampleType::kFloat32) && !big_endian_);
-  if (!kept_as_stored || voxel_ != sample_ || to.steps[0] != sample_) return false;
-  const bool joined = to.steps[1] == row_;  // in memory as in the file
-  return RowBytes(part.size()) == row_ ? joined : !joined && PitchFor(part.size()).row != row_;
+  if (!kept_as_stored || voxel_ != sample_ || to.turn != AxisTurn{}) return false;
+  // Whole rows lie in memory as in the file.
+  return RowBytes(part.size()) == row_ || PitchFor(part.size()).row != row_;
 }
 
-std::int64_t StoredSamples::MemoryFor(const Box& part, const PlacedSamples<std::byte>& to) const {
+std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) const {
   if (CanReadInto(part, to)) return 0;
   const Index3 size = part.size();
   const Pitch pitch = PitchFor(size);
   return (size.z - 1) * pitch.slice + (size.y - 1) * pitch.row + RowBytes(size);
 }
 
-Status StoredSamples::Read(const Box& part, const PlacedSamples<std::byte>& to) {
-  if (CanReadInto(part, to)) return ReadRows(part, to.first, {to.steps[1], to.steps[2]});
+Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
+  const Box turned = to.Turned(part);
+  const Index3 size = to.box.size();
+  const auto kept_bytes = std::int64_t(BytesPerSample(KeptTypeOf(type_).type));
+  std::byte* const out = to.out + std::int64_t(NumberIn(size, turned.begin - to.box.begin)) * kept_bytes;
+  if (CanReadInto(part, to)) return ReadRows(part, out, {size.x * sample_, size.x * sample_ * size.y});
+
   const auto bytes = std::size_t(MemoryFor(part, to));
   const std::unique_ptr<std::byte[]> stored(new (std::nothrow) std::byte[bytes]);
   if (stored == nullptr) return Status::ResourceExhausted(fmt::format("{}: no memory for {} bytes of samples", name_, bytes));
   const Pitch pitch = PitchFor(part.size());
   if (Status status = ReadRows(part, stored.get(), pitch); !status.ok()) return status;
-  KeepSamples(type_, big_endian_, part.size(), {stored.get(), {voxel_, pitch.row, pitch.slice}}, to);
+  if (big_endian_) SwapByteOrder(type_, {stored.get(), bytes});
+  const std::array<std::int64_t, 3> pitches = {voxel_ / sample_, pitch.row / sample_, pitch.slice / sample_};
+  std::array<std::int64_t, 3> steps{};
+  std::int64_t first = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t step = pitches[std::size_t(to.turn.from[i])];
+    steps[i] = to.turn.flipped[i] ? -step : step;
+    if (to.turn.flipped[i]) first += step * (turned.size()[int(i)] - 1);
+  }
+  CopySamples(type_, stored.get() + first * sample_, steps, turned.size(), out, size.x, std::int64_t{size.x} * size.y);
   return Status::Ok();
 }
 

@@ -13,10 +13,21 @@
 #include "common/base/file_descriptor.h"
 #include "common/base/status.h"
 #include "common/volume/box.h"
-#include "data/positional/keep_samples.h"
 #include "data/volume_io/raw_volume.h"
+#include "data/volume_io/world_placement.h"
 
 namespace slabstream {
+
+// A box of a volume whose voxels are turned as they are read, and where its samples belong: x fastest.
+struct TurnedBox {
+  AxisTurn turn;
+  Index3 size;  // of the volume
+  Box box;
+  std::byte* out = nullptr;
+
+  Box Stored() const;                 // the box by the axes of the file
+  Box Turned(const Box& part) const;  // a part of that, by those of the volume
+};
 
 class StoredSamples {
  public:
@@ -26,10 +37,10 @@ class StoredSamples {
   // A box, by the stored axes, cut into parts that are read on their own, each with little memory.
   std::vector<Box> Parts(const Box& box) const;
   // Bytes of memory that reading a part takes: at most kPartBytes, or those of one voxel.
-  std::int64_t MemoryFor(const Box& part, const PlacedSamples<std::byte>& to) const;
+  std::int64_t MemoryFor(const Box& part, const TurnedBox& to) const;
   // Fills in the kept samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
   // ResourceExhausted.
-  Status Read(const Box& part, const PlacedSamples<std::byte>& to);
+  Status Read(const Box& part, const TurnedBox& to);
 
   std::uint64_t read_bytes() const { return read_bytes_; }
 
@@ -43,7 +54,7 @@ class StoredSamples {
 
   StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file);
   Pitch PitchFor(const Index3& size) const;
-  bool CanReadInto(const Box& part, const PlacedSamples<std::byte>& to) const;
+  bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }
   Status ReadRows(const Box& part, std::byte* to, const Pitch& pitch);
   Status ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes);
