@@ -33,7 +33,11 @@ struct Job {
     if (stop.stop_requested()) {
       Fail(Status::Cancelled("reading was cancelled"));
     } else if (!failed()) {
-      if (const Status status = samples->Read(part, box); !status.ok()) Fail(Printable(status));
+      try {
+        if (const Status status = samples->Read(part, box); !status.ok()) Fail(Printable(status));
+      } catch (const std::exception& error) {
+        Fail(Status::ResourceExhausted(std::string("a part of a volume cannot be read: ") + error.what()));
+      }
     }
   }
   void EndPart() {

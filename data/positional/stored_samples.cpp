@@ -6,10 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <new>
 #include <system_error>
 #include <utility>
 
+#include "common/base/pooled_vector.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -108,12 +108,10 @@ Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
   std::byte* const out = to.out + std::int64_t(NumberIn(size, turned.begin - to.box.begin)) * kept_bytes;
   if (CanReadInto(part, to)) return ReadRows(part, out, {size.x * sample_, size.x * sample_ * size.y});
 
-  const auto bytes = std::size_t(MemoryFor(part, to));
-  const std::unique_ptr<std::byte[]> stored(new (std::nothrow) std::byte[bytes]);
-  if (stored == nullptr) return Status::ResourceExhausted(fmt::format("{}: no memory for {} bytes of samples", name_, bytes));
+  PooledVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
   const Pitch pitch = PitchFor(part.size());
-  if (Status status = ReadRows(part, stored.get(), pitch); !status.ok()) return status;
-  if (big_endian_) SwapByteOrder(type_, {stored.get(), bytes});
+  if (Status status = ReadRows(part, stored.data(), pitch); !status.ok()) return status;
+  if (big_endian_) SwapByteOrder(type_, stored);
   const std::array<std::int64_t, 3> pitches = {voxel_ / sample_, pitch.row / sample_, pitch.slice / sample_};
   std::array<std::int64_t, 3> steps{};
   std::int64_t first = 0;
@@ -122,7 +120,7 @@ Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
     steps[i] = to.turn.flipped[i] ? -step : step;
     if (to.turn.flipped[i]) first += step * (turned.size()[int(i)] - 1);
   }
-  CopySamples(type_, stored.get() + first * sample_, steps, turned.size(), out, size.x, std::int64_t{size.x} * size.y);
+  CopySamples(type_, stored.data() + first * sample_, steps, turned.size(), out, size.x, std::int64_t{size.x} * size.y);
   return Status::Ok();
 }
 

@@ -39,7 +39,7 @@ class StoredSamples {
   // Bytes of memory that reading a part takes: at most kPartBytes, or those of one voxel.
   std::int64_t MemoryFor(const Box& part, const TurnedBox& to) const;
   // Fills in the kept samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
-  // ResourceExhausted.
+  // Throws std::bad_alloc.
   Status Read(const Box& part, const TurnedBox& to);
 
   std::uint64_t read_bytes() const { return read_bytes_; }
