@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "common/base/pooled_vector.h"
-#include "data/sources/copy_samples.h"
 
 namespace slabstream {
 namespace {
@@ -19,28 +18,6 @@ namespace {
 constexpr std::int64_t kGap = 4096;
 
 }  // namespace
-
-Box TurnedBox::Stored() const {
-  Box stored;
-  for (int i = 0; i < 3; ++i) {
-    const int axis = turn.from[std::size_t(i)];
-    const bool flipped = turn.flipped[std::size_t(i)];
-    stored.begin[axis] = flipped ? size[i] - box.end[i] : box.begin[i];
-    stored.end[axis] = flipped ? size[i] - box.begin[i] : box.end[i];
-  }
-  return stored;
-}
-
-Box TurnedBox::Turned(const Box& part) const {
-  Box turned;
-  for (int i = 0; i < 3; ++i) {
-    const int axis = turn.from[std::size_t(i)];
-    const bool flipped = turn.flipped[std::size_t(i)];
-    turned.begin[i] = flipped ? size[i] - part.end[axis] : part.begin[axis];
-    turned.end[i] = flipped ? size[i] - part.begin[axis] : part.end[axis];
-  }
-  return turned;
-}
 
 Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int channel) {
   FileDescriptor file(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
@@ -102,25 +79,16 @@ std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) cons
 }
 
 Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
-  const Box turned = to.Turned(part);
-  const Index3 size = to.box.size();
-  const auto kept_bytes = std::int64_t(BytesPerSample(KeptTypeOf(type_).type));
-  std::byte* const out = to.out + std::int64_t(NumberIn(size, turned.begin - to.box.begin)) * kept_bytes;
-  if (CanReadInto(part, to)) return ReadRows(part, out, {size.x * sample_, size.x * sample_ * size.y});
+  if (CanReadInto(part, to)) {
+    const Index3 size = to.box.size();
+    return ReadRows(part, to.Place(part, type_), {size.x * sample_, size.x * sample_ * size.y});
+  }
 
   PooledVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
   const Pitch pitch = PitchFor(part.size());
   if (Status status = ReadRows(part, stored.data(), pitch); !status.ok()) return status;
   if (big_endian_) SwapByteOrder(type_, stored);
-  const std::array<std::int64_t, 3> pitches = {voxel_ / sample_, pitch.row / sample_, pitch.slice / sample_};
-  std::array<std::int64_t, 3> steps{};
-  std::int64_t first = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t step = pitches[std::size_t(to.turn.from[i])];
-    steps[i] = to.turn.flipped[i] ? -step : step;
-    if (to.turn.flipped[i]) first += step * (turned.size()[int(i)] - 1);
-  }
-  CopySamples(type_, stored.data() + first * sample_, steps, turned.size(), out, size.x, std::int64_t{size.x} * size.y);
+  to.Fill(part, type_, stored.data(), {voxel_ / sample_, pitch.row / sample_, pitch.slice / sample_});
   return Status::Ok();
 }
 

@@ -13,21 +13,10 @@
 #include "common/base/file_descriptor.h"
 #include "common/base/status.h"
 #include "common/volume/box.h"
+#include "data/positional/turned_box.h"
 #include "data/volume_io/raw_volume.h"
-#include "data/volume_io/world_placement.h"
 
 namespace slabstream {
-
-// A box of a volume whose voxels are turned as they are read, and where its samples belong: x fastest.
-struct TurnedBox {
-  AxisTurn turn;
-  Index3 size;  // of the volume
-  Box box;
-  std::byte* out = nullptr;
-
-  Box Stored() const;                 // the box by the axes of the file
-  Box Turned(const Box& part) const;  // a part of that, by those of the volume
-};
 
 class StoredSamples {
  public:
