@@ -13,6 +13,10 @@
 namespace slabstream {
 namespace {
 
+Status NoMemory(const std::exception& error) {
+  return Status::ResourceExhausted(std::string("a part of a volume cannot be read: ") + error.what());
+}
+
 // A box on its way: ends when all parts have.
 struct Job {
   std::shared_ptr<StoredSamples> samples;
@@ -30,7 +34,7 @@ struct Job {
       try {
         if (const Status status = samples->Read(part, box); !status.ok()) Fail(Printable(status));
       } catch (const std::exception& error) {
-        Fail(Status::ResourceExhausted(std::string("a part of a volume cannot be read: ") + error.what()));
+        Fail(NoMemory(error));
       }
     }
   }
@@ -67,7 +71,12 @@ class PositionalSource : public VolumeSource {
     const std::shared_ptr<Job> job(new Job{samples_, turned, std::move(stop), std::move(done), parts.size()});
     for (const Box& part : parts) {
       const auto bytes = std::uint64_t(samples_->MemoryFor(part, turned));
-      context_->Admit(bytes, [job, part, bytes, context = context_] { Post(context, job, part, bytes); });
+      try {
+        context_->Admit(bytes, [job, part, bytes, context = context_] { Post(context, job, part, bytes); });
+      } catch (const std::exception& error) {
+        job->Fail(NoMemory(error));
+        job->EndPart();
+      }
     }
   }
 
@@ -84,7 +93,7 @@ class PositionalSource : public VolumeSource {
         end();
       });
     } catch (const std::exception& error) {
-      job->Fail(Status::ResourceExhausted(std::string("reading cannot begin: ") + error.what()));
+      job->Fail(NoMemory(error));
       end();
     }
   }

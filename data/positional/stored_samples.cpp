@@ -50,9 +50,12 @@ std::vector<Box> StoredSamples::Parts(const Box& box) const {
   const Index3 size = box.size();
   const Pitch pitch = PitchFor(size);
   const auto most = [](std::int64_t bytes) { return std::int32_t(std::clamp<std::int64_t>(kPartBytes / bytes, 1, kMaxVolumeSide)); };
-  Index3 step = {size.x, size.y, most(pitch.slice)};
-  if (pitch.slice > kPartBytes) step.y = most(pitch.row);
-  if (pitch.row > kPartBytes) step.x = most(voxel_);
+  // A short row on its own costs as much as a page, so many of them are read by several threads.
+  const bool joined = pitch.row == row_;
+  const std::int64_t row = joined ? pitch.row : std::max(pitch.row, kGap), slice = joined ? pitch.slice : row * size.y;
+  Index3 step = {size.x, size.y, most(slice)};
+  if (slice > kPartBytes) step.y = most(row);
+  if (row > kPartBytes) step.x = most(voxel_);
   std::vector<Box> parts;
   for (std::int32_t z = box.begin.z; z < box.end.z; z += step.z) {
     for (std::int32_t y = box.begin.y; y < box.end.y; y += step.y) {
