@@ -4,12 +4,13 @@
 #include <filesystem>
 
 #include "data/positional/positional_source.h"
+#include "data/tiles/tiled_tiff.h"
 #include "data/zarr/zarr.h"
 
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {Zarr(), UncompressedFile()};
+  static const std::vector<SourceFormat> kFormats = {Zarr(), TiledTiff(), UncompressedFile()};
   return kFormats;
 }
 

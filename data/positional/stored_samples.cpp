@@ -6,9 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <new>
 #include <system_error>
 #include <utility>
+
+#include "common/base/pooled_vector.h"
 
 namespace slabstream {
 namespace {
@@ -49,9 +50,12 @@ std::vector<Box> StoredSamples::Parts(const Box& box) const {
   const Index3 size = box.size();
   const Pitch pitch = PitchFor(size);
   const auto most = [](std::int64_t bytes) { return std::int32_t(std::clamp<std::int64_t>(kPartBytes / bytes, 1, kMaxVolumeSide)); };
-  Index3 step = {size.x, size.y, most(pitch.slice)};
-  if (pitch.slice > kPartBytes) step.y = most(pitch.row);
-  if (pitch.row > kPartBytes) step.x = most(voxel_);
+  // A short row on its own costs as much as a page, so many of them are read by several threads.
+  const bool joined = pitch.row == row_;
+  const std::int64_t row = joined ? pitch.row : std::max(pitch.row, kGap), slice = joined ? pitch.slice : row * size.y;
+  Index3 step = {size.x, size.y, most(slice)};
+  if (slice > kPartBytes) step.y = most(row);
+  if (row > kPartBytes) step.x = most(voxel_);
   std::vector<Box> parts;
   for (std::int32_t z = box.begin.z; z < box.end.z; z += step.z) {
     for (std::int32_t y = box.begin.y; y < box.end.y; y += step.y) {
@@ -61,30 +65,33 @@ std::vector<Box> StoredSamples::Parts(const Box& box) const {
   return parts;
 }
 
-// Samples that are kept as they are in the file: rows of them need no memory on the way.
-bool StoredSamples::CanReadInto(const Box& part, const PlacedSamples<std::byte>& to) const {
+// Samples that are kept as they are in the file, in its order: rows of them need no memory on the way.
+bool StoredSamples::CanReadInto(const Box& part, const TurnedBox& to) const {
   const bool kept_as_stored =
       type_ == SampleType::kUint8 || ((type_ == SampleType::kUint16 || type_ == SampleType::kFloat32) && !big_endian_);
-  if (!kept_as_stored || voxel_ != sample_ || to.steps[0] != sample_) return false;
-  const bool joined = to.steps[1] == row_;  // in memory as in the file
-  return RowBytes(part.size()) == row_ ? joined : !joined && PitchFor(part.size()).row != row_;
+  if (!kept_as_stored || voxel_ != sample_ || to.turn != AxisTurn{}) return false;
+  // Whole rows lie in memory as in the file.
+  return RowBytes(part.size()) == row_ || PitchFor(part.size()).row != row_;
 }
 
-std::int64_t StoredSamples::MemoryFor(const Box& part, const PlacedSamples<std::byte>& to) const {
+std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) const {
   if (CanReadInto(part, to)) return 0;
   const Index3 size = part.size();
   const Pitch pitch = PitchFor(size);
   return (size.z - 1) * pitch.slice + (size.y - 1) * pitch.row + RowBytes(size);
 }
 
-Status StoredSamples::Read(const Box& part, const PlacedSamples<std::byte>& to) {
-  if (CanReadInto(part, to)) return ReadRows(part, to.first, {to.steps[1], to.steps[2]});
-  const auto bytes = std::size_t(MemoryFor(part, to));
-  const std::unique_ptr<std::byte[]> stored(new (std::nothrow) std::byte[bytes]);
-  if (stored == nullptr) return Status::ResourceExhausted(fmt::format("{}: no memory for {} bytes of samples", name_, bytes));
+Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
+  if (CanReadInto(part, to)) {
+    const Index3 size = to.box.size();
+    return ReadRows(part, to.Place(part, type_), {size.x * sample_, size.x * sample_ * size.y});
+  }
+
+  PooledVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
   const Pitch pitch = PitchFor(part.size());
-  if (Status status = ReadRows(part, stored.get(), pitch); !status.ok()) return status;
-  KeepSamples(type_, big_endian_, part.size(), {stored.get(), {voxel_, pitch.row, pitch.slice}}, to);
+  if (Status status = ReadRows(part, stored.data(), pitch); !status.ok()) return status;
+  if (big_endian_) SwapByteOrder(type_, stored);
+  to.Fill(part, type_, stored.data(), {voxel_ / sample_, pitch.row / sample_, pitch.slice / sample_});
   return Status::Ok();
 }
 

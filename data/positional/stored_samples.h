@@ -13,7 +13,7 @@
 #include "common/base/file_descriptor.h"
 #include "common/base/status.h"
 #include "common/volume/box.h"
-#include "data/positional/keep_samples.h"
+#include "data/positional/turned_box.h"
 #include "data/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -26,10 +26,10 @@ class StoredSamples {
   // A box, by the stored axes, cut into parts that are read on their own, each with little memory.
   std::vector<Box> Parts(const Box& box) const;
   // Bytes of memory that reading a part takes: at most kPartBytes, or those of one voxel.
-  std::int64_t MemoryFor(const Box& part, const PlacedSamples<std::byte>& to) const;
+  std::int64_t MemoryFor(const Box& part, const TurnedBox& to) const;
   // Fills in the kept samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
-  // ResourceExhausted.
-  Status Read(const Box& part, const PlacedSamples<std::byte>& to);
+  // Throws std::bad_alloc.
+  Status Read(const Box& part, const TurnedBox& to);
 
   std::uint64_t read_bytes() const { return read_bytes_; }
 
@@ -43,7 +43,7 @@ class StoredSamples {
 
   StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file);
   Pitch PitchFor(const Index3& size) const;
-  bool CanReadInto(const Box& part, const PlacedSamples<std::byte>& to) const;
+  bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }
   Status ReadRows(const Box& part, std::byte* to, const Pitch& pitch);
   Status ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes);

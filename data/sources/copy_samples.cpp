@@ -1,6 +1,7 @@
 #include "data/sources/copy_samples.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <type_traits>
 
@@ -60,7 +61,7 @@ template <class From>
 void CopyTiles(const std::byte* from, const std::array<std::int64_t, 3>& steps, const Index3& count, std::byte* to, std::int64_t row,
                std::int64_t slice) {
   constexpr std::int32_t kTile = 32;
-  const bool y_fastest = steps[1] < steps[2];
+  const bool y_fastest = std::abs(steps[1]) < std::abs(steps[2]);
   Index3 tile = {kTile, y_fastest ? kTile : 1, y_fastest ? 1 : kTile};
   for (std::int32_t z = 0; z < count.z; z += tile.z) {
     for (std::int32_t y = 0; y < count.y; y += tile.y) {
@@ -90,7 +91,8 @@ void CopySamples(SampleType type, const std::byte* from, std::array<std::int64_t
   VisitSampleType(type, [&](const auto* null) {
     using From = std::remove_cvref_t<decltype(*null)>;
     // Along an axis of one voxel the step does not matter.
-    if (count.x > 1 && ((count.y > 1 && steps[1] < steps[0]) || (count.z > 1 && steps[2] < steps[0]))) {
+    const auto faster_than_x = [&](std::size_t axis) { return std::abs(steps[axis]) < std::abs(steps[0]); };
+    if (count.x > 1 && ((count.y > 1 && faster_than_x(1)) || (count.z > 1 && faster_than_x(2)))) {
       CopyTiles<From>(from, steps, count, to, row, slice);
     } else if (steps[0] == 1 && steps[1] == count.x && row == count.x) {  // slices without gaps
       for (std::int64_t z = 0; z < count.z; ++z) {

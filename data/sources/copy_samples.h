@@ -20,8 +20,8 @@ struct KeptType {
 KeptType KeptTypeOf(SampleType type);
 
 // For each voxel v in [0, count): to[v.z * slice + v.y * row + v.x] = the sample at from[v.x * steps[0] + v.y * steps[1] + v.z * steps[2]],
-// as KeptTypeOf(type) keeps it. Steps, `row` and `slice` are in samples; a step of 0 repeats a sample. Neither pointer needs to be aligned.
-// The two do not overlap.
+// as KeptTypeOf(type) keeps it. Steps, `row` and `slice` are in samples; steps may be negative, and one of 0 repeats a sample. Neither
+// pointer needs to be aligned. The two do not overlap.
 void CopySamples(SampleType type, const std::byte* from, std::array<std::int64_t, 3> steps, Index3 count, std::byte* to, std::int64_t row,
                  std::int64_t slice);
 

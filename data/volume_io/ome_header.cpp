@@ -111,7 +111,9 @@ Result<PageOrder> ReadOmeHeader(const std::string& path, const std::string& desc
 
   // "XYZCT": z runs fastest from page to page, then c, then t.
   const std::string order = ome->pixels.Attribute("DimensionOrder");
-  PageOrder pages_of{.count = slices, .of_channel = in_page == 1 && channels > 1, .spacing = SpacingOf(ome->pixels)};
+  PageOrder pages_of{.count = slices, .of_channel = in_page == 1 && channels > 1, .spacing = SpacingOf(ome->pixels), .times = int(times)};
+  pages_of.channels = ome->channels;
+  if (pages_of.of_channel) pages_of.channels.resize(std::size_t(channels));
   std::int64_t step = 1;
   for (const char letter : order.substr(std::min<std::size_t>(2, order.size()))) {
     switch (letter) {

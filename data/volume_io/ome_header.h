@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/math/vec.h"
@@ -14,8 +15,12 @@ namespace slabstream {
 // The slices of a volume among the pages of a file: first, first + step, ...
 struct PageOrder {
   std::int64_t first = 0, step = 1, count = 0;
-  bool of_channel = false;      // these are the pages of the channel that options.channel takes
-  std::optional<Vec3> spacing;  // micrometres
+  bool of_channel = false;                 // these are the pages of the channel that options.channel takes
+  std::optional<Vec3> spacing;             // micrometres
+  std::vector<std::string> channels = {};  // names, "" where there is none; as many as there are channels if these have pages
+  int times = 1;                           // that the file holds
+
+  std::int64_t PageOf(std::int64_t slice) const { return first + slice * step; }
 };
 
 // Whether a description is OME's.

@@ -4,7 +4,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <fstream>
 #include <new>
 #include <vector>
 
@@ -21,8 +20,10 @@ Status Truncated(const Payload& payload, std::int64_t expected, std::int64_t fou
 
 Status Damaged(const Payload& payload) { return Status::DataLoss(payload.file.string() + ": the compressed samples are damaged"); }
 
+}  // namespace
+
 // Decompresses a file from an offset on. Members of a gzip file that follow each other make one stream.
-class InflateReader {
+class PayloadStream::InflateReader {
  public:
   InflateReader(std::ifstream& file, std::int64_t offset) : file_(file), input_(kBlock) {
     file_.seekg(offset);
@@ -81,39 +82,6 @@ class InflateReader {
   bool ended_ = false, damaged_ = false;
 };
 
-// Reads `out` by `read`, which returns how many bytes there were. Returns how many there were in all.
-template <class Read>
-std::size_t ReadInSteps(std::span<std::byte> out, ReadProgress* progress, Read read) {
-  if (progress == nullptr) return read(out);
-  std::size_t done = 0;
-  while (done < out.size()) {
-    const std::span<std::byte> step = out.subspan(done, std::min(kStep, out.size() - done));
-    const std::size_t found = read(step);
-    done += found;
-    progress->Add(std::int64_t(found));
-    if (found < step.size()) break;
-  }
-  return done;
-}
-
-Status ReadCompressed(const Payload& payload, std::ifstream& file, std::span<std::byte> out, Extent extent, ReadProgress* progress) {
-  InflateReader reader(file, payload.offset);
-  std::vector<std::byte> skipped(kBlock);
-  for (std::int64_t left = payload.skip; left > 0;) {
-    const std::size_t wanted = std::min(skipped.size(), std::size_t(left));
-    if (reader.Read(std::span(skipped).first(wanted)) != wanted) {
-      return reader.damaged() ? Damaged(payload) : Truncated(payload, std::int64_t(out.size()), 0);
-    }
-    left -= std::int64_t(wanted);
-  }
-  const std::size_t found = ReadInSteps(out, progress, [&](std::span<std::byte> step) { return reader.Read(step); });
-  if (reader.damaged()) return Damaged(payload);
-  if (found != out.size()) return Truncated(payload, std::int64_t(out.size()), std::int64_t(found));
-  return extent == Extent::kStart || reader.EndsWell() ? Status::Ok() : Damaged(payload);
-}
-
-}  // namespace
-
 bool BeginsLikeGzip(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   return file.get() == 0x1f && file.get() == 0x8b;
@@ -130,16 +98,53 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes) {
                                       payload.file.string(), bytes, data_bytes));
 }
 
+PayloadStream::PayloadStream(const Payload& payload, std::int64_t bytes) : payload_(payload), expected_(bytes) {}
+PayloadStream::~PayloadStream() = default;
+
+Status PayloadStream::Truncated() const { return slabstream::Truncated(payload_, expected_, found_); }
+
+Status PayloadStream::Open() {
+  file_.open(payload_.file, std::ios::binary);
+  if (!file_) return Status::NotFound(payload_.file.string() + ": cannot be opened for reading");
+  if (!payload_.compressed) {
+    file_.seekg(payload_.offset);
+    return Status::Ok();
+  }
+  inflate_ = std::make_unique<InflateReader>(file_, payload_.offset);
+  std::vector<std::byte> skipped(kBlock);
+  for (std::int64_t left = payload_.skip; left > 0;) {
+    const std::size_t wanted = std::min(skipped.size(), std::size_t(left));
+    if (inflate_->Read(std::span(skipped).first(wanted)) != wanted) return inflate_->damaged() ? Damaged(payload_) : Truncated();
+    left -= std::int64_t(wanted);
+  }
+  return Status::Ok();
+}
+
+Status PayloadStream::Read(std::span<std::byte> out) {
+  std::size_t found = 0;
+  if (inflate_) {
+    found = inflate_->Read(out);
+    if (inflate_->damaged()) return Damaged(payload_);
+  } else {
+    file_.read(reinterpret_cast<char*>(out.data()), std::streamsize(out.size()));
+    found = std::size_t(file_.gcount());
+  }
+  found_ += std::int64_t(found);
+  return found == out.size() ? Status::Ok() : Truncated();
+}
+
+Status PayloadStream::Finish() { return !inflate_ || inflate_->EndsWell() ? Status::Ok() : Damaged(payload_); }
+
 Status ReadPayload(const Payload& payload, std::span<std::byte> out, Extent extent, ReadProgress* progress) {
-  std::ifstream file(payload.file, std::ios::binary);
-  if (!file) return Status::NotFound(payload.file.string() + ": cannot be opened for reading");
-  if (payload.compressed) return ReadCompressed(payload, file, out, extent, progress);
-  file.seekg(payload.offset);
-  const std::size_t found = ReadInSteps(out, progress, [&](std::span<std::byte> step) {
-    file.read(reinterpret_cast<char*>(step.data()), std::streamsize(step.size()));
-    return std::size_t(file.gcount());
-  });
-  return found == out.size() ? Status::Ok() : Truncated(payload, std::int64_t(out.size()), std::int64_t(found));
+  PayloadStream stream(payload, std::int64_t(out.size()));
+  if (Status status = stream.Open(); !status.ok()) return status;
+  const std::size_t step = progress == nullptr ? std::max<std::size_t>(out.size(), 1) : kStep;
+  for (std::size_t done = 0; done < out.size(); done += step) {
+    const std::span<std::byte> part = out.subspan(done, std::min(step, out.size() - done));
+    if (Status status = stream.Read(part); !status.ok()) return status;
+    if (progress != nullptr) progress->Add(std::int64_t(part.size()));
+  }
+  return extent == Extent::kStart ? Status::Ok() : stream.Finish();
 }
 
 }  // namespace slabstream

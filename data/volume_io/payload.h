@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <span>
 
 #include "common/base/status.h"
@@ -30,6 +32,31 @@ Status CheckHolds(const Payload& payload, std::int64_t bytes);
 
 // How far a compressed stream is read: to its end, so that its checksum is verified, or only as far as wanted, as for a header inside it.
 enum class Extent { kStart, kWholeStream };
+
+// The bytes of a payload's samples, as they are in the file, from the first to the last. Messages name the file. One thread at a time.
+class PayloadStream {
+ public:
+  // `bytes`: of the samples, for messages.
+  PayloadStream(const Payload& payload, std::int64_t bytes);
+  ~PayloadStream();
+
+  // First: goes to the samples. NotFound: no such file. DataLoss: it is truncated or damaged in front of them.
+  Status Open();
+  // Fills `out` with the next bytes. DataLoss: truncated or damaged.
+  Status Read(std::span<std::byte> out);
+  // Behind the last sample: reads a compressed stream to its end. DataLoss: damaged, as its checksum tells.
+  Status Finish();
+
+ private:
+  class InflateReader;
+  Status Truncated() const;
+
+  const Payload payload_;
+  const std::int64_t expected_;
+  std::int64_t found_ = 0;
+  std::ifstream file_;
+  std::unique_ptr<InflateReader> inflate_;  // none: not compressed
+};
 
 // Fills `out` with the bytes as they are in the file (byte order is not touched). DataLoss: truncated or damaged. NotFound: no such file.
 // `progress`, if any, counts what is read.

@@ -106,9 +106,10 @@ std::string ValuesOf(SampleType type) {
   });
 }
 
-void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes) {
-  const std::size_t size = BytesPerSample(type);
-  for (std::size_t i = 0; i < bytes.size(); i += size) std::reverse(bytes.data() + i, bytes.data() + i + size);
+void SwapByteOrder(SampleType type, std::span<std::byte> bytes) {
+  VisitSampleType(type, [&]<class T>(const T*) {  // a size that the compiler knows
+    for (std::size_t i = 0; i < bytes.size(); i += sizeof(T)) std::ranges::reverse(bytes.subspan(i).template first<sizeof(T)>());
+  });
 }
 
 KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) {

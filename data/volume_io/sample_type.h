@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -39,7 +40,7 @@ decltype(auto) VisitSampleType(SampleType type, Function&& function) {
 }
 
 // Turns samples between big and little endian, in place. `bytes` holds whole samples.
-void SwapByteOrder(SampleType type, AlignedVector<std::byte>& bytes);
+void SwapByteOrder(SampleType type, std::span<std::byte> bytes);
 
 struct KeptSamples {
   ScalarType type = ScalarType::kUint8;

@@ -47,8 +47,8 @@ bool IsStackOfPictures(const std::string& folder, const std::vector<std::string_
   return !HasVolumeFiles(folder);
 }
 
-Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
-                                      const ReadOptions& options) {
+Result<RawHeader> HeaderOfSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
+                                 const ReadOptions& options) {
   if (Status status = SetSize(slice, path, {double(slice.size.x), double(slice.size.y), double(count)}, {}); !status.ok()) return status;
   if (options.spacing) {
     slice.steps = StepsOf(*options.spacing);
@@ -61,20 +61,22 @@ Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, 
     return Status::DataLoss(
         fmt::format("{}: truncated: the header speaks of {} bytes of samples, the file has {}", path, needed, file_bytes));
   }
-  return TakeMemory(path, slice, options);
+  return slice;
+}
+
+Status CheckSlice(const std::string& name, const RawHeader& slice, const RawHeader& volume) {
+  const auto kind = [](const RawHeader& of) {
+    return fmt::format("{} x {} {}{}", of.size.x, of.size.y, ToString(of.type),
+                       of.components == 1 ? "" : fmt::format(" of {} components", of.components));
+  };
+  if (kind(slice) == kind(volume)) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(slice), kind(volume)));
 }
 
 Status ReadSlice(SliceFile& slice, const std::string& name, std::int64_t number, RawVolume& volume, const ReadOptions& options) {
   const Result<RawHeader> header = slice.ReadHeader();
   if (!header.ok()) return header.status();
-  const RawHeader& wanted = volume.header;
-  const auto kind = [](const RawHeader& of) {
-    return fmt::format("{} x {} {}{}", of.size.x, of.size.y, ToString(of.type),
-                       of.components == 1 ? "" : fmt::format(" of {} components", of.components));
-  };
-  if (kind(*header) != kind(wanted)) {
-    return Status::InvalidArgument(fmt::format("{} is {}, must be {} like the first one", name, kind(*header), kind(wanted)));
-  }
+  if (Status status = CheckSlice(name, *header, volume.header); !status.ok()) return status;
   if (options.headers_only) return Status::Ok();
   const Status status = slice.ReadSamples(*header, volume.bytes.data() + number * header->sample_bytes());
   if (options.progress != nullptr) options.progress->Add(header->sample_bytes());
@@ -92,7 +94,9 @@ Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<st
     if (!raw) {
       const Result<RawHeader> first = (*slice)->ReadHeader();
       if (!first.ok()) return first.status();
-      Result<RawVolume> taken = TakeMemoryForSlices(folder, *first, std::int64_t(paths.size()), file_bytes, options);
+      const Result<RawHeader> header = HeaderOfSlices(folder, *first, std::int64_t(paths.size()), file_bytes, options);
+      if (!header.ok()) return header.status();
+      Result<RawVolume> taken = TakeMemory(folder, *header, options);
       if (!taken.ok()) return taken;
       raw = *std::move(taken);
     }

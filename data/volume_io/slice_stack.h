@@ -35,10 +35,13 @@ class SliceFile {
   virtual Status ReadSamples(const RawHeader& header, std::byte* out) = 0;
 };
 
-// Takes memory for a volume of `count` slices like `slice`, as TakeMemory does, after checking that files of `file_bytes` can hold it.
-// Spacing: options.spacing if it is given, else that of the slice.
-Result<RawVolume> TakeMemoryForSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
-                                      const ReadOptions& options);
+// Of a volume of `count` slices like `slice`. Spacing: options.spacing if it is given, else that of the slice. InvalidArgument: too many.
+// DataLoss: files of `file_bytes` cannot hold it.
+Result<RawHeader> HeaderOfSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,
+                                 const ReadOptions& options);
+
+// InvalidArgument: a slice differs from the volume in size, type or components. `name`: of the slice.
+Status CheckSlice(const std::string& name, const RawHeader& slice, const RawHeader& volume);
 
 // Reads a slice, or only its header, as number `number` of the volume. `name`: of the slice, for messages. InvalidArgument: it differs from
 // the first one in size, type or components.

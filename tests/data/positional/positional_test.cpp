@@ -9,7 +9,6 @@
 #include <limits>
 #include <vector>
 
-#include "data/open/open_source.h"
 #include "data/positional/positional_source.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/more_files.h"
@@ -28,7 +27,7 @@ using testing::HasSubstr;
 SourceContext MakeContext() { return std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}); }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
-  return OpenSource(path, options, MakeContext());
+  return UncompressedFile().open(path, options, MakeContext());
 }
 
 std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) {
@@ -243,21 +242,21 @@ TEST(Positional, KnowsWhatItReads) {
   for (const SampleFile& file : OneOfEachFormat()) {
     SCOPED_TRACE(file.file);
     WriteFile(directory / file.file, file.bytes);
-    const bool plain = FindSourceFormat(directory / file.file) != nullptr;
-    const auto source = UncompressedFile().open(directory / file.file, {}, MakeContext());
+    const bool plain = UncompressedFile().recognises(directory / file.file);
+    const auto source = Open(directory / file.file);
     EXPECT_EQ(source.ok(), plain) << source.status().message();
     EXPECT_EQ(source.status().code(), plain ? StatusCode::kOk : StatusCode::kInvalidArgument) << source.status().message();
   }
-  EXPECT_NE(FindSourceFormat(directory / "v.nii"), nullptr);
-  EXPECT_EQ(FindSourceFormat(directory / "v.nii.gz"), nullptr);
+  EXPECT_TRUE(UncompressedFile().recognises(directory / "v.nii"));
+  EXPECT_FALSE(UncompressedFile().recognises(directory / "v.nii.gz"));
 }
 
 TEST(Positional, SaysWhyAFileIsNotReadByPosition) {
   const TemporaryDirectory directory;
   const auto refusal = [&](const std::string& name, const FileBytes& bytes) {
     WriteFile(directory / name, bytes);
-    EXPECT_EQ(FindSourceFormat(directory / name), nullptr);
-    const Status status = UncompressedFile().open(directory / name, {}, MakeContext()).status();
+    EXPECT_FALSE(UncompressedFile().recognises(directory / name));
+    const Status status = Open(directory / name).status();
     EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
     return status.message();
   };

@@ -1,0 +1,30 @@
+// LocatedVolume: what a volume file's header says, where the samples lie, and how they are turned: all but the samples.
+#pragma once
+
+#include <string>
+
+#include "common/base/status.h"
+#include "data/sources/volume_source.h"
+#include "data/volume_io/raw_volume.h"
+#include "data/volume_io/world_placement.h"
+
+namespace slabstream {
+
+enum class Packing { kNone, kCompressed };
+
+struct LocatedVolume {
+  RawHeader header;
+  Payload payload;  // of this volume alone
+  AxisTurn turn;
+  int channel = 0;  // which of the header's components
+  SourceInfo info;  // one level; samples as KeptTypeOf says
+};
+
+// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise, are half floats or lie in several pieces; axes
+// that are not at right angles; the luminance of several components.
+Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& options, Packing packing);
+
+// Whether LocateVolume takes this file, with the options that it needs.
+bool HasLocatedSamples(const std::string& path, Packing packing);
+
+}  // namespace slabstream

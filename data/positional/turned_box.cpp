@@ -1,0 +1,45 @@
+#include "data/positional/turned_box.h"
+
+#include "data/sources/copy_samples.h"
+
+namespace slabstream {
+
+Box TurnedBox::Stored() const {
+  Box stored;
+  for (int i = 0; i < 3; ++i) {
+    const int axis = turn.from[std::size_t(i)];
+    const bool flipped = turn.flipped[std::size_t(i)];
+    stored.begin[axis] = flipped ? size[i] - box.end[i] : box.begin[i];
+    stored.end[axis] = flipped ? size[i] - box.begin[i] : box.end[i];
+  }
+  return stored;
+}
+
+Box TurnedBox::Turned(const Box& part) const {
+  Box turned;
+  for (int i = 0; i < 3; ++i) {
+    const int axis = turn.from[std::size_t(i)];
+    const bool flipped = turn.flipped[std::size_t(i)];
+    turned.begin[i] = flipped ? size[i] - part.end[axis] : part.begin[axis];
+    turned.end[i] = flipped ? size[i] - part.begin[axis] : part.end[axis];
+  }
+  return turned;
+}
+
+std::byte* TurnedBox::Place(const Box& turned_part, SampleType type) const {
+  return out + NumberIn(box.size(), turned_part.begin - box.begin) * BytesPerSample(KeptTypeOf(type).type);
+}
+
+void TurnedBox::Fill(const Box& part, SampleType type, const std::byte* from, const std::array<std::int64_t, 3>& steps) const {
+  const Box turned = Turned(part);
+  std::array<std::int64_t, 3> turned_steps{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int64_t step = steps[std::size_t(turn.from[i])];
+    turned_steps[i] = turn.flipped[i] ? -step : step;
+    if (turn.flipped[i]) from += step * (turned.size()[int(i)] - 1) * std::int64_t(BytesPerSample(type));
+  }
+  const Index3 pitch = box.size();
+  CopySamples(type, from, turned_steps, turned.size(), Place(turned, type), pitch.x, std::int64_t{pitch.x} * pitch.y);
+}
+
+}  // namespace slabstream
