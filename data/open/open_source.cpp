@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "data/hdf5/hdf5_format.h"
+
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {};
+  static const std::vector<SourceFormat> kFormats = {Hdf5()};
   return kFormats;
 }
 

@@ -35,6 +35,9 @@ std::vector<FuzzBytes> DicomFileSeeds();
 bool DecodeMeshFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> MeshFileSeeds();
 
+bool DecodeHdf5File(std::span<const std::byte> input);
+std::vector<FuzzBytes> Hdf5FileSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 

@@ -20,6 +20,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"mesh-files", "files of unstructured grids", DecodeMeshFile, MeshFileSeeds},
+      {"hdf5-files", "HDF5 files and their chunks", DecodeHdf5File, Hdf5FileSeeds},
       {"service-files", "service files, folders of keys and records of services", DecodeServiceFile, ServiceFileSeeds},
       {"recordings", "traces with a recording", DecodeRecording, RecordingSeeds},
       {"sweeps", "files of experiment sweep", DecodeSweep, SweepSeeds},
