@@ -80,7 +80,7 @@ ZarrSpec AnySpec(Random& random) {
 TEST(ZarrArrayTest, EveryElementIsWhereTheMetadataSay) {
   Random random(1);
   SCOPED_TRACE(random.trace());
-  constexpr int kArrays = 400;
+  constexpr int kArrays = 200;
   for (int i = 0; i < kArrays; ++i) {
     const TemporaryDirectory folder;
     const ZarrSpec spec = AnySpec(random);
