@@ -38,6 +38,9 @@ std::vector<FuzzBytes> MeshFileSeeds();
 bool DecodeHdf5File(std::span<const std::byte> input);
 std::vector<FuzzBytes> Hdf5FileSeeds();
 
+bool DecodeN5Container(std::span<const std::byte> input);
+std::vector<FuzzBytes> N5ContainerSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 
