@@ -6,12 +6,13 @@
 #include "data/hdf5/hdf5_format.h"
 #include "data/n5/n5.h"
 #include "data/positional/positional_source.h"
+#include "data/precomputed/precomputed.h"
 #include "data/zarr/zarr.h"
 
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {Hdf5(), N5(), Zarr(), UncompressedFile()};
+  static const std::vector<SourceFormat> kFormats = {Hdf5(), N5(), Precomputed(), Zarr(), UncompressedFile()};
   return kFormats;
 }
 

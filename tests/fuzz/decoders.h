@@ -41,6 +41,9 @@ std::vector<FuzzBytes> Hdf5FileSeeds();
 bool DecodeN5Container(std::span<const std::byte> input);
 std::vector<FuzzBytes> N5ContainerSeeds();
 
+bool DecodePrecomputed(std::span<const std::byte> input);
+std::vector<FuzzBytes> PrecomputedSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 
