@@ -5,9 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/base/status.h"
+#include "data/precomputed/sharding.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/source_format.h"
 #include "data/stores/store.h"
@@ -22,7 +24,8 @@ struct Scale {
   std::array<std::int64_t, 3> offset{};          // of the first voxel, which names of chunks count from
   std::array<double, 3> resolution{};            // nm
   Encoding encoding = Encoding::kRaw;
-  std::array<std::uint64_t, 3> block{};  // kSegmentation
+  std::array<std::uint64_t, 3> block{};   // kSegmentation
+  std::optional<Sharding> sharding = {};  // else each chunk is a file
 };
 
 std::shared_ptr<ChunkedArray> MakeArray(const std::shared_ptr<Store>& store, const Scale& scale, SampleType type, std::uint64_t channels,

@@ -81,7 +81,11 @@ Result<Scale> ParseScale(const Field& field, SampleType type, std::uint64_t chan
   if (field["voxel_offset"].given()) {
     if (Status status = TakeTriple(field["voxel_offset"], scale.offset, TakeOffset); !status.ok()) return status;
   }
-  if (field["sharding"].given()) return field["sharding"].Wrong("left out: sharded volumes are not supported");
+  if (field["sharding"].given()) {
+    const Result<Sharding> sharding = ParseSharding(field["sharding"]);
+    if (!sharding.ok()) return sharding.status();
+    scale.sharding = *sharding;
+  }
   if (Status status = TakeEncoding(field, type, channels, scale); !status.ok()) return status;
   std::uint64_t bytes = BytesPerSample(type) * channels;
   for (const std::uint64_t along : scale.chunk) {

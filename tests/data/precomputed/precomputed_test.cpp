@@ -13,6 +13,7 @@
 #include "data/open/open_source.h"
 #include "data/precomputed/jpeg_codec.h"
 #include "data/precomputed/segmentation_codec.h"
+#include "data/precomputed/sharding.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
@@ -262,6 +263,107 @@ TEST_F(PrecomputedTest, SegmentationsAreLabels) {
   EXPECT_TRUE(std::ranges::equal(*samples, labels));
 }
 
+std::string ShardingText(const std::string& hash, int minishard_bits, int shard_bits, bool gzip = false) {
+  return fmt::format(R"({{"@type": "neuroglancer_uint64_sharded_v1", "hash": "{}", "preshift_bits": 0, "minishard_bits": {},
+    "shard_bits": {}, "minishard_index_encoding": "{}", "data_encoding": "{}"}})",
+                     hash, minishard_bits, shard_bits, gzip ? "gzip" : "raw", gzip ? "gzip" : "raw");
+}
+
+// The places are those of a shard that TensorStore wrote.
+TEST(Sharding, PlacesChunksAsOthersDo) {
+  EXPECT_EQ(precomputed::ChunkNumber({1, 2, 3}, {2, 4, 8}), 29U);
+  EXPECT_EQ(precomputed::ChunkNumber({4, 2, 4}, {5, 3, 5}), 208U);
+  const precomputed::Sharding murmur{.minishard_bits = 32, .shard_bits = 32, .murmur = true};
+  EXPECT_EQ(precomputed::PlaceOf(murmur, 0).file, "4772b084.shard");
+  EXPECT_EQ(precomputed::PlaceOf(murmur, 0).minishard, 3760762433U);
+  EXPECT_EQ(precomputed::PlaceOf(murmur, 123456789012345).file, "9b457016.shard");
+  const precomputed::Sharding identity{.preshift_bits = 2, .minishard_bits = 3, .shard_bits = 5};
+  EXPECT_EQ(precomputed::PlaceOf(identity, 0x1234).file, "11.shard");
+  EXPECT_EQ(precomputed::PlaceOf(identity, 0x1234).minishard, 5U);
+}
+
+std::string LongWord(std::uint64_t word) { return std::string(reinterpret_cast<const char*>(&word), sizeof(word)); }
+
+// Writes a shard for each of `chunks` by their numbers.
+void WriteShards(const std::string& folder, const precomputed::Sharding& sharding, const std::map<std::uint64_t, std::string>& chunks) {
+  std::map<std::string, std::map<std::uint64_t, std::vector<std::uint64_t>>> shards;  // by file and minishard, in order
+  for (const auto& [number, bytes] : chunks) {
+    const precomputed::ShardPlace place = precomputed::PlaceOf(sharding, number);
+    shards[place.file][place.minishard].push_back(number);
+  }
+  for (const auto& [file, minishards] : shards) {
+    std::string index(sharding.index_bytes(), '\0'), data;
+    for (const auto& [minishard, numbers] : minishards) {
+      std::string deltas, gaps, lengths;
+      std::uint64_t last = 0, end = 0;
+      for (const std::uint64_t number : numbers) {
+        const std::string bytes = sharding.gzip_data ? Gzip(chunks.at(number)) : chunks.at(number);
+        data += "gap";
+        deltas += LongWord(number - last);
+        gaps += LongWord(data.size() - end);
+        lengths += LongWord(bytes.size());
+        data += bytes;
+        last = number;
+        end = data.size();
+      }
+      const std::string packed = sharding.gzip_index ? Gzip(deltas + gaps + lengths) : deltas + gaps + lengths;
+      index.replace(16 * minishard, 16, LongWord(data.size()) + LongWord(data.size() + packed.size()));
+      data += packed;
+    }
+    WriteText(folder + "/" + file, index + data);
+  }
+}
+
+TEST_F(PrecomputedTest, ChunksInShards) {
+  for (const bool gzip : {false, true}) {
+    for (const std::string hash : {"identity", "murmurhash3_x86_128"}) {
+      std::filesystem::remove_all(root_);
+      WriteText(root_ + "/info", Info("image", "uint8", 1,
+                                      R"({"key": "s", "size": [9, 7, 8], "chunk_sizes": [[4, 4, 4]],
+        "resolution": [1, 1, 1], "encoding": "raw", "sharding": )" +
+                                          ShardingText(hash, 2, 1, gzip) + "}"));
+      std::map<std::uint64_t, std::string> chunks;
+      for (std::uint64_t z = 0; z < 2; ++z) {
+        for (std::uint64_t y = 0; y < 2; ++y) {
+          for (std::uint64_t x = 0; x < 3; ++x) {
+            if (x == 1 && y == 1 && z == 0) continue;  // is not there
+            const std::size_t count = (x == 2 ? 1U : 4U) * (y == 1 ? 3U : 4U) * 4U;
+            chunks[precomputed::ChunkNumber({x, y, z}, {3, 2, 2})] = std::string(count, char(100 + 20 * z + 5 * y + x));
+          }
+        }
+      }
+      const precomputed::Sharding sharding{
+          .minishard_bits = 2, .shard_bits = 1, .murmur = hash != "identity", .gzip_index = gzip, .gzip_data = gzip};
+      WriteShards(root_ + "/s", sharding, chunks);
+      const auto source = Open();
+      ASSERT_TRUE(source.ok()) << source.status().message();
+      const auto samples = Samples<std::uint8_t>(**source);
+      ASSERT_TRUE(samples.ok()) << samples.status().message();
+      for (int z = 0, i = 0; z < 8; ++z) {
+        for (int y = 0; y < 7; ++y) {
+          for (int x = 0; x < 9; ++x, ++i) {
+            const bool there = !(x / 4 == 1 && y / 4 == 1 && z / 4 == 0);
+            ASSERT_EQ((*samples)[std::size_t(i)], there ? 100 + 20 * (z / 4) + 5 * (y / 4) + x / 4 : 0) << x << " " << y << " " << z;
+          }
+        }
+      }
+    }
+  }
+  // The file that holds the first chunk, damaged in turn.
+  const std::string path = root_ + "/s/" + precomputed::PlaceOf({.minishard_bits = 2, .shard_bits = 1, .murmur = true}, 0).file;
+  const std::string good = ReadFile(path);
+  std::string far = good;
+  for (std::size_t minishard = 0; minishard < 4; ++minishard) far.replace(16 * minishard, 16, LongWord(1) + LongWord(~std::uint64_t{0}));
+  for (const auto& [bytes, why] : {std::pair<std::string, const char*>{good.substr(0, 7), "the shard ends within its index"},
+                                   {good.substr(0, 70), "the shard ends within an index"},
+                                   {far, "the index of the shard is damaged: a minishard lies from 1 to 18446744073709551615"}}) {
+    WriteText(path, bytes);
+    const Status status = Samples<std::uint8_t>(**Open()).status();
+    EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
+    EXPECT_THAT(status.message(), testing::AllOf(HasSubstr(".shard: chunk "), HasSubstr(why)));
+  }
+}
+
 TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   const std::string good = Info(
       "image", "uint8", 1, R"({"key": "0", "size": [8, 4, 8], "chunk_sizes": [[8, 4, 4]], "resolution": [1, 1, 1], "encoding": "raw"})");
@@ -273,8 +375,14 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   const std::pair<std::string, const char*> cases[] = {
       {with("\"raw\"", "\"compresso\""),
        "scales[0].encoding is \"compresso\", must be a supported encoding: raw, jpeg or compressed_segmentation"},
-      {with("\"raw\"", "\"raw\", \"sharding\": {\"@type\": \"neuroglancer_uint64_sharded_v1\"}"),
-       "must be left out: sharded volumes are not supported"},
+      {with("\"raw\"", "\"raw\", \"sharding\": {\"@type\": \"v2\"}"),
+       "scales[0].sharding.@type is \"v2\", must be neuroglancer_uint64_sharded_v1"},
+      {with("\"raw\"", "\"raw\", \"sharding\": " + ShardingText("md5", 1, 1)),
+       "sharding.hash is \"md5\", must be identity or murmurhash3_x86_128"},
+      {with("\"raw\"", "\"raw\", \"sharding\": " + ShardingText("identity", 33, 1)),
+       "minishard_bits is 33, must be a whole number in [0, 32]"},
+      {with("\"raw\"", "\"raw\", \"sharding\": " + ShardingText("identity", 32, 33)),
+       "shard_bits is 33, must be a whole number in [0, 32]"},
       {with("\"raw\"", "\"compressed_segmentation\""), "must be raw or jpeg, since labels are uint32 or uint64"},
       {with("uint8", "float16"), "data_type is \"float16\", must be one of int8"},
       {with("[8, 4, 8]", "[8, 0, 8]"), "scales[0].size[1] is 0, must be a whole number"},
