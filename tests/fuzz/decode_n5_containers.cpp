@@ -25,9 +25,9 @@ std::vector<FuzzBytes> N5ContainerSeeds() {
   const FileBytes samples(2 * 3 * 4 * 2, 'x');
   for (const std::string compression : {"raw", "gzip"}) {
     for (const int mode : {0, 1}) {
-      const std::string attributes = fmt::format(
-          R"({{"dimensions": [3, 2, 4], "blockSize": [3, 2, 5], "dataType": "uint16", "compression": {{"type": "{}"}}, "resolution": [4, 4, 40], "units": ["nm"]}})",
-          compression);
+      const std::string attributes = fmt::format(R"({{"dimensions": [3, 2, 4], "blockSize": [3, 2, 5], "dataType": "uint16",)"
+                                                 R"( "compression": {{"type": "{}"}}, "resolution": [4, 4, 40], "units": ["nm"]}})",
+                                                 compression);
       FuzzSeed seed;
       seed.Put(attributes).Put("\n");
       for (const int byte : {0, mode, 0, 3, 0, 0, 0, 3, 0, 0, 0, 2, 0, 0, 0, 4}) seed.Put(std::uint8_t(byte));

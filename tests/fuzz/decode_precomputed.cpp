@@ -31,9 +31,10 @@ bool DecodePrecomputed(std::span<const std::byte> bytes) {
 std::vector<FuzzBytes> PrecomputedSeeds() {
   std::vector<FuzzBytes> seeds;
   const auto add = [&](const std::string& type, const std::string& encoding, const FileBytes& chunk) {
-    const std::string info = fmt::format(
-        R"({{"type": "image", "data_type": "{}", "num_channels": 1, "scales": [{{"key": "s", "size": [4, 4, 4], "chunk_sizes": [[4, 4, 4]], "resolution": [4, 4, 40], "voxel_offset": [0, 0, 0], {}}}]}})",
-        type, encoding);
+    const std::string info = fmt::format(R"({{"type": "image", "data_type": "{}", "num_channels": 1,)"
+                                         R"( "scales": [{{"key": "s", "size": [4, 4, 4], "chunk_sizes": [[4, 4, 4]],)"
+                                         R"( "resolution": [4, 4, 40], "voxel_offset": [0, 0, 0], {}}}]}})",
+                                         type, encoding);
     seeds.push_back(FuzzSeed().Put(info).Put("\n").Put(chunk).bytes());
   };
   add("uint16", R"("encoding": "raw")", FileBytes(128, 'x'));

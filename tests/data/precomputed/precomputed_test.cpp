@@ -158,7 +158,8 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   const int size[3] = {10, 7, 5}, chunk[3] = {4, 4, 3}, offset[3] = {100, -3, 0};
   WriteText(root_ + "/info", Info("image", "uint16", 2, R"({"key": "8_8_40", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
     "resolution": [8, 8, 40], "voxel_offset": [100, -3, 0], "encoding": "raw"},
-    {"key": "16_16_40", "size": [5, 4, 5], "chunk_sizes": [[64, 64, 64]], "resolution": [16, 16, 40], "voxel_offset": [50, -2, 0], "encoding": "raw"})"));
+    {"key": "16_16_40", "size": [5, 4, 5], "chunk_sizes": [[64, 64, 64]], "resolution": [16, 16, 40],
+    "voxel_offset": [50, -2, 0], "encoding": "raw"})"));
   int number = 0;
   for (int z = 0; z < size[2]; z += chunk[2]) {
     for (int y = 0; y < size[1]; y += chunk[1]) {
