@@ -298,7 +298,7 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
   if (data.load || data.layers.any()) return std::optional<OpenedSource>();
   const Result<SourceText> parsed = ParseSourceText(data.path);
   if (!parsed.ok()) return parsed.status();
-  if (FindSourceFormat(parsed->path) == nullptr) return std::optional<OpenedSource>();
+  if (FindSourceFormat(parsed->path, parsed->options) == nullptr) return std::optional<OpenedSource>();
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     Result<std::shared_ptr<VolumeSource>> source = OpenSource(parsed->path, parsed->options, ProcessReadContext());

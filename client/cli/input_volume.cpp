@@ -26,7 +26,7 @@ Status CheckInputHeaders(const std::string& source) {
 
 bool CanBeReadInParts(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
-  return parsed.ok() && FindSourceFormat(parsed->path) != nullptr;
+  return parsed.ok() && FindSourceFormat(parsed->path, parsed->options) != nullptr;
 }
 
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }

@@ -20,7 +20,7 @@ namespace slabstream {
 namespace {
 
 bool IsReadWhole(const std::string& path, const ReadOptions& options) {
-  return FindFormat(path, options) != nullptr || FindSourceFormat(path) == nullptr;
+  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
 }
 
 // A quarter of the process' memory: at most 128 MiB for chunks under way, the rest for those that may be needed again.

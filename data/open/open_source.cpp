@@ -3,26 +3,29 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "data/hdf5/hdf5_format.h"
+#include "data/n5/n5.h"
 #include "data/positional/positional_source.h"
+#include "data/precomputed/precomputed.h"
 #include "data/tiles/tiled_tiff.h"
 #include "data/zarr/zarr.h"
 
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {Zarr(), TiledTiff(), UncompressedFile()};
+  static const std::vector<SourceFormat> kFormats = {Hdf5(), N5(), Precomputed(), Zarr(), TiledTiff(), UncompressedFile()};
   return kFormats;
 }
 
-const SourceFormat* FindSourceFormat(const std::string& path) {
-  const auto found = std::ranges::find_if(SourceFormats(), [&](const SourceFormat& format) { return format.recognises(path); });
+const SourceFormat* FindSourceFormat(const std::string& path, const ReadOptions& options) {
+  const auto found = std::ranges::find_if(SourceFormats(), [&](const SourceFormat& format) { return format.recognises(path, options); });
   return found == SourceFormats().end() ? nullptr : &*found;
 }
 
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
-  const SourceFormat* const format = FindSourceFormat(path);
+  const SourceFormat* const format = FindSourceFormat(path, options);
   if (format == nullptr) return Status::InvalidArgument(path + ": is no volume that can be read in parts");
   for (const ReadOption& option : ReadOptionList()) {
     if (option.given(options) && std::ranges::find(format->options, option.name) == format->options.end()) {

@@ -73,15 +73,15 @@ Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& o
   return LocatedVolume{header, *std::move(payload), placed->turn, options.channel.value_or(0), std::move(info)};
 }
 
-bool HasLocatedSamples(const std::string& path, Packing packing) {
-  if (!CheckVolume(path).ok()) {
+bool HasLocatedSamples(const std::string& path, const ReadOptions& options, Packing packing) {
+  if (!CheckVolume(path, options).ok()) {
     // Options that a format requires are not known yet.
-    const VolumeFormat* const format = FindFormat(path, {});
+    const VolumeFormat* const format = FindFormat(path, options);
     return format != nullptr && format->locate != nullptr && !format->required.empty() && packing == Packing::kNone;
   }
-  ReadOptions any_time;
-  any_time.time = TimeRange{};
-  const Result<LocatedSamples> located = Locate(*FindFormat(path, {}), path, any_time, packing);
+  ReadOptions any_time = options;
+  if (!any_time.time) any_time.time = TimeRange{};
+  const Result<LocatedSamples> located = Locate(*FindFormat(path, options), path, any_time, packing);
   if (!located.ok()) return false;
   // Axes that a file does not state are at right angles.
   return located->header.world == World::kVoxels || PlaceUpright(located->header, path).ok();

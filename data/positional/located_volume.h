@@ -25,6 +25,6 @@ struct LocatedVolume {
 Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& options, Packing packing);
 
 // Whether LocateVolume takes this file, with the options that it needs.
-bool HasLocatedSamples(const std::string& path, Packing packing);
+bool HasLocatedSamples(const std::string& path, const ReadOptions& options, Packing packing);
 
 }  // namespace slabstream

@@ -113,7 +113,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
       std::make_shared<PositionalSource>(std::move(volume->info), volume->turn, *std::move(samples), context));
 }
 
-bool Recognises(const std::string& path) { return HasLocatedSamples(path, Packing::kNone); }
+bool Recognises(const std::string& path, const ReadOptions& options) { return HasLocatedSamples(path, options, Packing::kNone); }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   Result<std::shared_ptr<VolumeSource>> source = OpenFile(path, options, context);

@@ -10,7 +10,7 @@
 
 namespace slabstream {
 
-bool SliceStream::Recognises(const std::string& path) { return HasLocatedSamples(path, Packing::kCompressed); }
+bool SliceStream::Recognises(const std::string& path) { return HasLocatedSamples(path, {}, Packing::kCompressed); }
 
 Result<SliceStream> SliceStream::Open(const std::string& path, const ReadOptions& options) {
   Result<LocatedVolume> volume = LocateVolume(path, options, Packing::kCompressed);

@@ -19,7 +19,7 @@ using SourceContext = std::shared_ptr<ReadContext>;
 struct SourceFormat {
   std::string_view name;  // "OME-Zarr"
   // Whether this path is of the format: by its ending, by what a folder holds, or by a file's first bytes. Looks at little.
-  bool (*recognises)(const std::string& path) = nullptr;
+  bool (*recognises)(const std::string& path, const ReadOptions& options) = nullptr;
   std::vector<std::string_view> options = {};  // names of the options (ReadOptionList) that it takes
   // NotFound, Unavailable: it cannot be read. InvalidArgument: it is no such volume, or needs something that is not supported, which the
   // message names; an option that does not suit it. DataLoss: damaged metadata. ResourceExhausted.

@@ -15,7 +15,7 @@
 namespace slabstream {
 namespace {
 
-bool Recognises(const std::string& path) {
+bool Recognises(const std::string& path, const ReadOptions&) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;
   const VolumeFormat* const format = FindFormat(path, {});

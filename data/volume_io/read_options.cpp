@@ -92,6 +92,14 @@ Status SetLattice(ReadOptions& options, std::string_view option, std::string_vie
   return Wrong(option, text, fmt::format("a whole number in [1, {}]", kMaxLatticeSide));
 }
 
+Status SetDataset(ReadOptions& options, std::string_view option, std::string_view text) {
+  if (text.empty() || text.size() > kMaxDatasetBytes) {
+    return Wrong(option, text.substr(0, 64), fmt::format("the path of a dataset in an HDF5 file, of 1 to {} bytes", kMaxDatasetBytes));
+  }
+  options.dataset = text;
+  return Status::Ok();
+}
+
 // Where the options of `source` begin, behind the question mark; npos: it has none.
 std::size_t OptionsBegin(const std::string& source) {
   const std::size_t mark = source.rfind('?');
@@ -148,6 +156,7 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"array", "NAME", "Which array of an unstructured grid; `slabstream info` lists them", SetArray, IsGiven<&ReadOptions::array>},
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},
+      {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
   };
   return options;
 }

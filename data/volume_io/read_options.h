@@ -8,6 +8,7 @@
 // Pure, but for ParseSourceText, which looks for the file.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -23,6 +24,7 @@ namespace slabstream {
 
 inline constexpr std::int64_t kMaxVolumes = 1 << 20;  // in one file
 inline constexpr int kLuminance = -1;
+inline constexpr std::size_t kMaxDatasetBytes = 4096;
 
 // Volumes of a file that holds several, both included.
 struct TimeRange {
@@ -41,6 +43,8 @@ struct ReadOptions {
   // Of unstructured grids.
   std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
+  // Of HDF5 files.
+  std::string dataset;  // the path of one in the file, at most kMaxDatasetBytes; "": the image that its layout says, or the only volume
   // Of raw samples.
   std::optional<Index3> dims;  // voxels along x, y and z, each in [1, kMaxVolumeSide]
   std::optional<SampleType> type;

@@ -33,8 +33,9 @@ std::optional<T> WholeOf(const Json& value) {
     const auto number = value.get<std::uint64_t>();
     return number <= std::uint64_t(std::numeric_limits<T>::max()) ? std::optional(T(number)) : std::nullopt;
   }
-  if (value.is_number_integer()) {  // a negative one
+  if (value.is_number_integer()) {
     const auto number = value.get<std::int64_t>();
+    if (number >= 0) return WholeOf<T>(Json(std::uint64_t(number)));
     return std::is_signed_v<T> && number >= std::int64_t(std::numeric_limits<T>::min()) ? std::optional(T(number)) : std::nullopt;
   }
   // "0.0", as some write for every type

@@ -66,7 +66,7 @@ Result<double> Field::Number() const {
 }
 
 Result<std::uint64_t> Field::Whole(std::uint64_t least, std::uint64_t most) const {
-  const bool whole = given() && value_->is_number_unsigned();
+  const bool whole = given() && value_->is_number_integer() && (value_->is_number_unsigned() || value_->get<std::int64_t>() >= 0);
   const std::uint64_t number = whole ? value_->get<std::uint64_t>() : 0;
   if (!whole || number < least || number > most) return Wrong(fmt::format("a whole number in [{}, {}]", least, most));
   return number;

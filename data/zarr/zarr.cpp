@@ -14,7 +14,7 @@ namespace {
 
 bool IsArchive(const std::string& path) { return path.ends_with(".zip") || path.ends_with(".ozx"); }
 
-bool Recognises(const std::string& path) {
+bool Recognises(const std::string& path, const ReadOptions&) {
   std::error_code error;
   const auto is_there = [&](const char* name) { return std::filesystem::is_regular_file(std::filesystem::path(path) / name, error); };
   if (std::filesystem::is_directory(path, error)) return is_there(kNode3) || is_there(kArray2) || is_there(kGroup2);

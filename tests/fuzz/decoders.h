@@ -35,6 +35,15 @@ std::vector<FuzzBytes> DicomFileSeeds();
 bool DecodeMeshFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> MeshFileSeeds();
 
+bool DecodeHdf5File(std::span<const std::byte> input);
+std::vector<FuzzBytes> Hdf5FileSeeds();
+
+bool DecodeN5Container(std::span<const std::byte> input);
+std::vector<FuzzBytes> N5ContainerSeeds();
+
+bool DecodePrecomputed(std::span<const std::byte> input);
+std::vector<FuzzBytes> PrecomputedSeeds();
+
 bool DecodeServiceFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> ServiceFileSeeds();
 

@@ -22,6 +22,7 @@ TEST(SourceText, IsAPathWithOptionsBehindIt) {
   EXPECT_FALSE(source->options.time);
   EXPECT_EQ(ParseSourceText("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
   EXPECT_EQ(ParseSourceText("head.nii.gz?channel=luminance")->options.channel, kLuminance);
+  EXPECT_EQ(ParseSourceText("scan.h5?dataset=/exchange/data,time=2")->options.dataset, "/exchange/data");
   EXPECT_EQ(ParseSourceText("head.nii.gz")->path, "head.nii.gz");
   EXPECT_EQ(ParseSourceText("what?")->path, "what?") << "no option stands behind the question mark";
 }
@@ -53,6 +54,7 @@ TEST(SourceText, SaysWhatIsWrong) {
       {"v?type=int12", "type 'int12' must be one of int8, uint8, int16"},
       {"v?endian=middle", "endian 'middle' must be little or big"},
       {"v?offset=-1", "offset '-1' must be a whole number of bytes"},
+      {"v?dataset=", "dataset '' must be the path of a dataset"},
       {"v?channel=red", "channel 'red' must be luminance or a whole number"},
   };
   for (const auto& [text, why] : cases) {

@@ -1,0 +1,91 @@
+// HDF5 files of BigDataViewer: tTTTTT/sSS/L/cells for time T, view setup S and level L, and sSS/resolutions, how many voxels of the view
+// each level takes together along x, y and z. A setup is a channel here; in files it may also be an angle or a tile. The spacing is in an
+// XML file beside it. Source: https://imagej.net/plugins/bdv/#about-the-bigdataviewer-data-format
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/parse_number.h"
+#include "data/hdf5/hdf5_array.h"
+#include "data/hdf5/hdf5_layouts.h"
+#include "data/sources/chosen_channel.h"
+#include "data/sources/view_setups.h"
+#include "data/volume_io/raw_volume.h"
+
+namespace slabstream {
+namespace {
+
+bool IsBigDataViewer(Hdf5File& file) { return file.Has("/s00/resolutions") && file.Has("/t00000"); }
+
+// Names of a letter and digits: "s00".
+std::vector<std::string> Numbered(const std::vector<std::string>& names, char letter) {
+  std::vector<std::string> found;
+  for (const std::string& name : names) {
+    if (name.size() > 1 && name[0] == letter && ParseNumber<int>(name.substr(1)).value_or(-1) >= 0) found.push_back(name);
+  }
+  return found;
+}
+
+// BigDataViewer keeps unsigned samples of 16 bits in signed ones, which is what Java has.
+std::optional<SampleType> Meant(SampleType type) { return type == SampleType::kInt16 ? std::optional(SampleType::kUint16) : std::nullopt; }
+
+Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
+  Pyramid pyramid{.info = {.format = "BigDataViewer HDF5", .files = {file->path()}}};
+  const Result<std::vector<std::string>> names = file->Names("/");
+  if (!names.ok()) return names.status();
+  const std::vector<std::string> times = Numbered(*names, 't'), setups = Numbered(*names, 's');
+  pyramid.info.times = int(times.size());
+  const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times, options);
+  if (!time.ok()) return time.status();
+  const Result<ViewSetupFile> xml = ReadViewSetupsBeside(file->path());
+  if (!xml.ok()) return xml.status();
+  if (!xml->path.empty()) pyramid.info.files.push_back(xml->path);
+  const auto setup_of = [&](const std::string& name) {
+    const auto found = std::ranges::find(xml->setups, ParseNumber<int>(name.substr(1)).value_or(-1), &ViewSetup::id);
+    return found == xml->setups.end() ? ViewSetup{} : *found;
+  };
+  for (const std::string& name : setups) pyramid.info.channels.push_back(setup_of(name).name);
+  const Result<int> channel = ChosenChannel(file->path(), pyramid.info.channels, options);
+  if (!channel.ok()) return channel.status();
+  const std::string& name = setups[std::size_t(*channel)];
+  const ViewSetup setup = setup_of(name);
+  const Vec3 spacing = setup.spacing.value_or(Vec3{1, 1, 1});
+  if (setup.spacing) pyramid.orientation.unit = setup.unit;
+
+  const std::string resolutions = "/" + name + "/resolutions";
+  const Result<std::vector<double>> factors = file->SmallDataset(resolutions);
+  if (!factors.ok()) return factors.status();
+  if (factors->empty() || factors->size() % 3 != 0) {
+    return Status::InvalidArgument(file->Named(resolutions) +
+                                   fmt::format(" has {} numbers, must have three for each level", factors->size()));
+  }
+  for (std::size_t level = 0; level < factors->size() / 3; ++level) {
+    const std::string path = fmt::format("/{}/{}/{}/cells", times[std::size_t(*time)], name, level);
+    Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(path);
+    if (!dataset.ok()) return dataset.status();
+    if ((*dataset)->size().size() != 3) {
+      return Status::InvalidArgument(file->Named(path) + fmt::format(" has {} axes, must have 3", (*dataset)->size().size()));
+    }
+    const std::optional<SampleType> meant = Meant((*dataset)->type());
+    const Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, meant);
+    if (!array.ok()) return array.status();
+    PyramidLevel each{.array = *array, .at = {0, 0, 0}};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double factor = (*factors)[3 * level + std::size_t(axis)];
+      if (!(factor > 0) || !std::isfinite(factor)) {
+        return Status::InvalidArgument(file->Named(resolutions) + fmt::format(" holds {}, must hold numbers above 0", factor));
+      }
+      each.spacing[axis] = factor * spacing[axis];
+      each.origin[axis] = 0.5 * (factor - 1) * spacing[axis];  // the mean of the voxels that it stands for
+    }
+    pyramid.levels.push_back(std::move(each));
+  }
+  return pyramid;
+}
+
+}  // namespace
+
+Hdf5Layout BigDataViewerHdf5() { return {IsBigDataViewer, Read}; }
+
+}  // namespace slabstream

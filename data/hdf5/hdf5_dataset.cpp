@@ -1,0 +1,182 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "common/base/printable.h"
+#include "data/hdf5/hdf5_driver.h"
+#include "data/hdf5/hdf5_file.h"
+#include "data/hdf5/hdf5_library.h"
+
+namespace slabstream {
+namespace {
+
+std::string_view NameOf(H5T_class_t kind) {
+  switch (kind) {
+    case H5T_INTEGER: return "integers";
+    case H5T_FLOAT: return "floats";
+    case H5T_TIME: return "times";
+    case H5T_STRING: return "texts";
+    case H5T_BITFIELD: return "bit fields";
+    case H5T_OPAQUE: return "opaque bytes";
+    case H5T_COMPOUND: return "compounds";
+    case H5T_REFERENCE: return "references";
+    case H5T_ENUM: return "enumerations";
+    case H5T_VLEN: return "sequences of any length";
+    case H5T_ARRAY: return "arrays";
+    default: return "elements of an unknown type";
+  }
+}
+
+std::optional<SampleType> IntegerType(std::size_t bytes, bool is_signed) {
+  switch (bytes) {
+    case 1: return is_signed ? SampleType::kInt8 : SampleType::kUint8;
+    case 2: return is_signed ? SampleType::kInt16 : SampleType::kUint16;
+    case 4: return is_signed ? SampleType::kInt32 : SampleType::kUint32;
+    case 8: return is_signed ? SampleType::kInt64 : SampleType::kUint64;
+    default: return std::nullopt;
+  }
+}
+
+hid_t NativeType(SampleType type) {
+  switch (type) {
+    case SampleType::kInt8: return H5T_NATIVE_INT8;
+    case SampleType::kUint8: return H5T_NATIVE_UINT8;
+    case SampleType::kInt16: return H5T_NATIVE_INT16;
+    case SampleType::kUint16: return H5T_NATIVE_UINT16;
+    case SampleType::kInt32: return H5T_NATIVE_INT32;
+    case SampleType::kUint32: return H5T_NATIVE_UINT32;
+    case SampleType::kInt64: return H5T_NATIVE_INT64;
+    case SampleType::kUint64: return H5T_NATIVE_UINT64;
+    case SampleType::kFloat32: return H5T_NATIVE_FLOAT;
+    case SampleType::kFloat64: break;
+  }
+  return H5T_NATIVE_DOUBLE;
+}
+
+}  // namespace
+
+Hdf5Dataset::~Hdf5Dataset() {
+  const Hdf5Lock lock;
+  (void)H5Dclose(id_);
+}
+
+Status Hdf5Dataset::DescribeType() {
+  const Hdf5Id type(H5Dget_type(id_), H5Tclose);
+  if (!type.ok()) return Refused("has no type: " + Hdf5Complaint());
+  const H5T_class_t kind = H5Tget_class(type.id());
+  const std::size_t bytes = H5Tget_size(type.id());
+  const auto is = [&](hid_t other) { return H5Tequal(type.id(), other) > 0; };
+  std::optional<SampleType> found;
+  if (kind == H5T_INTEGER && H5Tget_precision(type.id()) == 8 * bytes) {
+    found = IntegerType(bytes, H5Tget_sign(type.id()) == H5T_SGN_2);
+    big_endian_ = H5Tget_order(type.id()) == H5T_ORDER_BE;
+  } else if (kind == H5T_FLOAT) {
+    big_endian_ = is(H5T_IEEE_F32BE) || is(H5T_IEEE_F64BE);
+    if (is(H5T_IEEE_F32LE) || is(H5T_IEEE_F32BE)) found = SampleType::kFloat32;
+    if (is(H5T_IEEE_F64LE) || is(H5T_IEEE_F64BE)) found = SampleType::kFloat64;
+  }
+  if (!found) {
+    const std::size_t used = kind == H5T_INTEGER ? H5Tget_precision(type.id()) : 8 * bytes;
+    return Refused(fmt::format("holds {} of {} bits{}; supported: integers of 8, 16, 32 and 64 bits and floats of 32 and 64", NameOf(kind),
+                               8 * bytes, used == 8 * bytes ? "" : fmt::format(", of which {} are used", used)));
+  }
+  type_ = *found;
+  return Status::Ok();
+}
+
+Status Hdf5Dataset::DescribeLayout(hid_t creation) {
+  switch (H5Pget_layout(creation)) {
+    case H5D_COMPACT: layout_ = Layout::kCompact; return Status::Ok();
+    case H5D_CONTIGUOUS: {
+      layout_ = Layout::kContiguous;
+      if (H5Pget_external_count(creation) != 0) return Refused("keeps its samples in other files (external storage), which are not read");
+      if (const haddr_t begin = H5Dget_offset(id_); begin != HADDR_UNDEF) begin_ = begin;
+      return Status::Ok();
+    }
+    case H5D_CHUNKED: break;
+    case H5D_VIRTUAL: return Refused("is a virtual dataset, made of parts of others, which is not supported");
+    default: return Refused("has a layout that is not known");
+  }
+  layout_ = Layout::kChunked;
+  std::array<hsize_t, H5S_MAX_RANK> chunk{};
+  if (H5Pget_chunk(creation, int(chunk.size()), chunk.data()) != int(size_.size()))
+    return Refused("has chunks with other axes than it has");
+  chunk_.assign(chunk.begin(), chunk.begin() + std::ptrdiff_t(size_.size()));
+  std::uint64_t bytes = BytesPerSample(type_);
+  for (const std::uint64_t along : chunk_) {
+    if (along < 1 || along > kMostChunkBytes / bytes) {
+      return Status::ResourceExhausted(file_->Named(path_) + fmt::format(" has chunks of more than {} bytes", kMostChunkBytes));
+    }
+    bytes *= along;
+  }
+  unsigned options = 0;
+  filters_cut_chunks_ = H5Pget_chunk_opts(creation, &options) < 0 || (options & H5D_CHUNK_DONT_FILTER_PARTIAL_CHUNKS) == 0;
+
+  const int filters = H5Pget_nfilters(creation);
+  for (int i = 0; i < filters; ++i) {
+    unsigned flags = 0, configuration = 0;
+    std::array<unsigned, 32> values{};
+    std::size_t count = values.size();
+    std::array<char, 64> name{};
+    const H5Z_filter_t id = H5Pget_filter2(creation, unsigned(i), &flags, &count, values.data(), name.size(), name.data(), &configuration);
+    if (id < 0) return Refused("has a filter that cannot be read: " + Hdf5Complaint());
+    name.back() = '\0';
+    filters_.push_back({id, Printable(name.data()), {values.begin(), values.begin() + std::ptrdiff_t(std::min(count, values.size()))}});
+  }
+  return Status::Ok();
+}
+
+Status Hdf5Dataset::Describe() {
+  const Hdf5Id creation(H5Dget_create_plist(id_), H5Pclose);
+  if (!creation.ok()) return Refused("has no layout: " + Hdf5Complaint());
+  if (H5Pget_layout(creation.id()) == H5D_VIRTUAL) return DescribeLayout(creation.id());  // its size would open other files
+
+  const Hdf5Id space(H5Dget_space(id_), H5Sclose);
+  std::array<hsize_t, H5S_MAX_RANK> size{};
+  const int axes = space.ok() ? H5Sget_simple_extent_dims(space.id(), size.data(), nullptr) : -1;
+  if (axes < 1) return Refused("has no axes");
+  if (axes > int(kMaxArrayAxes)) return Refused(fmt::format("has {} axes, must have at most {}", axes, kMaxArrayAxes));
+  size_.assign(size.begin(), size.begin() + axes);
+  if (std::ranges::find(size_, 0U) != size_.end()) return Refused("is empty");
+
+  if (Status status = DescribeType(); !status.ok()) return status;
+  if (Status status = DescribeLayout(creation.id()); !status.ok()) return status;
+
+  fill_.assign(BytesPerSample(type_), std::byte{0});
+  H5D_fill_value_t fill{};
+  if (H5Pfill_value_defined(creation.id(), &fill) >= 0 && fill == H5D_FILL_VALUE_USER_DEFINED) {
+    (void)H5Pget_fill_value(creation.id(), NativeType(type_), fill_.data());
+  }
+  return Status::Ok();
+}
+
+Result<std::optional<Hdf5StoredChunk>> Hdf5Dataset::Find(std::span<const std::uint64_t> index) const {
+  std::array<hsize_t, kMaxArrayAxes> offset{};
+  for (std::size_t axis = 0; axis < size_.size(); ++axis) offset[axis] = index[axis] * chunk_[axis];
+  const Hdf5Lock lock;
+  std::uint32_t left_out = 0;
+  if (const auto place = FindHdf5Chunk(file_->id_, id_, offset.data(), left_out)) {
+    return std::optional(Hdf5StoredChunk{place->begin, place->bytes, left_out});
+  }
+  // The index answered, and has no address. If it is damaged, the first failure is one of the index.
+  if (Hdf5FailedFirst(H5E_DATASET, H5E_CANTGET)) return std::optional<Hdf5StoredChunk>();
+  return Status::DataLoss(file_->Named(path_) + " has a damaged index of chunks: " + Hdf5Complaint());
+}
+
+Result<Bytes> Hdf5Dataset::ReadCompact() const {
+  constexpr std::uint64_t kMost = 64 << 10;  // as the format allows
+  std::uint64_t bytes = BytesPerSample(type_);
+  for (const std::uint64_t along : size_) {
+    if (along > kMost / bytes) return Status::DataLoss(file_->Named(path_) + " is compact, and has more than 64 KiB");
+    bytes *= along;
+  }
+  AlignedVector<std::byte> samples(bytes);
+  const Hdf5Lock lock;
+  if (H5Dread(id_, NativeType(type_), H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()) < 0) {
+    return Status::DataLoss(file_->Named(path_) + " cannot be read: " + Hdf5Complaint());
+  }
+  return Bytes(std::move(samples));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,18 @@
+// HDF5 files as sources: those of Imaris and BigDataViewer, and any dataset by its path.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "data/sources/chunked_source.h"
+#include "data/sources/source_format.h"
+
+namespace slabstream {
+
+SourceFormat Hdf5();
+
+// What the format opens a source of. Errors of SourceFormat::open.
+Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context);
+
+}  // namespace slabstream

@@ -1,0 +1,27 @@
+// How programs lay volumes out in HDF5 files. hdf5_format.cpp has the only list.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "common/base/status.h"
+#include "data/hdf5/hdf5_file.h"
+#include "data/sources/chunked_source.h"
+#include "data/sources/source_format.h"
+
+namespace slabstream {
+
+struct Hdf5Layout {
+  bool (*recognises)(Hdf5File& file) = nullptr;
+  // Errors of SourceFormat::open.
+  Result<Pyramid> (*read)(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) = nullptr;
+};
+
+Hdf5Layout Imaris();
+Hdf5Layout BigDataViewerHdf5();
+Hdf5Layout PlainHdf5();  // any dataset of any file
+
+// How many names PREFIX0, PREFIX1, ... there are without a gap.
+int CountNumbered(const std::vector<std::string>& names, const std::string& prefix);
+
+}  // namespace slabstream

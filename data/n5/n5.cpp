@@ -1,0 +1,30 @@
+#include "data/n5/n5.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "data/n5/n5_pyramid.h"
+#include "data/sources/chunked_source.h"
+
+namespace slabstream {
+namespace n5 {
+namespace {
+
+bool Recognises(const std::string& path, const ReadOptions&) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error) && (std::filesystem::path(path).extension() == ".n5" ||
+                                                        std::filesystem::is_regular_file(std::filesystem::path(path) / kAttributes, error));
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  Result<Pyramid> pyramid = OpenPyramid(FolderStore(path), options, context);
+  if (!pyramid.ok()) return pyramid.status();
+  return MakeChunkedSource(path, *std::move(pyramid), context);
+}
+
+}  // namespace
+}  // namespace n5
+
+SourceFormat N5() { return {.name = "N5", .recognises = n5::Recognises, .options = {"time", "channel", "array"}, .open = n5::Open}; }
+
+}  // namespace slabstream

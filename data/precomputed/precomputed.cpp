@@ -1,0 +1,38 @@
+#include "data/precomputed/precomputed.h"
+
+#include <filesystem>
+#include <utility>
+
+#include "data/precomputed/precomputed_pyramid.h"
+#include "data/sources/chunked_source.h"
+
+namespace slabstream {
+namespace precomputed {
+namespace {
+
+// A folder with an info file that names scales, or says that it is such a volume.
+bool Recognises(const std::string& path, const ReadOptions&) {
+  std::error_code error;
+  const std::string info = (std::filesystem::path(path) / kInfo).string();
+  if (!std::filesystem::is_regular_file(info, error)) return false;
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
+  const Result<Bytes> bytes = ReadNow(*FolderStore(path), kInfo, kMostBytes);
+  if (!bytes.ok()) return false;
+  const std::string_view text(reinterpret_cast<const char*>(bytes->span().data()), bytes->size());
+  return text.find("\"scales\"") != std::string_view::npos || text.find("neuroglancer_multiscale_volume") != std::string_view::npos;
+}
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  Result<Pyramid> pyramid = OpenPyramid(FolderStore(path), options, context);
+  if (!pyramid.ok()) return pyramid.status();
+  return MakeChunkedSource(path, *std::move(pyramid), context);
+}
+
+}  // namespace
+}  // namespace precomputed
+
+SourceFormat Precomputed() {
+  return {.name = "Neuroglancer precomputed", .recognises = precomputed::Recognises, .options = {"channel"}, .open = precomputed::Open};
+}
+
+}  // namespace slabstream

@@ -1,0 +1,133 @@
+#include "data/precomputed/precomputed_array.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "data/codecs/codecs.h"
+#include "data/precomputed/jpeg_codec.h"
+#include "data/precomputed/segmentation_codec.h"
+#include "data/sources/decode_chunk.h"
+#include "data/zarr/metadata.h"
+
+namespace slabstream::precomputed {
+namespace {
+
+bool IsGzip(const Bytes& bytes) { return bytes.size() > 2 && bytes.span()[0] == std::byte{0x1f} && bytes.span()[1] == std::byte{0x8b}; }
+
+// Files of mirrors may be gzipped. What is encoded may be longer than what it holds, so `most` is of its own.
+class MaybeGzip : public ChunkCodec {
+ public:
+  explicit MaybeGzip(std::uint64_t most) : most_(most) {}
+  Result<Bytes> Decode(Bytes packed, std::uint64_t) const override {
+    return IsGzip(packed) ? GzipCodec()->Decode(std::move(packed), most_) : Result<Bytes>(std::move(packed));
+  }
+
+ private:
+  const std::uint64_t most_;
+};
+
+class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_this<PrecomputedArray> {
+ public:
+  PrecomputedArray(std::shared_ptr<Store> store, Scale scale, SampleType type, std::uint64_t channels, SourceContext context)
+      : store_(std::move(store)), scale_(std::move(scale)), context_(std::move(context)) {
+    shape_.size = {channels, scale_.size[2], scale_.size[1], scale_.size[0]};
+    shape_.chunk = {channels, scale_.chunk[2], scale_.chunk[1], scale_.chunk[0]};
+    shape_.type = type;
+    shape_.cut_at_end = true;
+    shape_.fill.resize(BytesPerSample(type));
+  }
+
+  const ArrayShape& shape() const override { return shape_; }
+
+  void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
+    std::string name;
+    std::array<std::uint64_t, 3> size{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::uint64_t begin = index[3 - axis] * scale_.chunk[axis], end = std::min(begin + scale_.chunk[axis], scale_.size[axis]);
+      size[axis] = end - begin;
+      name +=
+          fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(begin), scale_.offset[axis] + std::int64_t(end));
+    }
+    if (scale_.sharding) return ReadFromShard(index, size, std::move(done));
+    const std::string key = zarr::Join(scale_.key, name);
+    // CloudVolume gives gzipped files an ending.
+    store_->Read(key, {}, MostStored(), [self = shared_from_this(), key, size, done = std::move(done)](Result<Bytes> answer) {
+      if (answer.status().code() != StatusCode::kNotFound)
+        return self->Decode(self->store_->name() + "/" + key, size, std::move(answer), done);
+      self->store_->Read(key + ".gz", {}, self->MostStored(), [self, key, size, done](Result<Bytes> gzipped) {
+        self->Decode(self->store_->name() + "/" + key + ".gz", size, std::move(gzipped), done);
+      });
+    });
+  }
+
+ private:
+  // The index of the shard, that of the minishard, and the chunk, one after the other.
+  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+    std::array<std::uint64_t, 3> counts{};
+    for (std::size_t axis = 0; axis < 3; ++axis) counts[axis] = (scale_.size[axis] - 1) / scale_.chunk[axis] + 1;
+    const std::uint64_t chunk = ChunkNumber({index[3], index[2], index[1]}, counts);
+    const ShardPlace place = PlaceOf(*scale_.sharding, chunk);
+    const std::string key = zarr::Join(scale_.key, place.file);
+    const std::string what = fmt::format("{}/{}: chunk {}", store_->name(), key, chunk);
+    constexpr std::uint64_t kEntryBytes = 16;
+    auto found_chunk = [self = shared_from_this(), key, size, what, done](Result<std::optional<ByteRange>> range) {
+      if (!range.ok()) return done(Status(range.status().code(), what + ": " + range.status().message()));
+      if (!*range) return done(std::optional<StoredChunk>());
+      self->store_->Read(key, **range, self->MostStored(), [self, size, what, wanted = (*range)->bytes, done](Result<Bytes> answer) {
+        if (answer.status().code() == StatusCode::kNotFound) answer = Status::Unavailable(what + ": the shard is gone");
+        if (answer.ok() && answer->size() != wanted) answer = Status::DataLoss(what + ": the shard ends before it does");
+        self->Decode(what, size, std::move(answer), done);
+      });
+    };
+    auto found_minishard = [self = shared_from_this(), key, what, chunk, found_chunk, done](Result<Bytes> entry) {
+      if (entry.status().code() == StatusCode::kNotFound) return done(std::optional<StoredChunk>());
+      if (!entry.ok()) return done(entry.status());
+      const Result<ByteRange> range = MinishardRange(*self->scale_.sharding, *entry);
+      if (!range.ok()) return found_chunk(range.status());
+      if (range->bytes == 0) return done(std::optional<StoredChunk>());
+      self->store_->Read(key, *range, kMostMinishardBytes, [self, chunk, found_chunk, done, wanted = range->bytes](Result<Bytes> packed) {
+        if (!packed.ok()) return done(packed.status());
+        if (packed->size() != wanted) return found_chunk(Status::DataLoss("the shard ends within an index"));
+        found_chunk(ChunkRange(*self->scale_.sharding, *std::move(packed), chunk));
+      });
+    };
+    store_->Read(key, {.begin = kEntryBytes * place.minishard, .bytes = kEntryBytes}, kEntryBytes, std::move(found_minishard));
+  }
+
+  // A block of one voxel in the segmentation encoding takes two words and its label.
+  std::uint64_t MostStored() const { return 4 * shape_.chunk_bytes() + (std::uint64_t{1} << 20); }
+
+  void Decode(const std::string& what, const std::array<std::uint64_t, 3>& size, Result<Bytes> answer, const ChunkDone& done) const {
+    const std::uint64_t channels = shape_.size[0], voxels = size[0] * size[1] * size[2];
+    const std::size_t each = BytesPerSample(shape_.type);
+    const std::uint64_t bytes = voxels * channels * each;
+    CodecChain chain;
+    switch (scale_.encoding) {
+      case Encoding::kRaw:
+        if (scale_.sharding ? scale_.sharding->gzip_data : answer.ok() && answer->size() != bytes)
+          chain.push_back(std::make_shared<MaybeGzip>(MostStored()));
+        break;
+      case Encoding::kJpeg: chain = {JpegCodec(voxels, int(channels)), std::make_shared<MaybeGzip>(MostStored())}; break;
+      case Encoding::kSegmentation:
+        chain = {SegmentationCodec(size, scale_.block, channels, each), std::make_shared<MaybeGzip>(MostStored())};
+        break;
+    }
+    DecodeOn(context_, std::move(chain), std::move(answer), bytes, what, done);
+  }
+
+  const std::shared_ptr<Store> store_;
+  const Scale scale_;
+  const SourceContext context_;
+  ArrayShape shape_;
+};
+
+}  // namespace
+
+std::shared_ptr<ChunkedArray> MakeArray(const std::shared_ptr<Store>& store, const Scale& scale, SampleType type, std::uint64_t channels,
+                                        const SourceContext& context) {
+  return std::make_shared<PrecomputedArray>(store, scale, type, channels, context);
+}
+
+}  // namespace slabstream::precomputed

@@ -1,0 +1,102 @@
+#include "data/sources/view_setups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string_view>
+
+#include "common/base/files.h"
+#include "common/base/parse_number.h"
+#include "data/volume_io/length_names.h"
+#include "data/volume_io/xml_events.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMostXmlBytes = std::size_t{64} << 20, kMostSetups = 65536;
+
+std::string_view Trimmed(std::string_view text) {
+  constexpr std::string_view kSpace = " \t\r\n";
+  const std::size_t begin = text.find_first_not_of(kSpace);
+  return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(kSpace) + 1 - begin);
+}
+
+// "0.4 0.4 2.0"
+std::optional<Vec3> Spacing(std::string_view text) {
+  Vec3 spacing;
+  for (int axis = 0; axis < 3; ++axis) {
+    text = Trimmed(text);
+    const std::size_t end = std::min(text.find_first_of(" \t\r\n"), text.size());
+    const std::optional<double> number = ParseNumber<double>(text.substr(0, end));
+    if (!number || !(*number > 0) || !std::isfinite(*number)) return std::nullopt;
+    spacing[axis] = *number;
+    text.remove_prefix(end);
+  }
+  return Trimmed(text).empty() ? std::optional(spacing) : std::nullopt;
+}
+
+}  // namespace
+
+Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml) {
+  struct Element {
+    std::string name;
+    std::int64_t text_begin = 0;
+  };
+  std::vector<Element> open;  // from the root to where the reader is
+  std::vector<ViewSetup> setups;
+  ViewSetup setup;
+  bool numbered = false;
+  const auto inside = [&](std::size_t above, std::string_view name) {
+    return open.size() > above && open.end()[-1 - std::ptrdiff_t(above)].name == name;
+  };
+  const auto start = [&](const XmlTag& tag) {
+    open.push_back({tag.name, tag.end});
+    if (tag.name == "ViewSetup") {
+      setup = {};
+      numbered = false;
+    }
+    return setups.size() < kMostSetups;
+  };
+  const auto end = [&](const XmlTag& tag) {
+    const std::string_view text = Trimmed(std::string_view(xml).substr(
+        std::size_t(open.back().text_begin), std::size_t(std::max<std::int64_t>(0, tag.begin - open.back().text_begin))));
+    if (inside(1, "ViewSetup")) {
+      if (tag.name == "id") {
+        const std::optional<int> id = ParseNumber<int>(text);
+        numbered = id.has_value();
+        setup.id = id.value_or(0);
+      } else if (tag.name == "name") {
+        setup.name = text.substr(0, 256);
+      }
+    } else if (inside(1, "voxelSize") && inside(2, "ViewSetup")) {
+      if (tag.name == "unit") setup.unit = LengthUnitNamed(text);
+      if (tag.name == "size") setup.spacing = Spacing(text);
+    }
+    if (tag.name == "ViewSetup" && numbered) setups.push_back(setup);
+    open.pop_back();
+  };
+  std::size_t at = 0;
+  const auto read = [&](std::span<char> buffer) {
+    const std::size_t count = std::min(buffer.size(), xml.size() - at);
+    std::copy_n(xml.begin() + std::ptrdiff_t(at), count, buffer.begin());
+    at += count;
+    return count;
+  };
+  if (Status status = ReadXml(read, {start, end}); !status.ok()) return status;
+  return setups;
+}
+
+Result<ViewSetupFile> ReadViewSetupsBeside(const std::string& path) {
+  const std::string file = std::filesystem::path(path).replace_extension(".xml").string();
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) return ViewSetupFile{};
+  const Result<std::string> xml = ReadTextFile(file, kMostXmlBytes);
+  if (!xml.ok()) return xml.status();
+  Result<std::vector<ViewSetup>> setups = ParseViewSetups(*xml);
+  if (!setups.ok()) return Status(setups.status().code(), file + ": " + setups.status().message());
+  return ViewSetupFile{file, *std::move(setups)};
+}
+
+}  // namespace slabstream

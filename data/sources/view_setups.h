@@ -1,0 +1,33 @@
+// The XML file of BigDataViewer and BigStitcher, beside the file or folder that holds the samples: how far voxels are apart, and in which
+// unit.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/math/vec.h"
+#include "common/volume/orientation.h"
+
+namespace slabstream {
+
+struct ViewSetup {
+  int id = 0;
+  std::string name = {};
+  std::optional<Vec3> spacing = {};  // each > 0, finite
+  std::optional<LengthUnit> unit = {};
+};
+
+// Those that have a number; at most 65536. Elements that are not known are skipped. InvalidArgument: no well-formed XML.
+Result<std::vector<ViewSetup>> ParseViewSetups(const std::string& xml);
+
+// Of the XML file beside `path`: of the same name, but for the ending. None: there is no such file. InvalidArgument, ResourceExhausted: it
+// cannot be taken; the message names it.
+struct ViewSetupFile {
+  std::string path;  // "": there is none
+  std::vector<ViewSetup> setups;
+};
+Result<ViewSetupFile> ReadViewSetupsBeside(const std::string& path);
+
+}  // namespace slabstream

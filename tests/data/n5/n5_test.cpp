@@ -1,0 +1,305 @@
+// N5 containers, written block by block as the specification says.
+#include <blosc.h>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <zlib.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/files.h"
+#include "data/n5/n5_array.h"
+#include "data/open/open_source.h"
+#include "tests/data/sources/read_array.h"
+#include "tests/support/random.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+using Sizes = std::vector<std::uint64_t>;
+
+void WriteText(const std::filesystem::path& path, const std::string& text) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::string Compressed(const std::string& name, const std::string& bytes, int element_bytes) {
+  if (name == "raw") return bytes;
+  if (name == "zstd") {
+    std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+    packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 3));
+    return packed;
+  }
+  if (name == "blosc") {
+    std::string packed(bytes.size() + BLOSC_MAX_OVERHEAD, '\0');
+    const int size = blosc_compress_ctx(5, BLOSC_SHUFFLE, std::size_t(element_bytes), bytes.size(), bytes.data(), packed.data(),
+                                        packed.size(), "lz4", 0, 1);
+    packed.resize(std::size_t(size));
+    return packed;
+  }
+  z_stream stream{};
+  constexpr int kGzip = 31, kZlib = 15;
+  CHECK(deflateInit2(&stream, 6, Z_DEFLATED, name == "gzip" ? kGzip : kZlib, 8, Z_DEFAULT_STRATEGY) == Z_OK);
+  std::string packed(deflateBound(&stream, uLong(bytes.size())), '\0');
+  std::string input = bytes;
+  stream.next_in = reinterpret_cast<Bytef*>(input.data());
+  stream.avail_in = uInt(input.size());
+  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
+  stream.avail_out = uInt(packed.size());
+  CHECK(deflate(&stream, Z_FINISH) == Z_STREAM_END);
+  packed.resize(stream.total_out);
+  deflateEnd(&stream);
+  return packed;
+}
+
+std::string BigEndian(std::uint64_t value, int bytes) {
+  std::string text;
+  for (int i = bytes - 1; i >= 0; --i) text += char(value >> (8 * i) & 0xff);
+  return text;
+}
+
+// As N5 counts: x first.
+struct Spec {
+  Sizes size, block;
+  SampleType type = SampleType::kUint16;
+  std::string compression = "raw";  // "zlib" is gzip with useZlib
+  bool old_style = false, with_count = false, whole_at_end = false;
+  double missing = 0;  // the chance that a block is left out
+};
+
+std::string AttributesOf(const Spec& spec, const std::string& more = "") {
+  const std::string compression =
+      spec.compression == "zlib" ? R"({"type": "gzip", "useZlib": true})" : fmt::format(R"({{"type": "{}"}})", spec.compression);
+  return fmt::format(R"({{"dimensions": [{}], "blockSize": [{}], "dataType": "{}", {}: {}{}}})", fmt::join(spec.size, ", "),
+                     fmt::join(spec.block, ", "), ToString(spec.type), spec.old_style ? "\"compressionType\"" : "\"compression\"",
+                     spec.old_style ? "\"" + spec.compression + "\"" : compression, more);
+}
+
+// Random elements; returns all of them, x fastest, in this machine's byte order. Those of missing blocks are 0.
+std::vector<std::byte> WriteDataset(const std::filesystem::path& folder, const Spec& spec, Random& random, const std::string& more = "") {
+  WriteText(folder / "attributes.json", AttributesOf(spec, more));
+  const std::size_t each = BytesPerSample(spec.type), axes = spec.size.size();
+  std::uint64_t count = 1;
+  Sizes reversed_counts;
+  for (std::size_t axis = axes; axis-- > 0;) reversed_counts.push_back((spec.size[axis] - 1) / spec.block[axis] + 1);
+  for (const std::uint64_t along : spec.size) count *= along;
+  std::vector<std::byte> elements(count * each);
+  Sizes index(axes, 0);
+  do {
+    if (random.Chance(spec.missing)) continue;
+    Sizes begin(axes), inside(axes), stored(axes);
+    std::string path = folder.string();
+    for (std::size_t axis = 0; axis < axes; ++axis) {
+      const std::uint64_t at = index[axes - 1 - axis];
+      path += "/" + std::to_string(at);
+      begin[axis] = at * spec.block[axis];
+      inside[axis] = std::min(spec.block[axis], spec.size[axis] - begin[axis]);
+      stored[axis] = spec.whole_at_end ? spec.block[axis] : inside[axis];
+    }
+    std::string header = BigEndian(spec.with_count ? 1 : 0, 2) + BigEndian(axes, 2), bytes;
+    std::uint64_t in_block = 1;
+    for (const std::uint64_t along : stored) {
+      header += BigEndian(along, 4);
+      in_block *= along;
+    }
+    if (spec.with_count) header += BigEndian(in_block, 4);
+    Sizes at(axes, 0);  // the last axis of N5 first
+    const Sizes reversed(stored.rbegin(), stored.rend());
+    do {
+      std::uint64_t place = 0;
+      bool outside = false;
+      for (std::size_t axis = axes; axis-- > 0;) {
+        const std::uint64_t along = at[axes - 1 - axis];
+        outside = outside || along >= inside[axis];
+        place = place * spec.size[axis] + begin[axis] + along;
+      }
+      std::string element;  // big endian
+      for (std::size_t i = 0; i < each; ++i) element += char(random.Integer(0, 3) * 37);
+      bytes += element;
+      if (outside) continue;
+      std::ranges::reverse(element);
+      std::memcpy(elements.data() + place * each, element.data(), each);
+    } while (NextIndex(at, reversed));
+    WriteText(path, header + Compressed(spec.compression, bytes, int(each)));
+  } while (NextIndex(index, reversed_counts));
+  return elements;
+}
+
+class N5Test : public testing::Test {
+ protected:
+  Result<std::shared_ptr<ChunkedArray>> OpenArray() {
+    const auto store = FolderStore(root_);
+    const Result<std::optional<zarr::Json>> json = zarr::ReadJson(*store, "attributes.json");
+    if (!json.ok()) return json.status();
+    return n5::OpenArray(store, "", zarr::Field("attributes.json", **json), context_);
+  }
+  Result<std::shared_ptr<VolumeSource>> Open(const ReadOptions& options = {}) { return OpenSource(root_, options, context_); }
+  void ExpectRefused(const ReadOptions& options, const std::string& why) {
+    const Result<std::shared_ptr<VolumeSource>> source = Open(options);
+    ASSERT_FALSE(source.ok()) << why;
+    EXPECT_THAT(source.status().message(), HasSubstr(why));
+    EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
+  }
+  Result<std::vector<std::byte>> Samples(VolumeSource& source, int level = 0) {
+    const VolumeDescription& description = source.info().levels[std::size_t(level)].description;
+    std::vector<std::byte> samples(std::size_t(description.voxel_bytes()));
+    const Status status = source.ReadNow(level, description.geometry.bounds(), samples);
+    if (!status.ok()) return status;
+    return samples;
+  }
+
+  TemporaryDirectory directory_;
+  const std::string root_ = directory_ / "scan.n5";
+  SourceContext context_ = std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2});
+};
+
+TEST_F(N5Test, BlocksOfEveryShapeTypeAndCompression) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  const std::vector<std::string> compressions = {"raw", "gzip", "zlib", "zstd", "blosc"};
+  for (int round = 0; round < 120; ++round) {
+    Spec spec{.type = SampleType(random.Integer(0, 9)),
+              .compression = compressions[random.Integer<std::size_t>(0, compressions.size() - 1)],
+              .with_count = random.Chance(0.3),
+              .whole_at_end = random.Chance(0.3),
+              .missing = random.Chance(0.5) ? 0.3 : 0};
+    spec.old_style = spec.compression != "zlib" && random.Chance(0.3);
+    for (int axes = random.Integer(1, 4); axes > 0; --axes) {
+      spec.size.push_back(random.Integer<std::uint64_t>(1, 12));
+      spec.block.push_back(random.Integer<std::uint64_t>(1, 7));
+    }
+    SCOPED_TRACE(AttributesOf(spec));
+    std::filesystem::remove_all(root_);
+    const std::vector<std::byte> expected = WriteDataset(root_, spec, random);
+    const auto array = OpenArray();
+    ASSERT_TRUE(array.ok()) << array.status().message();
+    const Result<std::vector<std::byte>> elements = ReadArray(**array);
+    ASSERT_TRUE(elements.ok()) << elements.status().message();
+    ASSERT_EQ(*elements, expected);
+  }
+}
+
+TEST_F(N5Test, DamagedBlocksAreNamed) {
+  Random random(6);
+  WriteDataset(root_, {.size = {5, 4}, .block = {4, 4}}, random);
+  const auto array = OpenArray();
+  ASSERT_TRUE(array.ok()) << array.status().message();
+  const std::string whole = BigEndian(0, 2) + BigEndian(2, 2) + BigEndian(4, 4) + BigEndian(4, 4) + std::string(32, 'x');
+  const std::pair<std::string, const char*> cases[] = {
+      {whole.substr(0, 7), "the header of the block is cut off"},
+      {"", "is a block of 0 axes, must have 2"},
+      {BigEndian(2, 2) + whole.substr(2), "is a block of mode 2, must be 0 or 1"},
+      {BigEndian(0, 2) + BigEndian(3, 2) + whole.substr(4), "is a block of 3 axes, must have 2"},
+      {whole.substr(0, 4) + BigEndian(0, 4) + whole.substr(8), "is a block of 0 elements along axis 0, must have 1 to 4"},
+      {whole.substr(0, 4) + BigEndian(0xffffffff, 4) + whole.substr(8), "is a block of 4294967295 elements along axis 0"},
+      {BigEndian(1, 2) + whole.substr(2, 10) + BigEndian(17, 4) + whole.substr(12), "is a block of 17 elements, must have 16"},
+      {whole.substr(0, 40), "has 28 bytes, expected 32"},
+      {whole + "xx", "has 34 bytes, expected 32"},
+  };
+  const Sizes first = {0, 0};
+  for (const auto& [bytes, why] : cases) {
+    WriteText(root_ + "/0/0", bytes);
+    const Status status = ReadChunkNow(**array, first).status();
+    EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
+    EXPECT_THAT(status.message(), testing::AllOf(HasSubstr("scan.n5/0/0: "), HasSubstr(why)));
+  }
+}
+
+TEST_F(N5Test, WrongAttributesAreNamed) {
+  const std::string good = AttributesOf({.size = {5, 4, 3}, .block = {2, 2, 2}});
+  const auto with = [&](const std::string& from, const std::string& to) {
+    std::string text = good;
+    text.replace(text.find(from), from.size(), to);
+    return text;
+  };
+  const std::pair<std::string, const char*> cases[] = {
+      {"{", "attributes.json: damaged: not JSON"},
+      {"[1]", "must be an object"},
+      {with("[5, 4, 3]", "[5, 0, 3]"), "dimensions[1] is 0, must be a whole number"},
+      {with("[5, 4, 3]", "7"), "dimensions is 7, must be a list"},
+      {with("[2, 2, 2]", "[2, 2]"), "blockSize is [2,2], must be a list of 3 numbers"},
+      {with("[2, 2, 2]", "[2000000000, 2000000000, 2000000000]"), "has blocks of more than 1073741824 bytes"},
+      {with("uint16", "string"), "dataType is \"string\", must be one of int8"},
+      {with("raw", "bzip2"), "compression.type is \"bzip2\", must be a supported compression: raw, gzip, zstd or blosc"},
+      {with("raw", "lz4"), "compression.type is \"lz4\", must be a supported compression"},
+      {with("\"compression\"", "\"packing\""), "must be a text"},
+  };
+  for (const auto& [text, why] : cases) {
+    WriteText(root_ + "/attributes.json", text);
+    ExpectRefused({}, why);
+  }
+}
+
+TEST_F(N5Test, ViewsOfBigStitcher) {
+  Random random(7);
+  const std::string setup_attributes = R"({"downsamplingFactors": [[1, 1, 1], [2, 2, 1]], "dataType": "uint16"})";
+  std::vector<std::byte> fine, coarse;
+  for (const std::string setup : {"/setup0", "/setup2"}) {
+    WriteText(root_ + setup + "/attributes.json", setup_attributes);
+    for (const std::string time : {"/timepoint0", "/timepoint4"}) {
+      WriteText(root_ + setup + time + "/attributes.json", R"({"multiScale": true, "resolution": [1, 1, 1]})");
+      fine = WriteDataset(root_ + setup + time + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}, .compression = "gzip"}, random);
+      coarse = WriteDataset(root_ + setup + time + "/s1", {.size = {4, 4, 5}, .block = {4, 4, 4}, .compression = "gzip"}, random);
+    }
+  }
+  WriteText(root_ + "/attributes.json", R"({"n5": "2.5.1"})");
+  WriteText(directory_ / "scan.xml",
+            "<SpimData><SequenceDescription><ViewSetups><ViewSetup><id>2</id><name>green</name>"
+            "<voxelSize><unit>um</unit><size>0.5 0.5 2</size></voxelSize></ViewSetup></ViewSetups></SequenceDescription></SpimData>");
+  ExpectRefused({}, "scan.n5: has 2 channels, of which --channel takes one: 0 to 1 (0, 1: green)");
+  ExpectRefused({.channel = 1}, "setup2: holds 2 volumes, of which --time takes one");
+  const auto source = Open({.time = TimeRange{1, 1}, .channel = 1});
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  const SourceInfo& info = (*source)->info();
+  EXPECT_EQ(info.format, "BigDataViewer N5");
+  EXPECT_EQ(info.times, 2);
+  ASSERT_EQ(info.levels.size(), 2U);
+  const VolumeGeometry& geometry = info.levels[1].description.geometry;
+  EXPECT_EQ(info.levels[0].description.geometry.size, (Index3{9, 8, 5}));
+  EXPECT_EQ(geometry.spacing, (Vec3{1, 1, 2}));
+  EXPECT_EQ(geometry.orientation.origin, (Vec3{0.25, 0.25, 0}));
+  EXPECT_EQ(geometry.orientation.unit, LengthUnit::kMicrometre);
+  EXPECT_EQ(Samples(**source).value(), fine);
+  EXPECT_EQ(Samples(**source, 1).value(), coarse);
+}
+
+TEST_F(N5Test, GroupsOfLevels) {
+  Random random(8);
+  for (const std::string group : {"/raw", "/deep/labels"}) {
+    WriteText(root_ + group + "/attributes.json",
+              R"({"scales": [[1, 1, 1], [2, 2, 2], [4, 4, 4]], "pixelResolution": {"unit": "nm", "dimensions": [4, 4, 40]}})");
+    WriteDataset(root_ + group + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
+    WriteDataset(root_ + group + "/s1", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
+    WriteDataset(root_ + group + "/s2", {.size = {2, 2, 1}, .block = {4, 4, 4}}, random, R"(, "downsamplingFactors": [4, 4, 5])");
+  }
+  const auto only = Open();
+  ASSERT_TRUE(only.ok()) << only.status().message();
+  ASSERT_EQ((*only)->info().levels.size(), 3U);
+  const VolumeGeometry& coarsest = (*only)->info().levels[2].description.geometry;
+  EXPECT_EQ(coarsest.spacing, (Vec3{16, 16, 200}));
+  EXPECT_EQ(coarsest.orientation.origin, (Vec3{6, 6, 80}));
+  EXPECT_EQ(coarsest.orientation.unit, LengthUnit::kNanometre);
+  EXPECT_TRUE(Open({.array = "deep/labels"}).ok());
+  const auto level = Open({.array = "deep/labels/s1"});
+  ASSERT_TRUE(level.ok()) << level.status().message();
+  EXPECT_EQ((*level)->info().levels[0].description.geometry.size, (Index3{4, 4, 2}));
+  ExpectRefused({.array = "deep"}, "scan.n5/deep: is no dataset, and no group of levels");
+  ExpectRefused({.array = "../other"}, "");
+  WriteDataset(root_ + "/more", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
+  ExpectRefused({}, "scan.n5: holds 2 volumes, of which ?array= takes one: more, raw");
+  ExpectRefused({.dataset = "/raw"}, "takes no option dataset");
+}
+
+TEST_F(N5Test, AnEmptyContainerSaysSo) {
+  std::filesystem::create_directories(root_);
+  ExpectRefused({}, "scan.n5: holds no dataset");
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,63 @@
+// HDF5 files: their metadata, which libhdf5 reads, and chunks with their filters.
+//
+// input: u8: the ending of the file, and whether a dataset is asked for; the file
+#include "tests/data/hdf5/hdf5_files.h"
+#include "tests/data/volume_io/volume_files.h"
+#include "tests/fuzz/decoders.h"
+#include "tests/fuzz/read_source.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+std::string PathOf(const std::string& name) {
+  static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
+  return directory / name;
+}
+
+}  // namespace
+
+bool DecodeHdf5File(std::span<const std::byte> bytes) {
+  FuzzInput input(bytes);
+  const ReadOptions options{.dataset = input.Take<std::uint8_t>() % 2 == 1 ? "/data" : ""};
+  const std::string path = PathOf("volume.h5");
+  WriteFile(path, FileBytes(input.Text()));
+  return ReadSource(path, options);
+}
+
+std::vector<FuzzBytes> Hdf5FileSeeds() {
+  std::vector<FuzzBytes> seeds;
+  const std::string path = PathOf("seed.h5");
+  std::vector<std::uint16_t> samples(6 * 7 * 8);
+  for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = std::uint16_t(i);
+  const auto keep = [&](std::uint8_t kind) { seeds.push_back(FuzzSeed().Put(kind).Put(ReadFile(path)).bytes()); };
+  for (const bool latest : {false, true}) {
+    for (const bool chunked : {false, true}) {
+      Hdf5Writer::Layout layout{.size = {6, 7, 8}, .big_endian = chunked};
+      if (chunked) layout.chunk = {3, 4, 4};
+      layout.filters = {.shuffle = chunked, .deflate = chunked, .fletcher32 = chunked};
+      Hdf5Writer(path, latest).Write("/data", layout, samples.data());
+      keep(latest ? 1 : 0);
+    }
+  }
+  {
+    Hdf5Writer writer(path);
+    const std::string group = "/DataSet/ResolutionLevel 0/TimePoint 0/Channel 0";
+    writer.Write(group + "/Data", {.size = {6, 7, 8}, .chunk = {3, 4, 4}}, samples.data());
+    writer.Characters(group, "ImageSizeX", "7");
+    writer.Characters(group, "ImageSizeY", "6");
+    writer.Characters(group, "ImageSizeZ", "6");
+    writer.Group("/DataSetInfo/Image");
+  }
+  keep(0);
+  {
+    Hdf5Writer writer(path);
+    const std::vector<double> factors = {1, 1, 1};
+    writer.Write("/s00/resolutions", {.size = {1, 3}, .type = SampleType::kFloat64}, factors.data());
+    writer.Write("/t00000/s00/0/cells", {.size = {6, 7, 8}, .chunk = {3, 4, 4}, .type = SampleType::kInt16}, samples.data());
+  }
+  keep(0);
+  return seeds;
+}
+
+}  // namespace slabstream
