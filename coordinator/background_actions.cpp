@@ -15,8 +15,8 @@
 #include "common/mesh/lattice.h"
 #include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/volume/memory_budget.h"
 #include "coordinator/answer_question.h"
-#include "coordinator/catalogue.h"
 #include "coordinator/dataset_id.h"
 
 namespace slabstream {
@@ -64,6 +64,7 @@ Result<FoundData> Find(const std::vector<std::string>& arguments) {
 
 Result<std::shared_ptr<const OccupancyGrid>> Count(const CountFunction& count, const VoxelServer::Samples& samples,
                                                    const CountDataset& action) {
+  if (samples.in_parts.source != nullptr) return Status::Unavailable("the voxels of a dataset that is read in parts are not counted");
   const RendererKind& renderer = *action.volume.renderer();
   const ClassificationTable drawn = renderer.DrawnTable(action.volume.transfer(), *action.summary);
   OccupancyGrid grid = renderer.Can(Ability::kCells) ? CountOccupiedByCells(samples.cells->mesh(), action.summary->description, drawn)
@@ -119,6 +120,10 @@ BackgroundActions::AtOnce BackgroundActions::PostResult(auto&& tasks, const char
 }
 
 Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const std::function<void(int percent)>& tell) {
+  if (action.source.at_level != nullptr) return LoadLevel(action, *action.source.at_level, tell);
+  Result<std::optional<OpenedSource>> opened = OpenInParts(action.source, action.most_bytes, tell);
+  if (!opened.ok()) return opened.status();
+  if (*opened) return Open(action, **std::move(opened));
   const Result<LoadedSource> loaded = LoadSource(action.source, tell);
   if (!loaded.ok()) return loaded.status();
   const std::shared_ptr<const Volume>& volume = loaded->volume;
@@ -137,6 +142,50 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
+}
+
+// The levels of a source, or its only one.
+BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, OpenedSource opened) {
+  const std::vector<SourceLevel>& levels = opened.source->info().levels;
+  std::vector<DataSource> sources;
+  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary, .overview_level = opened.survey.level});
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    described->levels.push_back(levels[level].description);
+    SourceAtLevel at{.source = opened.source,
+                     .surveyed = opened.survey.summary,
+                     .stored = {opened.text, int(level), opened.version, {{0, 0, 0}, levels[level].block}},
+                     .stamp = opened.stamp};
+    if (int(level) == opened.survey.level) at.surveyed_level = int(level);
+    sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
+  }
+  if (sources.size() == 1) return *LoadLevel(action, *sources.front().at_level, [](int) {});  // it stays where it is, so this cannot fail
+  return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp}};
+}
+
+// Holds the voxels of the level if there is room for them.
+Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at,
+                                                             const std::function<void(int percent)>& tell) {
+  const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
+  const auto bytes = std::uint64_t(description.voxel_bytes());
+  VoxelServer::Samples samples;
+  VolumeSummary summary;
+  if (bytes <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+    const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, tell);
+    if (!volume.ok()) return volume.status();
+    samples.volume = *volume;
+    summary = at.surveyed_level ? *at.surveyed : Summarize(**volume);
+    summary.range = at.surveyed->range;
+    summary.histogram = at.surveyed->histogram;
+    summary.non_finite = at.surveyed->non_finite;
+  } else {
+    samples.in_parts = {at.source, at.stored.level};
+    summary = at.surveyed_level ? *at.surveyed : UnreadSummary(description, *at.surveyed);
+    summary.stored = at.stored;
+  }
+  const DatasetId id = IdOf(action.name, description, at.stored);
+  const std::uint64_t held = samples.bytes();
+  return News{DatasetLoaded{action.name, action.load, id, std::make_shared<const VolumeSummary>(std::move(summary)), held, at.stamp}, id,
+              std::move(samples)};
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {

@@ -19,6 +19,7 @@
 #include "common/base/fair_tasks.h"
 #include "common/classification/count_occupied.h"
 #include "common/transport/mailbox.h"
+#include "coordinator/catalogue.h"
 #include "coordinator/dataset_machine.h"
 #include "coordinator/folder_memory.h"
 #include "coordinator/frame_machine.h"
@@ -77,6 +78,8 @@ class BackgroundActions {
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
   static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
+  static News Open(const LoadDataset& action, OpenedSource opened);
+  static Result<News> LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const std::function<void(int percent)>& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(auto&& tasks, const char* what, auto make, auto failed);
   // Where the event holds a result: that of `find`, or the error.

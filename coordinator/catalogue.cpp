@@ -13,10 +13,11 @@
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/read_progress.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {
@@ -56,7 +57,7 @@ bool HasFiles(const std::string& folder) {
 // holds a volume in each.
 bool IsOneVolume(const std::string& folder, const std::vector<fs::path>& volumes) {
   const VolumeFormat* const format = FindFormat(folder, {});
-  return format != nullptr && LooksLikeVolume(folder) && HasFiles(folder) &&
+  return format != nullptr && LooksLikeAnyVolume(folder) && HasFiles(folder) &&
          std::ranges::all_of(volumes, [&](const fs::path& path) { return FindFormat(path.string(), {}) == format; });
 }
 
@@ -82,7 +83,7 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!IsHidden(path) && LooksLikeVolume(path.string())) files.push_back(path);
+    if (!IsHidden(path) && LooksLikeAnyVolume(path.string())) files.push_back(path);
   }
   if (error) {
     const bool missing = error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
@@ -147,7 +148,7 @@ void LeaveOutMost(FoundData& found) {
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   const Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
-  Result<std::vector<std::string>> files = CheckVolumeHeaders(source->path, source->options);
+  Result<std::vector<std::string>> files = CheckAnyVolumeHeaders(source->path, source->options);
   if (!files.ok() || !data.layers.any()) return files;
   const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
   if (!of_layers.ok()) return of_layers.status();
@@ -160,7 +161,7 @@ Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<voi
   if (!source.ok()) return source.status();
   ReadProgress progress(tell);
   source->options.progress = &progress;
-  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
+  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
   if (!layers.ok()) return layers.status();
@@ -192,6 +193,10 @@ Status TakeLayers(std::string& path, LayerFiles& layers) {
   }
   if (!labels.empty()) SetLabelFiles(labels, layers);
   return Status::Ok();
+}
+
+Status BeingWritten(const DataSource& source) {
+  return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
 }
 
 // Waits until the files were not changed for longer than a tick of the file system's clock. Then their stamp tells of every change from now
@@ -288,6 +293,36 @@ void CheckFiles(FoundData& found) {
   }
 }
 
+Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uint64_t most_bytes,
+                                                const std::function<void(int percent)>& tell) {
+  if (data.load || data.layers.any()) return std::optional<OpenedSource>();
+  const Result<SourceText> parsed = ParseSourceText(data.path);
+  if (!parsed.ok()) return parsed.status();
+  if (FindSourceFormat(parsed->path) == nullptr) return std::optional<OpenedSource>();
+  constexpr int kAttempts = 2;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    Result<std::shared_ptr<VolumeSource>> source = OpenSource(parsed->path, parsed->options, ProcessReadContext());
+    if (!source.ok()) return source.status();
+    const SourceInfo& info = (*source)->info();
+    if (info.levels.size() == 1 && std::uint64_t(info.levels.front().description.voxel_bytes()) <= most_bytes) {
+      return std::optional<OpenedSource>();
+    }
+    const Result<FileStamp> stamp = StampFiles(info.files);
+    if (!stamp.ok()) return stamp.status();
+    AwaitRest(*stamp);
+    const Result<std::uint64_t> version = VersionOf(info.files);
+    Result<Survey> survey = SurveySource(**source, tell);
+    const Result<bool> changed = HaveChanged(*stamp);
+    if (!changed.ok() || *changed || !version.ok()) continue;
+    if (!survey.ok()) return survey.status();
+    // Other processes may run in other folders.
+    const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
+    return std::optional(
+        OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
+  }
+  return BeingWritten(data);
+}
+
 Result<LoadedSource> LoadSource(const DataSource& source, const std::function<void(int percent)>& tell) {
   if (source.load) {
     Result<LayeredVolume> loaded = source.load();
@@ -307,7 +342,7 @@ Result<LoadedSource> LoadSource(const DataSource& source, const std::function<vo
     if (!read.ok()) return read.status();
     return LoadedSource{std::move(read->volume), std::move(read->layers), std::make_shared<const FileStamp>(*stamp)};
   }
-  return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
+  return BeingWritten(source);
 }
 
 }  // namespace slabstream

@@ -14,13 +14,16 @@
 // Everything here may take as long as the file system does. Any thread.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
 #include "coordinator/data_source.h"
+#include "data/survey/survey.h"
 
 namespace slabstream {
 
@@ -60,6 +63,19 @@ Result<FoundData> ListFolder(const std::string& folder);
 // Reads the headers of all files. Adds an error for each named one that cannot be read. One in a folder may still be on its way: it gets
 // a complaint and stays.
 void CheckFiles(FoundData& found);
+
+// A volume that is read in parts, if it is to be: it has several levels, or more voxels than `most_bytes`. Null: it is to be read as a
+// whole.
+struct OpenedSource {
+  std::shared_ptr<VolumeSource> source;
+  Survey survey;
+  std::string text;           // where workers find it
+  std::uint64_t version = 0;  // VersionOf its files
+  std::shared_ptr<const FileStamp> stamp;
+};
+// Does not change between the two stamps that it takes, as LoadSource. Errors of OpenSource and SurveySource.
+Result<std::optional<OpenedSource>> OpenInParts(
+    const DataSource& source, std::uint64_t most_bytes, const std::function<void(int percent)>& tell = [](int) {});
 
 struct LoadedSource {
   std::shared_ptr<const Volume> volume;

@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,9 +14,21 @@
 #include "common/base/file_stamp.h"
 #include "common/base/status.h"
 #include "common/volume/layers.h"
+#include "common/volume/stored_at.h"
+#include "common/volume/summary.h"
 #include "data/layers/layer_reader.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
+
+// A level of a source that is open.
+struct SourceAtLevel {
+  std::shared_ptr<VolumeSource> source;           // never null
+  std::shared_ptr<const VolumeSummary> surveyed;  // Survey::summary
+  std::optional<int> surveyed_level = {};         // its level, if that is the survey's
+  StoredAt stored;                                // where workers find it
+  std::shared_ptr<const FileStamp> stamp;         // of its files
+};
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
 using DataLoader = std::function<Result<LayeredVolume>()>;
@@ -35,11 +48,12 @@ struct DataSource {
           return LayeredVolume{.volume = *std::move(volume)};
         }) {}
 
-  std::string path;              // a file, or a folder of slices; a named one may have options for reading it behind a question mark
-  std::string folder;            // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;             // of a named one
-  DataLoader load;               // set: `path` and `layers` are not used
-  std::uint64_t held_bytes = 0;  // of memory that it takes itself, whether it is loaded or not: a client has sent it
+  std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
+  std::string folder;  // the watched folder that it was found in; empty: it was named
+  LayerFiles layers;   // of a named one
+  std::shared_ptr<const SourceAtLevel> at_level = {};  // of one that has several: this one, which is loaded as a dataset of its own
+  DataLoader load;                                     // set: `path` and `layers` are not used
+  std::uint64_t held_bytes = 0;                        // of memory that it takes itself, whether it is loaded or not: a client has sent it
 };
 
 // By name.

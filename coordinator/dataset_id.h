@@ -11,5 +11,7 @@ namespace slabstream {
 
 // Reads every voxel once. Not 0.
 DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers = {});
+// Of voxels that nobody has read: their files have another version if they are other voxels. `name`: of the dataset, or of one level of it.
+DatasetId IdOf(const std::string& name, const VolumeDescription& description, const StoredAt& stored);
 
 }  // namespace slabstream

@@ -13,11 +13,18 @@ namespace slabstream {
 // ---------------------------------------------------------------- requests
 
 void DatasetMachine::State::On(const SeekDataset& event) {
-  if (datasets.folders.empty() && datasets.Find(event.name) == nullptr) {
-    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(event.name), &RefusedRequests::unknown_dataset};
+  const std::string& name = event.request->dataset;
+  if (IsLevelName(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
+    news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset};
     return;
   }
-  TellUse(*uses.insert_or_assign(event.use, Use{.name = event.name, .check = Seek(event.name)}).first);
+  const auto use = uses.insert_or_assign(event.use, Use{.request = event.request, .entry = name, .check = Seek(name)}).first;
+  if (const Status found = DescendUse(use->second); !found.ok()) {
+    news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
+    uses.erase(use);
+    return;
+  }
+  TellUse(*use);
 }
 
 void DatasetMachine::State::On(const KeepDataset& event) {
@@ -69,12 +76,25 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
   return 0;
 }
 
+// If its dataset has several levels and is open, it seeks the one that it draws. Errors of LevelOf.
+Status DatasetMachine::State::DescendUse(Use& use) {
+  const DatasetTable::Entry& entry = *datasets.Find(use.entry);
+  if (entry.state != DatasetState::kReady || entry.levels == nullptr) return Status::Ok();
+  const Result<int> level = LevelOf(*use.request, *entry.levels);
+  if (!level.ok()) return level.status();
+  use.entry = LevelName(use.request->dataset, *level);
+  use.check = Seek(use.entry);
+  return Status::Ok();
+}
+
 // Until a check has shown that the files have not changed, requests are planned for the voxels that are there.
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
-  const DatasetTable::Entry& entry = *datasets.Find(use.name);
-  if (entry.state == DatasetState::kReady) {
-    news.uses[id] = DatasetReady{entry.id, entry.summary, entry.checks.IsOver(use.check)};
+  const DatasetTable::Entry& entry = *datasets.Find(use.entry);
+  if (entry.state == DatasetState::kReady && entry.levels == nullptr) {
+    DatasetReady ready{.dataset = entry.id, .summary = entry.summary, .seen = entry.checks.IsOver(use.check)};
+    if (IsLevelName(use.entry)) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+    news.uses[id] = std::move(ready);
   } else {
     news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
   }
@@ -82,21 +102,22 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
 
 void DatasetMachine::State::TellUses(const std::string& name) {
   for (const auto& use : uses) {
-    if (use.second.name == name && !use.second.kept) TellUse(use);
+    if (use.second.entry == name && !use.second.kept) TellUse(use);
   }
 }
 
-// What waits for the dataset ends.
+// What waits for the dataset, or for a level of it, ends; or what waits for this level.
 void DatasetMachine::State::Lose(const std::string& name, const Status& why, RefusedAs as) {
+  const auto waits_for_it = [&](const auto& each) { return each.entry == name || DatasetOfLevel(each.entry) == name; };
   std::erase_if(uses, [&](const auto& each) {
     const auto& [id, use] = each;
-    if (use.name != name || use.kept) return false;
+    if (!waits_for_it(use) || use.kept) return false;
     news.uses[id] = DatasetLost{why, as};
     return true;
   });
   std::erase_if(questions, [&](const auto& each) {
     const OpenQuestion& open = each.second;
-    if (open.asked || DatasetOf(open.question) != name) return false;
+    if (open.asked || !waits_for_it(open)) return false;
     if (as != nullptr) ++(refused.*as);
     RefuseQuestion(open, why);
     return true;
@@ -104,8 +125,8 @@ void DatasetMachine::State::Lose(const std::string& name, const Status& why, Ref
 }
 
 bool DatasetMachine::State::IsWanted(const std::string& name) const {
-  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.name == name && !use.second.kept; }) ||
-         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && DatasetOf(open.second.question) == name; });
+  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.entry == name && !use.second.kept; }) ||
+         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.entry == name; });
 }
 
 bool DatasetMachine::State::InUse(DatasetId dataset) const {
@@ -114,15 +135,16 @@ bool DatasetMachine::State::InUse(DatasetId dataset) const {
     return entry != nullptr && entry->id == dataset;
   };
   return std::ranges::any_of(uses,
-                             [&](const auto& use) { return use.second.kept ? use.second.kept == dataset : is_of(use.second.name); }) ||
-         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && is_of(DatasetOf(open.second.question)); });
+                             [&](const auto& use) { return use.second.kept ? use.second.kept == dataset : is_of(use.second.entry); }) ||
+         std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && is_of(open.second.entry); });
 }
 
 // ---------------------------------------------------------------- voxels
 
 void DatasetMachine::State::LoadData(const std::string& name) {
   const LoadId load = datasets.BeginLoad(name, now);
-  actions.emplace_back(LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source});
+  actions.emplace_back(
+      LoadDataset{.name = name, .load = load, .source = datasets.Find(name)->source, .most_bytes = DatasetShare(config.memory_bytes)});
   TellUses(name);
 }
 
@@ -140,8 +162,9 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
     return;
   }
   const Index3& size = event.summary->description.geometry.size;
-  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is loaded: {} x {} x {} voxels, {}, {:.1f} ms", InQuotes(event.name), size.x,
-       size.y, size.z, MemoryText(event.bytes), std::chrono::duration<double, std::milli>(now - begun).count());
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "{} is {}: {} x {} x {} voxels, {}, {:.1f} ms", Named(event.name),
+       event.summary->stored && event.bytes == 0 ? "open, and its voxels stay where they are" : "loaded", size.x, size.y, size.z,
+       MemoryText(event.bytes), std::chrono::duration<double, std::milli>(now - begun).count());
   if (event.stamp == nullptr) datasets.Find(event.name)->checks.AnswerAll();
   CheckFilesOf(event.name);
   TellUses(event.name);
@@ -156,9 +179,28 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   UnloadOne();
 }
 
+void DatasetMachine::State::On(const DatasetOpened& event) {
+  const int count = int(event.levels->levels.size());
+  if (!datasets.Opened(event.name, event.load, event.levels, event.sources, event.stamp, now)) return;
+  const Index3& size = event.levels->levels.front().geometry.size;
+  Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is open: {} x {} x {} voxels at the finest of {} levels", InQuotes(event.name),
+       size.x, size.y, size.z, count);
+  datasets.Find(event.name)->checks.AnswerAll();  // levels are checked for themselves
+  for (auto next = uses.begin(); next != uses.end();) {
+    const auto each = next++;
+    auto& [id, use] = *each;
+    if (use.entry != event.name || use.kept) continue;
+    const Status found = DescendUse(use);
+    if (found.ok()) continue;
+    news.uses[id] = DatasetLost{found, &RefusedRequests::bad_request};
+    uses.erase(each);
+  }
+  for (int level = 0; level < count; ++level) TellUses(LevelName(event.name, level));
+}
+
 Status DatasetMachine::State::TooLarge(const std::string& name, std::uint64_t bytes, std::uint64_t others) const {
   return Status::ResourceExhausted(
-      fmt::format("dataset \"{}\" needs {}, limit {} ({} are in use by other datasets); the coordinator's --memory sets the limit", name,
+      fmt::format("{} needs {}, limit {} ({} are in use by other datasets); the coordinator's --memory sets the limit", Named(name),
                   MemoryText(bytes), MemoryText(DatasetShare(config.memory_bytes)), MemoryText(others)));
 }
 
@@ -171,12 +213,20 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
   datasets.Fail(name, status, now);
   const bool full = status.code() == StatusCode::kResourceExhausted;
   if (full && UnloadOne()) return LoadData(name);  // there may be room now
-  Tell(NoteAbout::kDatasets, LogLevel::kWarning, "dataset {} cannot be read: {}", InQuotes(name), status.message());
+  Tell(NoteAbout::kDatasets, LogLevel::kWarning, "{} cannot be read: {}", Named(name), status.message());
   Lose(name, status, full ? &RefusedRequests::too_large : nullptr);
 }
 
 // What the dataset is read from is not what it was. Frames that have begun go on with the voxels that they began with.
-void DatasetMachine::State::RenewData(const std::string& name) {
+// All levels of a dataset change together.
+void DatasetMachine::State::RenewData(const std::string& changed) {
+  const std::string name = DatasetOfLevel(changed);
+  for (auto& [id, use] : uses) {
+    if (DatasetOfLevel(use.entry) == name && !use.kept) use.entry = name;
+  }
+  for (auto& [id, open] : questions) {
+    if (DatasetOfLevel(open.entry) == name && !open.asked) open.entry = name;
+  }
   datasets.Reset(name, now);
   if (IsWanted(name)) LoadData(name);
 }
@@ -220,12 +270,12 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
   } else if (!event.changed.ok()) {
     FailData(event.name, event.changed.status());
   } else if (*event.changed) {
-    Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of dataset {} have changed: they are read anew", InQuotes(event.name));
+    Tell(NoteAbout::kDatasets, LogLevel::kInfo, "the files of {} have changed: they are read anew", Named(event.name));
     RenewData(event.name);
   } else {
     CheckFilesOf(event.name);
     for (auto& use : uses) {
-      if (use.second.check == 0 || use.second.name != event.name || !entry->checks.IsOver(use.second.check)) continue;
+      if (use.second.check == 0 || use.second.entry != event.name || !entry->checks.IsOver(use.second.check)) continue;
       use.second.check = 0;
       if (!use.second.kept) TellUse(use);
     }

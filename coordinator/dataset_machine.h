@@ -4,6 +4,7 @@
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
 //              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
 //              cannot be loaded for want of memory.
+//   levels     A dataset with several levels is only opened. A request seeks the level that it draws (LevelOf), and that one is loaded.
 //   files      A frame of a dataset begins only after a check of its files that began after the request came. If they have changed, they
 //              are read anew, and what has not begun waits. Frames that have begun end with the voxels that they began with, which stay
 //              until then. Watched folders are looked through every check_interval, and when somebody asks for a name that is not known;
@@ -71,6 +72,14 @@ struct DatasetLoaded {
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
   std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
 };
+// Of a dataset with several levels: none was loaded yet.
+struct DatasetOpened {
+  std::string name;
+  LoadId load = 0;
+  std::shared_ptr<const VolumeLevels> levels;  // never null
+  std::vector<DataSource> sources;             // of each level
+  std::shared_ptr<const FileStamp> stamp;      // as in DatasetLoaded
+};
 struct DatasetReading {  // not the end yet
   std::string name;
   LoadId load = 0;
@@ -113,15 +122,16 @@ struct UploadFinished {
   Result<DataSource> source;
 };
 struct DatasetTick {};
-using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetReading, DatasetFailed, DatasetSeen,
-                                  FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
+using DatasetEvent = std::variant<ToDatasets, ClientAsked, BadRequest, DatasetLoaded, DatasetOpened, DatasetReading, DatasetFailed,
+                                  DatasetSeen, FoldersSeen, DatasetsFound, QuestionAnswered, UploadBegun, UploadFinished, DatasetTick>;
 
 // ---- actions
-// -> DatasetLoaded or DatasetFailed
+// -> DatasetLoaded, DatasetOpened or DatasetFailed
 struct LoadDataset {
   std::string name;
   LoadId load = 0;
   DataSource source;
+  std::uint64_t most_bytes = 0;  // of voxels that are held; more stay where they are, if the source can be read in parts
 };
 // Its voxels are not needed any more.
 struct UnloadDataset {

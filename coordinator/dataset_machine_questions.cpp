@@ -7,7 +7,7 @@ namespace slabstream {
 
 void DatasetMachine::State::Ask(PeerToken client, Question question) {
   const std::string& name = DatasetOf(question);
-  OpenQuestion open{.client = client, .question = question};
+  OpenQuestion open{.client = client, .question = question, .entry = name};
   const auto of_client = std::ranges::count(questions, client, [](const auto& each) { return each.second.client; });
   if (std::size_t(of_client) >= kMaxOpenQuestions || questions.size() >= config.max_questions) {
     ++refused.over_quota;
@@ -16,7 +16,7 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
         open, Status::ResourceExhausted(fmt::format("{} questions are open, which is the limit of {}",
                                                     own ? std::size_t(of_client) : questions.size(), own ? "a client" : "the service")));
   }
-  if (datasets.folders.empty() && datasets.Find(name) == nullptr) {
+  if (IsLevelName(name) || (datasets.folders.empty() && datasets.Find(name) == nullptr)) {
     ++refused.unknown_dataset;
     return RefuseQuestion(open, datasets.NoSuchDataset(name));
   }
@@ -24,14 +24,48 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
   questions.emplace(++last_question, std::move(open));
 }
 
+// Of a dataset with several levels, that is open: a question about a picture is one about the level that it shows, any other one about the
+// finest level. Errors of LevelOf.
+Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
+  int level = 0;
+  if (auto* pick = std::get_if<PickQuery>(&open.question)) {
+    const Result<int> drawn = LevelOf(pick->frame, levels);
+    if (!drawn.ok()) return drawn.status();
+    level = *drawn;
+    pick->frame = AtLevel(pick->frame, levels.levels.front().geometry, levels.levels[std::size_t(level)].geometry);
+  }
+  open.entry = LevelName(open.entry, level);
+  open.check = Seek(open.entry);
+  return Status::Ok();
+}
+
 // What can be answered now.
 void DatasetMachine::State::AskExecutor() {
+  std::vector<std::pair<QuestionId, Status>> wrong;
   for (auto& [id, open] : questions) {
-    if (open.asked) continue;
-    const DatasetTable::Entry& entry = *datasets.Find(DatasetOf(open.question));
-    if (entry.state != DatasetState::kReady || !entry.checks.IsOver(open.check)) continue;
+    const auto can_be_asked = [this](const OpenQuestion& question) {
+      const DatasetTable::Entry& entry = *datasets.Find(question.entry);
+      return entry.state == DatasetState::kReady && entry.checks.IsOver(question.check);
+    };
+    if (open.asked || !can_be_asked(open)) continue;
+    const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
+    std::shared_ptr<const VolumeSummary> summary;
+    if (levels != nullptr && std::holds_alternative<SummaryQuery>(open.question)) {
+      summary = std::make_shared<const VolumeSummary>(StatisticsOf(*levels));
+    } else if (levels != nullptr) {
+      if (const Status found = DescendQuestion(open, *levels); !found.ok()) {
+        wrong.emplace_back(id, found);
+        continue;
+      }
+      if (!can_be_asked(open)) continue;
+    }
+    const DatasetTable::Entry& entry = *datasets.Find(open.entry);
     open.asked = true;
-    actions.emplace_back(AnswerQuestion{id, open.question, entry.id, entry.summary});
+    actions.emplace_back(AnswerQuestion{id, open.question, entry.id, summary != nullptr ? summary : entry.summary});
+  }
+  for (const auto& [id, why] : wrong) {
+    ++refused.bad_request;
+    RefuseQuestion(questions.extract(id).mapped(), why);
   }
 }
 

@@ -25,12 +25,19 @@ inline std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_by
 
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
+// Of an entry of the table, for messages: dataset "scan", or level 2 of dataset "scan".
+inline std::string Named(const std::string& entry) {
+  const std::string dataset = "dataset " + InQuotes(DatasetOfLevel(entry));
+  return IsLevelName(entry) ? "level " + entry.substr(entry.find('\n') + 1) + " of " + dataset : dataset;
+}
+
 struct DatasetMachine::State {
   explicit State(DatasetConfig c) : config(std::move(c)), datasets(config.datasets, config.folders) {}
 
   // A dataset that a request needs.
   struct Use {
-    std::string name;
+    std::shared_ptr<const FrameRequest> request;
+    std::string entry;              // of the table that it waits for: the dataset, or the level of it that it draws
     CheckId check = 0;              // at its files, which must be over before a frame begins; 0: none
     std::optional<DatasetId> kept;  // its frame has begun with these voxels
   };
@@ -45,7 +52,8 @@ struct DatasetMachine::State {
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    CheckId check = 0;   // as of a Use
+    std::string entry;   // as of a Use
+    CheckId check = 0;   // likewise
     bool asked = false;  // of the executor
   };
   // A dataset on its way from a client.
@@ -89,6 +97,7 @@ struct DatasetMachine::State {
   void On(const ClientAsked& event);
   void On(const BadRequest& event);
   void On(const DatasetLoaded& event);
+  void On(const DatasetOpened& event);
   void On(const DatasetReading& event);
   void On(const DatasetFailed& event);
   void On(const DatasetSeen& event);
@@ -111,6 +120,7 @@ struct DatasetMachine::State {
 
   // ---- requests
   CheckId Seek(const std::string& name);
+  Status DescendUse(Use& use);
   void TellUse(const std::pair<const UseId, Use>& use);
   void TellUses(const std::string& name);
   void Lose(const std::string& name, const Status& why, RefusedAs as = nullptr);
@@ -145,6 +155,7 @@ struct DatasetMachine::State {
 
   // ---- questions
   void Ask(PeerToken client, Question question);
+  Status DescendQuestion(OpenQuestion& open, const VolumeLevels& levels);
   void AskExecutor();
   void RefuseQuestion(const OpenQuestion& open, const Status& status);
 

@@ -23,13 +23,15 @@ DatasetTable::DatasetTable(Catalogue catalogue, std::set<std::string> watched) :
 }
 
 DatasetTable::Entry* DatasetTable::Find(const std::string& name) {
-  const auto entry = entries_.find(name);
-  return entry == entries_.end() ? nullptr : &entry->second;
+  auto& table = IsLevelName(name) ? levels_ : entries_;
+  const auto entry = table.find(name);
+  return entry == table.end() ? nullptr : &entry->second;
 }
 
 const DatasetTable::Entry* DatasetTable::Find(const std::string& name) const {
-  const auto entry = entries_.find(name);
-  return entry == entries_.end() ? nullptr : &entry->second;
+  const auto& table = IsLevelName(name) ? levels_ : entries_;
+  const auto entry = table.find(name);
+  return entry == table.end() ? nullptr : &entry->second;
 }
 
 bool DatasetTable::IsListed(const std::string& name) const {
@@ -66,9 +68,7 @@ std::vector<std::string> DatasetTable::Named(const std::string& name) const {
   return names;
 }
 
-void DatasetTable::ForEach(const std::function<void(const std::string&, Entry&)>& visit) {
-  for (auto& [name, entry] : entries_) visit(name, entry);
-}
+void DatasetTable::ForEach(const std::function<void(const std::string&, Entry&)>& visit) { VisitAll(*this, visit); }
 
 void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
   Entry& entry = entries_[name];
@@ -79,13 +79,22 @@ void DatasetTable::Add(const std::string& name, DataSource source, Time now) {
 void DatasetTable::Await(const std::string& name, CheckId check) { entries_[name].awaited = check; }
 
 void DatasetTable::Remove(const std::string& name) {
+  RemoveLevels(name);
   const auto entry = entries_.find(name);
   Retire(entry->second);
   entries_.erase(entry);
 }
 
+void DatasetTable::RemoveLevels(const std::string& name) {
+  std::erase_if(levels_, [&](const auto& each) {
+    if (DatasetOfLevel(each.first) != name) return false;
+    Retire(each.second);
+    return true;
+  });
+}
+
 LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
-  Entry& entry = entries_.at(name);
+  Entry& entry = *Find(name);
   CHECK(entry.state == DatasetState::kUnloaded || entry.state == DatasetState::kFailed) << name;
   entry.state = DatasetState::kLoading;
   entry.since = now;
@@ -94,7 +103,7 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   return entry.load = ++last_load_;
 }
 
-void DatasetTable::Use(const std::string& name) { entries_.at(name).last_use = ++uses_; }
+void DatasetTable::Use(const std::string& name) { Find(name)->last_use = ++uses_; }
 
 bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary,
                           std::uint64_t bytes, std::shared_ptr<const FileStamp> stamp, Time now) {
@@ -111,6 +120,20 @@ bool DatasetTable::Loaded(const std::string& name, LoadId load, DatasetId id, st
   return true;
 }
 
+bool DatasetTable::Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
+                          std::shared_ptr<const FileStamp> stamp, Time now) {
+  if (!IsLoading(name, load)) return false;
+  Entry& entry = *Find(name);
+  entry.state = DatasetState::kReady;
+  entry.since = now;
+  entry.levels = std::move(levels);
+  entry.stamp = std::move(stamp);
+  for (std::size_t level = 0; level < sources.size(); ++level) {
+    levels_[LevelName(name, int(level))] = {.source = std::move(sources[level]), .since = now};
+  }
+  return true;
+}
+
 bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
   const Entry* const entry = Find(name);
   return entry != nullptr && entry->state == DatasetState::kLoading && entry->load == load;
@@ -118,13 +141,14 @@ bool DatasetTable::IsLoading(const std::string& name, LoadId load) const {
 
 void DatasetTable::Fail(const std::string& name, const Status& status, Time now) {
   Reset(name, now);
-  Entry& entry = entries_.at(name);
+  Entry& entry = *Find(name);
   entry.state = DatasetState::kFailed;
   entry.error = status.message();
 }
 
 void DatasetTable::Reset(const std::string& name, Time now) {
-  Entry& entry = entries_.at(name);
+  RemoveLevels(name);
+  Entry& entry = *Find(name);
   Retire(entry);
   Entry fresh{.source = std::move(entry.source), .since = now, .load = entry.load, .last_use = entry.last_use, .checks = entry.checks};
   fresh.checks.End();
@@ -132,32 +156,33 @@ void DatasetTable::Reset(const std::string& name, Time now) {
 }
 
 void DatasetTable::Retire(const Entry& entry) {
-  if (entry.state == DatasetState::kReady) retired_[entry.id] = entry.source.held_bytes + entry.bytes;
+  if (entry.state == DatasetState::kReady && entry.levels == nullptr) retired_[entry.id] = entry.source.held_bytes + entry.bytes;
 }
 
 std::uint64_t DatasetTable::bytes() const {
   std::uint64_t total = 0;
-  for (const auto& [name, entry] : entries_) total += entry.source.held_bytes + entry.bytes;
+  VisitAll(*this, [&](const std::string&, const Entry& entry) { total += entry.source.held_bytes + entry.bytes; });
   for (const auto& [id, bytes] : retired_) total += bytes;
   return total;
 }
 
 bool DatasetTable::Holds(DatasetId dataset) const {
-  const auto is_it = [dataset](const auto& entry) { return entry.second.state == DatasetState::kReady && entry.second.id == dataset; };
-  return retired_.contains(dataset) || std::ranges::any_of(entries_, is_it);
+  bool held = retired_.contains(dataset);
+  VisitAll(*this, [&](const std::string&, const Entry& entry) { held |= entry.state == DatasetState::kReady && entry.id == dataset; });
+  return held;
 }
 
 std::optional<DatasetId> DatasetTable::UnloadOne(const std::function<bool(DatasetId)>& in_use, Time now) {
   const std::string* oldest = nullptr;
   std::uint64_t last_use = 0;
-  for (const auto& [name, entry] : entries_) {
-    const bool may_go = entry.state == DatasetState::kReady && entry.source.held_bytes == 0 && !in_use(entry.id);
-    if (!may_go || (oldest != nullptr && entry.last_use >= last_use)) continue;
+  VisitAll(*this, [&](const std::string& name, const Entry& entry) {
+    const bool held = entry.state == DatasetState::kReady && entry.levels == nullptr && entry.source.held_bytes == 0;
+    if (!held || in_use(entry.id) || (oldest != nullptr && entry.last_use >= last_use)) return;
     oldest = &name;
     last_use = entry.last_use;
-  }
+  });
   if (oldest == nullptr) return std::nullopt;
-  const DatasetId id = entries_.at(*oldest).id;
+  const DatasetId id = Find(*oldest)->id;
   Reset(*oldest, now);
   retired_.erase(id);
   return id;
@@ -180,7 +205,11 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
     DatasetStatus status{.name = name, .state = entry.state, .error = entry.error};
     const auto since = std::chrono::duration_cast<std::chrono::milliseconds>(now - entry.since);
     status.since_ms = std::uint64_t(std::max(since, std::chrono::milliseconds(0)).count());
-    if (entry.summary) {
+    if (entry.levels != nullptr) {
+      status.description = entry.levels->levels.front();
+      status.range = entry.levels->overview->range;
+      for (const auto& [level, of_level] : levels_) status.memory_bytes += DatasetOfLevel(level) == name ? of_level.bytes : 0;
+    } else if (entry.summary) {
       status.description = entry.summary->description;
       status.range = entry.summary->range;
       status.memory_bytes = entry.source.held_bytes + entry.bytes;

@@ -2,6 +2,9 @@
 // is tried again at the next request. Every load has a number, so that results of an earlier load are recognised. Loaded datasets that
 // nobody uses may be unloaded, the least recently used one first; they are loaded again when they are asked for.
 //
+// A dataset with several levels holds no voxels itself. Each level is an entry beside it (LevelName), which is loaded at its first use like
+// a dataset, and goes with it.
+//
 // Names come and go, and files change. Voxels that have left the table, but that frames are still rendered from, are retired:
 // they stay until no frame uses them.
 #pragma once
@@ -18,6 +21,7 @@
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/levels.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/check_counter.h"
 #include "coordinator/data_source.h"
@@ -25,6 +29,11 @@
 namespace slabstream {
 
 using LoadId = std::uint32_t;
+
+// The entry of a level. No dataset of a catalogue has such a name.
+inline std::string LevelName(const std::string& name, int level) { return name + '\n' + std::to_string(level); }
+inline bool IsLevelName(const std::string& name) { return name.find('\n') != std::string::npos; }
+inline std::string DatasetOfLevel(const std::string& name) { return name.substr(0, name.find('\n')); }
 
 class DatasetTable {
  public:
@@ -36,6 +45,7 @@ class DatasetTable {
     int percent = 0;                               // kLoading only: of its samples that have been read, as far as is known
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
+    std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary
     std::shared_ptr<const FileStamp> stamp;        // kReady only: of its files as they were read; null: they never change
     std::string error;                             // kFailed only
     std::uint64_t bytes = 0;                       // kReady only: memory of its voxels beside what the source holds
@@ -69,6 +79,9 @@ class DatasetTable {
   // The end of a load. False: another one was begun since, or none; nothing changes.
   bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes,
               std::shared_ptr<const FileStamp> stamp, Time now);
+  // The same of a dataset with several levels, which are entries from then on.
+  bool Opened(const std::string& name, LoadId load, std::shared_ptr<const VolumeLevels> levels, std::vector<DataSource> sources,
+              std::shared_ptr<const FileStamp> stamp, Time now);
   bool IsLoading(const std::string& name, LoadId load) const;
   // Both retire the voxels that it has. The first one as if it had never been loaded.
   void Reset(const std::string& name, Time now);
@@ -86,8 +99,15 @@ class DatasetTable {
 
  private:
   void Retire(const Entry& entry);
+  void RemoveLevels(const std::string& name);
+  template <class Table, class Visit>
+  static void VisitAll(Table& table, Visit&& visit) {
+    for (auto& [name, entry] : table.entries_) visit(name, entry);
+    for (auto& [name, entry] : table.levels_) visit(name, entry);
+  }
 
   std::map<std::string, Entry> entries_;
+  std::map<std::string, Entry> levels_;         // by LevelName
   std::map<DatasetId, std::uint64_t> retired_;  // and the memory of each
   LoadId last_load_ = 0;
   std::uint64_t uses_ = 0;

@@ -115,7 +115,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
   for (const Member& member : roster.members()) {
     if (member.leaving) continue;
     const Register& worker = member.description;
-    ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid});
+    ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid, worker.memory_bytes});
   }
   return ask;
 }

@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
+#include "common/planning/levels.h"
 #include "common/renderers/registry.h"
 #include "coordinator/frame_machine_state.h"
 
@@ -19,7 +22,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   request.needs_occupancy = request.uses_occupancy && !LeavesChoice(policy);
   request.use = ++last_use;
   queue.Push(std::move(request));
-  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, message.frame.dataset});
+  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, std::make_shared<const FrameRequest>(message.frame)});
 }
 
 void FrameMachine::State::On(const DatasetNews& event) {
@@ -50,8 +53,14 @@ void FrameMachine::State::On(const DatasetNews& event) {
 
 // Errors as of ResolveRequest.
 Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
-  Result<ResolvedRequest> resolved = ResolveRequest(request.submit.frame, ready.dataset, ready.summary);
+  const FrameRequest& asked = request.submit.frame;
+  if (!ready.finest && LevelNumber(asked.level).value_or(0) > 0) {
+    return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has level 0 alone", asked.level, asked.dataset));
+  }
+  Result<ResolvedRequest> resolved = ResolveRequest(
+      ready.finest ? AtLevel(asked, *ready.finest, ready.summary->description.geometry) : asked, ready.dataset, ready.summary);
   if (!resolved.ok()) return resolved.status();
+  if (resolved->summary->stored) request.uses_occupancy = request.needs_occupancy = false;  // nobody counts what nobody holds
   request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
   return Status::Ok();
 }

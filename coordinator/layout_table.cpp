@@ -39,8 +39,8 @@ std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volu
   return learnt != nullptr && learnt->cost.any() ? std::optional(learnt->cost) : std::nullopt;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots, bool counted) {
-  Key key{volume, policy, slots, !counted && NeedsOccupancy(AskFor(policy))};
+LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
+  Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target, !counted && NeedsOccupancy(AskFor(*request.policy))};
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
@@ -48,7 +48,7 @@ LayoutTable::Key LayoutTable::KeyOf(const ClassifiedVolume& volume, const Resolv
 
 std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
-  const Key key = KeyOf(*request.volume, policy, request.slots, request.occupied != nullptr);
+  const Key key = KeyOf(request, request.occupied != nullptr);
   std::unique_lock lock(mutex_);
   if (request.occupied != nullptr && FindLearnt(key.volume) == nullptr) {
     lock.unlock();
@@ -92,6 +92,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                            .volume = request.volume,
                            .policy = &policy,
                            .slots = request.slots,
+                           .box_bytes_target = request.box_bytes_target,
                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                            .stop = request.stop};
   const bool rebalance = present != nullptr && policy.dynamic_balance;
@@ -121,7 +122,7 @@ std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock || policy.dynamic_balance) return nullptr;
-  const auto found = std::ranges::find(entries_, KeyOf(*request.volume, policy, request.slots, true), &Entry::key);
+  const auto found = std::ranges::find(entries_, KeyOf(request, true), &Entry::key);
   if (found == entries_.end()) return nullptr;
   if (policy.balance_by == BalanceBy::kCost && !found->by_cost) return nullptr;
   entries_.splice(entries_.begin(), entries_, found);
@@ -143,11 +144,14 @@ void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, c
                         std::span<const RankReport> reports) {
   const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
   if (seconds.empty()) return;
-  const Key key = KeyOf(volume, policy, plan.slots, true);
+  Key key = KeyOf({.policy = &policy, .volume = &volume, .slots = plan.slots}, true);
   const std::lock_guard lock(mutex_);
   Learnt* const learnt = FindLearnt(volume);
   if (learnt == nullptr) return;
-  const auto is_of = [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); };
+  const auto is_of = [&](const Entry& e) {
+    key.box_bytes_target = e.key.box_bytes_target;  // the layout tells
+    return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout);
+  };
   const auto entry = std::ranges::find_if(entries_, is_of);
   // The first frame of a layout counts most; a frame of a layout that has been changed since counts as an average one.
   double weight = kLeastWeight;

@@ -20,6 +20,7 @@
 
 #include "common/planning/classified_volume.h"
 #include "common/planning/frame_plan.h"
+#include "common/planning/layout.h"
 #include "common/planning/measured_cost.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
@@ -42,11 +43,12 @@ class LayoutTable {
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it, or begins without it
     std::uint32_t slots = 1;
+    std::int64_t box_bytes_target = kBoxBytesTarget;
     std::stop_token stop = {};  // told to stop, Find returns soon
   };
   // The layout to plan the frame with; null: it was stopped.
   std::shared_ptr<const Layout> Find(const Request& request);
-  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume and slots alone. Does not wait for other threads.
+  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots and box_bytes_target alone. Does not wait for other threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
   // Measured costs: seconds.
@@ -61,11 +63,12 @@ class LayoutTable {
     ClassifiedVolume volume;
     ResolvedPolicy policy;
     std::uint32_t slots = 1;
+    std::int64_t box_bytes_target = kBoxBytesTarget;
     bool by_bricks = false;  // the policy needs occupied voxels, but they were not counted yet
     friend bool operator==(const Key&, const Key&) = default;
   };
   // Combining moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(const ClassifiedVolume& volume, const ResolvedPolicy& policy, std::uint32_t slots, bool counted);
+  static Key KeyOf(const Request& request, bool counted);
   struct Entry {
     Key key;
     std::shared_ptr<const Layout> layout;

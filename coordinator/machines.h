@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -46,7 +47,7 @@ struct Note {
 using UseId = std::uint64_t;  // of a request's dataset; from 1, never given twice
 struct SeekDataset {
   UseId use = 0;
-  std::string name;
+  std::shared_ptr<const FrameRequest> request;  // never null
 };
 struct KeepDataset {
   UseId use = 0;
@@ -75,6 +76,7 @@ struct DatasetAwaited {
 struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
+  std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

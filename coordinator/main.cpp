@@ -75,6 +75,7 @@ int Run(int argc, char** argv) {
     options.folders = {found.folders.begin(), found.folders.end()};
     options.machine.log_level = LeastLogLevel();
     LimitMemory(options.machine.memory_bytes);
+    SetReadMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options));
   });

@@ -1,12 +1,25 @@
 #include "coordinator/planner.h"
 
+#include <algorithm>
 #include <exception>
+#include <span>
 #include <utility>
 
 #include "common/base/guarded.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/worker_memory.h"
 
 namespace slabstream {
+namespace {
+
+// The worker with the least memory decides: any box may come to it after a loss.
+std::int64_t BoxTarget(const FrameSetup& setup, std::span<const HostedWorker> workers) {
+  std::int64_t target = kBoxBytesTarget;
+  for (const HostedWorker& worker : workers) target = std::min(target, BoxBytesFor(setup, worker.memory_bytes));
+  return target;
+}
+
+}  // namespace
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& request) {
   return Guarded("planning", [&] { return TryPlan(request); });
@@ -17,11 +30,13 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
-  std::shared_ptr<const Layout> layout =
-      layouts_.FindMade({.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots)});
-  if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
+  std::shared_ptr<const Layout> layout = layouts_.FindMade({.policy = &*resolved.policy,
+                                                            .volume = &resolved.volume,
+                                                            .slots = std::uint32_t(slots),
+                                                            .box_bytes_target = BoxTarget(*setup, request.workers)});
+  if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
   return WithLayout({.asked = request, .policy = *resolved.policy}, *std::move(setup), std::move(layout));
 } catch (const std::exception&) {
   return std::nullopt;  // Plan meets the same and says what it is
@@ -33,7 +48,11 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   if (!setup.ok()) return setup.status();
   PlannedFrame planned{.asked = request};
   const MachineModel machine = ServiceMachine(request.workers, surroundings_);
-  if (LeavesChoice(resolved.frame.policy, machine, request.roster.slots.size())) {
+  const std::size_t slots = request.roster.slots.size();
+  if (setup->stored && LeavesChoice(resolved.frame.policy, machine, slots)) {
+    // Nothing is known of the work in voxels that nobody has read.
+    planned.policy = ResolvePolicy(FirstPolicy(resolved.frame.policy, slots), setup->description.geometry);
+  } else if (LeavesChoice(resolved.frame.policy, machine, slots)) {
     ChosenPolicy chosen = policies_.Find(request, machine, layouts_);
     planned.policy = std::move(chosen.policy);
     if (!chosen.chosen) planned.asked.occupied = nullptr;
@@ -46,7 +65,8 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .volume = &resolved.volume,
                                                         .summary = resolved.summary.get(),
                                                         .occupied = planned.asked.occupied,
-                                                        .slots = std::uint32_t(request.roster.slots.size()),
+                                                        .slots = std::uint32_t(slots),
+                                                        .box_bytes_target = BoxTarget(*setup, request.workers),
                                                         .stop = request.stop});
   if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
   return WithLayout(std::move(planned), *std::move(setup), std::move(layout));

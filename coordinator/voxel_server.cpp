@@ -13,6 +13,7 @@
 #include "common/base/log.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
+#include "data/sources/read_part.h"
 
 namespace slabstream {
 namespace {
@@ -48,7 +49,7 @@ VoxelServer::VoxelServer(Socket socket, std::string endpoint, Epoch epoch, Codec
 
 VoxelServer::~VoxelServer() {
   thread_.request_stop();
-  wakeup_.Notify();
+  read_->wakeup().Notify();
   thread_.join();
 }
 
@@ -77,7 +78,7 @@ void VoxelServer::EndConnections(const std::string& user) {
     const std::lock_guard lock(mutex_);
     unwanted_.push_back(user);
   }
-  wakeup_.Notify();
+  read_->wakeup().Notify();
 }
 
 std::vector<std::string> VoxelServer::TakeUnwanted() {
@@ -128,8 +129,13 @@ Status VoxelServer::Check(const ChunkRequest& request, const Samples& samples) {
 void VoxelServer::Run(const std::stop_token& stop) {
   const std::array<Socket*, 1> sockets = {&socket_};
   while (!stop.stop_requested()) {
-    Wait(sockets, &wakeup_, std::chrono::minutes(1));
+    Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
     for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
+    for (ReadDone& done : read_->TakeAll()) {
+      --reading_;
+      Reply(done.asked.identity, done.asked.request, std::move(done.answer));
+    }
+    ReadNext();
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
@@ -144,22 +150,53 @@ void VoxelServer::Answer(const Incoming& incoming) {
   if (!decoded.ok()) return complaints_.Warning("voxels plane: dropped a message: " + decoded.status().message());
   const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
   if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
-  const Status served = Guarded("chunk request", [&] {
-    const Samples samples = Find(request.dataset);
-    if (Status status = Check(request, samples); !status.ok()) return status;
-    Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-    Result<Bytes> cut = IsCellChunk(request.chunk) ? CutCells(samples, request, chunk)
-                                                   : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
-    if (!cut.ok()) return cut.status();
-    const Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
-    const Status sent = socket_.Send(incoming.identity, Encode(chunk), payload);
+  const Samples samples = Find(request.dataset);
+  if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
+  if (samples.in_parts.source != nullptr) {
+    waiting_.push_back({incoming.identity, request, samples.in_parts});
+    return ReadNext();
+  }
+  Reply(incoming.identity, request, Guarded("chunk request", [&]() -> Result<std::pair<Chunk, Bytes>> {
+          Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+          Result<Bytes> cut = IsCellChunk(request.chunk)
+                                  ? CutCells(samples, request, chunk)
+                                  : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
+          if (!cut.ok()) return cut.status();
+          Bytes payload = PackChunk(*std::move(cut), codec_, chunk);
+          return std::pair(chunk, std::move(payload));
+        }));
+}
+
+void VoxelServer::ReadNext() {
+  while (!waiting_.empty() && reading_ < kReadAtOnce) {
+    Asked asked = std::move(waiting_.front());
+    waiting_.pop_front();
+    ++reading_;
+    const auto [source, level] = asked.from;
+    const ChunkRequest request = asked.request;
+    const ChunkPart part = PartOfChunk(request.box, asked.from.description().type, request.chunk);
+    ReadPart(source, level, request.box, part.begin, part.bytes,
+             [inbox = read_, codec = codec_, epoch = epoch_, asked = std::move(asked)](Result<Bytes> samples) {
+               auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
+                 if (!samples.ok()) return samples.status();
+                 Chunk chunk{.epoch = epoch, .dataset = asked.request.dataset, .box = asked.request.box, .chunk = asked.request.chunk};
+                 Bytes payload = PackChunk(*std::move(samples), codec, chunk);
+                 return std::pair(chunk, std::move(payload));
+               });
+               inbox->Post({asked, std::move(answer)});
+             });
+  }
+}
+
+void VoxelServer::Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer) {
+  if (answer.ok()) {
+    const Status sent = socket_.Send(identity, Encode(answer->first), answer->second);
     if (!sent.ok()) LogDebug("voxels plane: " + sent.message());  // it has gone, or asks again when its request times out
-    return Status::Ok();
-  });
-  if (served.ok()) return;
-  complaints_.Warning(served.message());
-  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, AsWorkersSee(served)};
-  (void)socket_.Send(incoming.identity, Encode(refused));  // a worker that has gone needs no refusal
+    return;
+  }
+  complaints_.Warning(answer.status().message());
+  const ChunkRefused refused{epoch_, request.dataset, request.box, request.chunk, AsWorkersSee(answer.status())};
+  (void)socket_.Send(identity, Encode(refused));  // a worker that has gone needs no refusal
 }
 
 }  // namespace slabstream

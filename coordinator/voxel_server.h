@@ -1,27 +1,34 @@
 // VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
 // volumes.
 //
+// Voxels of sources that are read in parts are read when they are asked for, kReadAtOnce chunks at a time; other requests do not wait for
+// them.
+//
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
 // refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,
 // except over inproc: they are raw there, and those of a whole volume refer to its own memory.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "common/base/check.h"
 #include "common/base/limited_log.h"
 #include "common/base/status.h"
+#include "common/transport/mailbox.h"
 #include "common/transport/socket.h"
 #include "common/volume/bricks.h"
 #include "common/volume/layers.h"
 #include "common/wire/any_message.h"
 #include "coordinator/cell_bytes.h"
 #include "coordinator/chunk_buffers.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
 
@@ -36,25 +43,35 @@ class VoxelServer {
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
     std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
     std::shared_ptr<const MeshCutter> cells = nullptr;  // of an unstructured grid
+    // Instead of all that: a level of a source, of which nothing is held.
+    struct InParts {
+      std::shared_ptr<VolumeSource> source = nullptr;
+      int level = 0;
+      const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
+    } in_parts = {};
 
-    bool any() const { return volume != nullptr || bricks != nullptr; }
+    bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().
-    const Box& box() const {
+    Box box() const {
       CHECK(any());
+      if (in_parts.source != nullptr) return in_parts.description().geometry.bounds();
       return volume != nullptr ? volume->block.box : bricks->grid().box;
     }
     std::uint64_t bytes() const {
+      if (in_parts.source != nullptr) return 0;
       const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
       const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes();
       return of_layers + of_cells + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
     SampleTypes types() const {
+      if (in_parts.source != nullptr) return in_parts.description().type;
       LayerTypes layers;
       if (labels != nullptr) layers.labels = labels->type();
       if (overlay != nullptr) layers.overlay = overlay->type();
       layers.cells = cells != nullptr;
       return {volume != nullptr ? volume->block.type : bricks->type(), layers};
     }
+    // Not in_parts.
     VoxelBricks view() const { return volume != nullptr ? VoxelBricks(volume->block) : VoxelBricks(*bricks); }
   };
 
@@ -79,10 +96,24 @@ class VoxelServer {
   void Run(const std::stop_token& stop);
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
+  // Of voxels that are read first: Reply follows when they are there.
+  void ReadNext();
+  void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
   // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
   Result<Bytes> CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk);
   static Status Check(const ChunkRequest& request, const Samples& samples);  // why it cannot be met, or ok
+
+  struct Asked {
+    std::string identity;
+    ChunkRequest request;
+    Samples::InParts from;
+  };
+  struct ReadDone {
+    Asked asked;
+    Result<std::pair<Chunk, Bytes>> answer;
+  };
+  static constexpr std::size_t kReadAtOnce = 32;  // chunks, which are in memory until they are sent
 
   const std::string endpoint_;
   const Epoch epoch_;
@@ -93,9 +124,11 @@ class VoxelServer {
   ChunkBuffers buffers_;                  // the thread's
   CellBytes cell_bytes_;                  // the thread's
   LimitedLog complaints_;                 // the thread's
-  Wakeup wakeup_;
-  Socket socket_;        // the thread's
-  std::jthread thread_;  // last member
+  std::deque<Asked> waiting_;             // the thread's; to be read
+  std::size_t reading_ = 0;               // the thread's
+  const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
+  Socket socket_;                                                                          // the thread's
+  std::jthread thread_;                                                                    // last member
 };
 
 }  // namespace slabstream

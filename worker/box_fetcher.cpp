@@ -8,6 +8,23 @@
 #include "common/volume/box_assembly.h"
 
 namespace slabstream {
+namespace {
+
+// Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings.
+std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types) {
+  Index3 block = stored.block.end;
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < kMaxVolumeSide / 2) block[axis] *= 2;
+  }
+  std::vector<Box> pieces;
+  for (const Box& box : boxes) {
+    const std::vector<Box> of_box = CutAtBlocks(box, block);
+    pieces.insert(pieces.end(), of_box.begin(), of_box.end());
+  }
+  return pieces;
+}
+
+}  // namespace
 
 std::uint32_t BoxFetcher::HeldBox::BytesOf(const ChunkPlace& chunk) const {
   if (!IsCellChunk(chunk.chunk)) return BytesOfChunk(chunk.box, key.types, chunk.chunk);
@@ -28,7 +45,8 @@ BoxFetcher::HeldBox* BoxFetcher::FindRequested(DatasetId dataset, const ChunkPla
   return nullptr;
 }
 
-BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, WorkerActions& actions) {
+BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, const SampleTypes& types,
+                                           const std::optional<StoredAt>& stored, WorkerActions& actions) {
   HeldBox* best = nullptr;
   for (auto& [generation, padded] : boxes_) {
     if (padded.retired || padded.key.dataset != dataset || padded.key.types != types || !padded.key.box.Contains(box)) continue;
@@ -38,6 +56,7 @@ BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, co
     const Generation generation = ++last_generation_;
     best = &boxes_[generation];
     best->key = {dataset, box, types, generation};
+    if (stored) best->stored_at = std::make_shared<const StoredAt>(*stored);
     best->bytes = best->RawBytes();
     cached_bytes_ += best->bytes;
     best->pins = 1;
@@ -72,7 +91,7 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
     ++source.pins;
     padded.sources.push_back(source.key.generation);
   }
-  for (const Box& box : assembly.missing) {
+  for (const Box& box : padded.stored_at == nullptr ? assembly.missing : InBlocks(assembly.missing, *padded.stored_at, padded.key.types)) {
     for (std::uint32_t chunk = 0; chunk < ChunkCount(box, padded.key.types); ++chunk) padded.missing.push_back({box, chunk});
   }
   if (padded.key.types.layers.cells) padded.missing.push_back({padded.key.box, kFirstCellChunk});
@@ -143,7 +162,7 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         in_flight_bytes += bytes;
         if (!padded.requested) padded.report.begin = now;
         padded.requested = true;
-        actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}});
+        actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
       }
     }
   }

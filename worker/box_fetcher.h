@@ -17,6 +17,8 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -43,7 +45,9 @@ class BoxFetcher {
 
   void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all padded boxes, those in use too; without a call there is no limit
 
-  Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, WorkerActions& actions);
+  // `stored`: where the voxels can be read (FrameSetup::stored). What is missing is then asked for block by block.
+  Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
+                     WorkerActions& actions);
   void Release(Generation padded);  // once for each Acquire
   // Of acquired padded boxes.
   bool complete(Generation padded) const { return boxes_.at(padded).is_complete(); }  // all that must be fetched is stored
@@ -73,6 +77,9 @@ class BoxFetcher {
   void Trim(WorkerActions& actions);
 
   std::uint64_t cached_bytes() const { return cached_bytes_; }
+  bool reads_stored() const {
+    return std::ranges::any_of(boxes_, [](const auto& box) { return box.second.stored_at != nullptr; });
+  }
   std::uint64_t fetched_bytes() const { return fetched_bytes_; }
   std::size_t size() const { return boxes_.size(); }
   std::size_t chunk_requests() const { return in_flight_.size(); }
@@ -86,6 +93,7 @@ class BoxFetcher {
   };
   struct HeldBox {
     BoxKey key;
+    std::shared_ptr<const StoredAt> stored_at = nullptr;  // null: the coordinator holds the voxels
     int pins = 0;
     bool retired = false;  // not to be acquired again; dropped when unpinned
     std::uint64_t bytes = 0;

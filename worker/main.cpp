@@ -11,6 +11,7 @@
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
+#include "data/open/any_volume.h"
 #include "common/kernels/simd_target.h"
 #include "common/service/service_file.h"
 #include "common/transport/socket.h"
@@ -85,6 +86,7 @@ int Run(int argc, char** argv) {
     }
     options.machine.compression = *ParseCompression(compress);
     options.share_memory = !frames_only;
+    SetReadMemory(options.machine.memory_bytes);
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;
     return Serve(std::move(options));
   });

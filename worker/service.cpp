@@ -25,6 +25,7 @@
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
+#include "worker/stored_voxels.h"
 
 namespace slabstream {
 namespace {
@@ -120,6 +121,7 @@ struct WorkerService::Impl {
   bool stop_now = false;           // set by the machine
   LimitedLog complaints;           // about messages
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
+  StoredVoxels stored_voxels{[this](MessageReceived message) { outbox.Post(WorkerEvent(std::move(message))); }};
   std::optional<Executor> executor;
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
@@ -272,6 +274,7 @@ void WorkerService::Impl::Perform(StopProcess& action) {
 }
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
+  if (action.stored != nullptr && stored_voxels.Read(action.request, *action.stored)) return;
   if (voxels) Send(*voxels, action.request);
 }
 

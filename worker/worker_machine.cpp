@@ -476,7 +476,7 @@ void WorkerMachine::State::Tend() {
 
 // What the images of the present frames leave of memory_bytes.
 std::uint64_t WorkerMachine::State::RoomForVoxels() const {
-  std::uint64_t taken = kIdleMemoryBytes;
+  std::uint64_t taken = kIdleMemoryBytes + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
   for (const auto& [id, frame] : frames) {
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
     taken += frame.group_bytes * std::uint64_t(runs) + (frame.accumulator ? frame.picture_bytes : 0);

@@ -163,8 +163,10 @@ using WorkerEvent = std::variant<MessageReceived, ImageUnreadable, ChunkStored, 
 struct SendControl {
   WorkerToCoordinator message;
 };
+// To the coordinator, unless the executor reads the chunk itself.
 struct SendChunkRequest {
   ChunkRequest request;
+  std::shared_ptr<const StoredAt> stored = nullptr;  // where the voxels are; null: the coordinator holds them
 };
 struct ConnectVoxels {
   std::string endpoint;

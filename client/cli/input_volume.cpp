@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+
 namespace slabstream {
 
 Status CheckInputVolume(const std::string& source) {
@@ -10,7 +13,7 @@ Status CheckInputVolume(const std::string& source) {
 }
 
 Status CheckInputVolume(const SourceText& source) {
-  const Status status = CheckVolume(source.path, source.options);
+  const Status status = CheckAnyVolume(source.path, source.options);
   return status.ok() ? status : Status(status.code(), "SOURCE " + status.message());
 }
 
@@ -18,7 +21,12 @@ Status CheckInputHeaders(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
   if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
-  return AsInput(CheckVolumeHeaders(parsed->path, parsed->options).status());
+  return AsInput(CheckAnyVolumeHeaders(parsed->path, parsed->options).status());
+}
+
+bool CanBeReadInParts(const std::string& source) {
+  const Result<SourceText> parsed = ParseSourceText(source);
+  return parsed.ok() && FindSourceFormat(parsed->path) != nullptr;
 }
 
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
@@ -30,7 +38,7 @@ Result<LoadedVolume> ReadInputVolume(const std::string& source) {
 }
 
 Result<LoadedVolume> ReadInputVolume(const SourceText& source) {
-  Result<LoadedVolume> loaded = ReadVolume(source.path, source.options);
+  Result<LoadedVolume> loaded = ReadAnyVolume(source.path, source.options);
   if (!loaded.ok()) return AsInput(loaded.status());
   return loaded;
 }

@@ -18,6 +18,9 @@ Status CheckInputVolume(const SourceText& source);
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
 Status CheckInputHeaders(const std::string& source);
 
+// Whether it may be larger than the memory (data/sources).
+bool CanBeReadInParts(const std::string& source);
+
 // A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
 Status AsInput(const Status& status);
 

@@ -11,6 +11,7 @@
 #include "common/base/printable.h"
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
 
 namespace slabstream {
 namespace {
@@ -55,7 +56,11 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
-    files.emplace_back([source, layers] { return LoadInput(source, layers); });
+    if (CanBeReadInParts(source) && !layers.any()) {
+      files.emplace_back(source, "");
+    } else {
+      files.emplace_back([source, layers] { return LoadInput(source, layers); });
+    }
   }
   if (layers.any()) {
     if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
@@ -84,6 +89,7 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
     options.coordinator.machine.memory_bytes = shares->coordinator;
     options.worker.memory_bytes = shares->worker;
     LimitMemory(connection.local_memory);
+    SetReadMemory(shares->worker * std::uint64_t(connection.local_workers));
   }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();

@@ -44,4 +44,10 @@ Partition::Partition(const Box& bounds, std::vector<Node> nodes) : bounds_(bound
   CHECK(std::find(reached.begin(), reached.end(), false) == reached.end()) << "a node hangs from no plane";
 }
 
+Partition Partition::OfBlocks(const Index3& block, const Box& bounds) const {
+  std::vector<Node> nodes = nodes_;
+  for (Node& node : nodes) node.position *= block[node.axis];
+  return Partition(bounds, std::move(nodes));
+}
+
 }  // namespace slabstream

@@ -31,6 +31,10 @@ class Partition {
   // `nodes[0]` is the root. CHECKs that the leaves tile `bounds`.
   Partition(const Box& bounds, std::vector<Node> nodes);
 
+  // The same partition of a volume that is cut in blocks: this one counts blocks of `block` voxels, and `bounds` holds as many, the last ones
+  // cut off.
+  Partition OfBlocks(const Index3& block, const Box& bounds) const;
+
   const Box& bounds() const { return bounds_; }
   std::span<const Box> boxes() const { return boxes_; }  // by BoxId
   std::span<const Node> nodes() const { return nodes_; }

@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/parse_number.h"
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/frame/layer_look.h"
@@ -24,6 +25,7 @@ namespace slabstream {
 inline constexpr int kMaxGroups = 1024, kMaxTeams = 1024;
 inline constexpr double kDefaultTermination = 1.0 / 1024, kMaxTermination = 0.5;
 inline constexpr double kMaxPixelError = 0.1;
+inline constexpr int kMaxLevels = 64;  // of a dataset
 inline constexpr std::size_t kMaxNameBytes = 256;
 inline constexpr std::string_view kAutomatic = "auto";  // in place of a name: the service chooses
 
@@ -73,6 +75,13 @@ struct OverlayChoice {
 using ParameterTexts = std::map<std::string, std::string, std::less<>>;
 inline constexpr std::size_t kMaxParameters = 32;
 
+// The number of a level; none: the text is kAutomatic, or neither (IsLevel).
+inline std::optional<int> LevelNumber(std::string_view text) {
+  const std::optional<int> number = ParseNumber<int>(text);
+  return number && *number >= 0 && *number < kMaxLevels ? number : std::nullopt;
+}
+inline bool IsLevel(std::string_view text) { return text == kAutomatic || LevelNumber(text); }
+
 struct FrameRequest {
   std::string dataset;               // a name of the catalogue, 1 ... kMaxNameBytes
   std::string renderer{kAutomatic};  // a name of Renderers() (common/renderers/registry.h), or kAutomatic: by the dataset (RenderersFor)
@@ -86,6 +95,9 @@ struct FrameRequest {
   Shading shading;
   double brightness = 1;                     // [0, 10]: factor of the colours of the transfer function and isosurfaces
   double termination = kDefaultTermination;  // [0, kMaxTermination]: transmittance below which what lies behind is skipped; 0: never
+  // Which level of a dataset that has several is drawn (common/planning/levels.h).
+  double detail = 1;              // [0.01, 1000]: the coarsest one whose voxels are at most so many pixels wide
+  std::string level{kAutomatic};  // the number of a level, in [0, kMaxLevels); kAutomatic: as `detail` says
   Policy policy;
   bool previews = false;  // a picture after each group
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;

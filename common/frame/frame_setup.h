@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/classification/transfer_function.h"
@@ -13,6 +14,7 @@
 #include "common/image/pixel_format.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/layers.h"
+#include "common/volume/stored_at.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -26,6 +28,7 @@ struct FrameSetup {
   VolumeDescription description;
   LayerTypes layers;                        // that the dataset has
   ValueRange range;                         // data values that the classification table is made for
+  std::optional<StoredAt> stored = {};      // none: the coordinator holds the voxels
   const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
   std::vector<double> parameters;           // one value for each of renderer->parameters()
   PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers

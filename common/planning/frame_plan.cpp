@@ -20,6 +20,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   setup.description = summary.description;
   setup.layers = summary.layers();
   setup.range = summary.range;
+  setup.stored = summary.stored;
   SetRenderer(*resolved.volume.renderer(), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   const VolumeGeometry& geometry = summary.description.geometry;

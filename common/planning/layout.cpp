@@ -42,7 +42,9 @@ class WorkFields {
         clip_(request.volume->clip()),
         voxels_(WorkField::Uniform(request.summary->description.geometry.size)) {}
 
+  // Nothing is known of the work in voxels that nobody has read.
   const WorkField& Of(BalanceBy metric) {
+    if (request_.summary->stored) return voxels_;
     if (metric == BalanceBy::kVoxels) return voxels_;
     if (metric == BalanceBy::kCost && request_.known.cost != nullptr) return *request_.known.cost;
     if (!occupied_) occupied_.emplace(Grid());
@@ -62,7 +64,7 @@ class WorkFields {
   bool Shows(const Box& box) {
     if (!clip_.MayKeep(box)) return false;
     const Box with_halo = Grown(box, request_.volume->renderer()->reach(), request_.summary->description.geometry.bounds());
-    if (request_.known.occupied == nullptr) return visibility_.AnyVisible(with_halo);
+    if (request_.known.occupied == nullptr || request_.summary->stored) return visibility_.AnyVisible(with_halo);
     return !Of(BalanceBy::kOccupied).Hull(with_halo).empty();
   }
 
@@ -94,6 +96,33 @@ struct LayoutMaker::State {
                                        .shape = shape});
   }
 
+  // Boxes of voxels that are read in parts end where blocks of their source end, so that few blocks are read for two boxes. The
+  // decomposition of the policy divides the volume in blocks; if its boxes are too large, cubes of blocks do.
+  Partition MakeStoredPartition(const ResolvedPolicy& policy) {
+    const Box bounds = request.summary->description.geometry.bounds();
+    const Index3 block = request.summary->stored->block.end;
+    const Index3 blocks = {(bounds.end.x - 1) / block.x + 1, (bounds.end.y - 1) / block.y + 1, (bounds.end.z - 1) / block.z + 1};
+    const std::int64_t slots = request.slots;
+    const std::int64_t bytes = bounds.voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
+    const int least = int(std::clamp<std::int64_t>(bytes / (request.box_bytes_target * slots), 1, kMaxGroups));
+    std::optional<Partition> made;
+    for (const auto make : {policy.decomposition->make, &MakeSubcubes}) {
+      const WorkField work = WorkField::Uniform(blocks);
+      for (int groups = policy.groups > 0 ? policy.groups : least; groups <= kMaxGroups; groups += std::max(1, groups / 8)) {
+        const auto boxes = std::int64_t(groups) * slots;
+        if (made && boxes > std::int64_t(CountIn(blocks))) break;
+        made = make({.work = &work,
+                     .boxes = int(std::min({boxes, std::int64_t(CountIn(blocks)), kMostBoxes})),
+                     .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
+                     .together = int(std::min(slots, kMostBoxes)),
+                     .axis = policy.axis})
+                   .OfBlocks(block, bounds);
+        if (stopped() || policy.groups > 0 || BoxesFit(*made)) return *std::move(made);
+      }
+    }
+    return *std::move(made);
+  }
+
   bool stopped() const { return request.stop.stop_requested(); }
 
   bool BoxesFit(const Partition& partition) {
@@ -123,10 +152,11 @@ struct LayoutMaker::State {
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
     std::vector<BoxId> filled;
     std::vector<double> box_costs;
+    const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
     for (BoxId box = 0; box < partition.boxes().size(); ++box) {
       if (!fields.Shows(partition.boxes()[box])) continue;
       filled.push_back(box);
-      box_costs.push_back(policy.assignment->by_cost ? MeanSeconds(partition.boxes()[box]) : 1);
+      box_costs.push_back(by_cost ? MeanSeconds(partition.boxes()[box]) : 1);
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
@@ -216,6 +246,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
+  if (state_->request.summary->stored) return state_->Assign(state_->MakeStoredPartition(policy), policy);
   const BalanceBy metric = policy.balance_by;
   const int groups = FewestGroups(policy);
   if (metric == BalanceBy::kOccupied || (metric == BalanceBy::kCost && state_->request.known.cost == nullptr)) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <map>
 #include <string>
 
@@ -99,6 +100,15 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary) {
   return bytes + BytesOfCells(padded, summary);
 }
 
+std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
+  if (limit == 0) return kBoxBytesTarget;
+  constexpr std::uint64_t kImages = 4;      // of a group, and the picture
+  constexpr std::uint64_t kLeast = 4 << 20;  // smaller boxes are mostly halo
+  const std::uint64_t taken = kIdleMemoryBytes + (setup.stored ? SourceBytes(limit) : 0) + kImages * std::uint64_t(FrameBytes(setup));
+  const std::uint64_t box = (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel);
+  return box < kLeast ? kBoxBytesTarget : std::min(kBoxBytesTarget, std::int64_t(std::bit_floor(box)));
+}
+
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {
   std::uint64_t group_bytes = 0;
   for (const GroupPlan& group : plan.groups) group_bytes = std::max(group_bytes, GroupImageBytes(plan.setup, group.placements));
@@ -109,10 +119,12 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& padded) {
     return kDerivedPerVoxel * std::uint64_t(padded.voxel_count()) * summary.types().bytes_per_voxel() + BytesOfCells(padded, summary);
   });
-  const auto needs = [&](WorkerId worker) { return kIdleMemoryBytes + voxels.at(worker) + images; };
+  const auto needs = [&](const WorkerLimit& limit) {
+    return kIdleMemoryBytes + (plan.setup.stored ? SourceBytes(limit.bytes) : 0) + voxels.at(limit.worker) + images;
+  };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(
-      workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit.worker) + (kEnough - 1) * images <= limit.bytes; });
+      workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit) + (kEnough - 1) * images <= limit.bytes; });
   if (all_fit) return int(kEnough);
   // Only now it matters how much of the volume is empty, which takes longer to find out.
   voxels = MostVoxels(plan, [&](const Box& padded) { return VoxelBytes(padded, summary); });
@@ -120,7 +132,7 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   std::uint64_t fit = kEnough;
   for (const WorkerLimit& limit : workers) {
     if (!has_part(limit)) continue;
-    const std::uint64_t needed = needs(limit.worker);
+    const std::uint64_t needed = needs(limit);
     if (needed > limit.bytes) {
       const std::string what = images > voxels.at(limit.worker) ? SizeText(plan.setup) : "the dataset";
       return Status::ResourceExhausted(fmt::format("{} needs {} of worker {}, limit {} (voxels {}, images {}); --memory sets the limit",

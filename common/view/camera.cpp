@@ -29,7 +29,6 @@ SinCos SinCosDegrees(double degrees) {
 constexpr double kParallel = 1e-6;  // the length of the cross product of two unit vectors that are
 
 Vec3 ExtentOf(const VolumeGeometry& geometry) { return ToVec3(geometry.size) * geometry.spacing; }
-double RadiusOf(const VolumeGeometry& geometry) { return 0.5 * Length(ExtentOf(geometry)); }  // of the bounding sphere
 double HalfFov(const ViewParameters& view) { return view.fov_degrees * (std::numbers::pi / 360); }
 
 // Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at the poles too, so
@@ -67,7 +66,7 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
   const Vec3 centre = geometry.ToWorld(geometry.centre());
   const Vec3 target = view.look_at.value_or(centre);
-  const double radius = RadiusOf(geometry);
+  const double radius = BoundingRadius(geometry);
   auto [right, up, forward] = view.eye ? LookingFrame(view, target) : FrameByAngles(view);
   const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
   const Frame rolled = {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
@@ -119,7 +118,7 @@ ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometr
     const double sine = radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
     if (sine < 1) fitted.zoom *= std::tan(HalfFov(view)) * std::sqrt(1 - sine * sine) / sine;
   } else {
-    fitted.zoom *= RadiusOf(geometry) / radius;
+    fitted.zoom *= BoundingRadius(geometry) / radius;
   }
   fitted.zoom = std::min(fitted.zoom, kMaxZoom);
   return fitted;
@@ -155,7 +154,7 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
 Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
-  const double radius = RadiusOf(geometry);
+  const double radius = BoundingRadius(geometry);
   const auto& [frame, target, distance] = LookOf(view, geometry);
   const Vec3 centre = geometry.centre() + target / spacing;  // data space, of the picture
 

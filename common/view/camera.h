@@ -58,6 +58,9 @@ struct ViewParameters {
   friend bool operator==(const ViewParameters&, const ViewParameters&) = default;
 };
 
+// Of the bounding sphere, physical.
+inline double BoundingRadius(const VolumeGeometry& geometry) { return 0.5 * Length(ToVec3(geometry.size) * geometry.spacing); }
+
 // InvalidArgument naming field, value and limits: a valid view that cannot be had of this volume.
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry);
 

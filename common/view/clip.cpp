@@ -51,12 +51,6 @@ void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<Half
   }
 }
 
-// The axis of the voxels that is nearest to the slab's normal.
-Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry) {
-  const Vec3 normal = geometry.orientation.FromWorld(slab.normal);
-  return *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return std::abs(normal[axis]); });
-}
-
 // Of a slice, in least spacings: positions of samples are rounded by far less.
 constexpr double kSliceThickness = 1.0 / 64;
 
@@ -79,6 +73,11 @@ void AddSlab(const ClipSlab& slab, const VolumeGeometry& geometry, std::vector<H
 }
 
 }  // namespace
+
+Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry) {
+  const Vec3 normal = geometry.orientation.FromWorld(slab.normal);
+  return *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return std::abs(normal[axis]); });
+}
 
 bool ClipRegion::MayKeep(const Box& box) const {
   if (empty()) return true;

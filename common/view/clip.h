@@ -93,6 +93,9 @@ struct ClipRegion {
   friend bool operator==(const ClipRegion&, const ClipRegion&) = default;
 };
 
+// The axis of the voxels that is nearest to the slab's normal.
+Axis AxisAcross(const ClipSlab& slab, const VolumeGeometry& geometry);
+
 // `clipping` valid. Sides that do not cut the volume are left out, so that a box around everything costs nothing.
 // InvalidArgument: the volume has no slice with the slab's index.
 Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry& geometry);

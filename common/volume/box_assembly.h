@@ -35,6 +35,9 @@ struct BoxAssembly {
 // skipped; without that limit, no voxel that a box of `at_hand` holds is missing.
 BoxAssembly Assemble(const Box& wanted, std::span<const Box> at_hand, std::size_t most_missing = std::numeric_limits<std::size_t>::max());
 
+// `box` cut at multiples of `block`, x fastest: none is empty.
+std::vector<Box> CutAtBlocks(const Box& box, const Index3& block);
+
 // The limit for fetching what is missing from another process. Each missing box takes a request, and a request may get lost. So there are
 // at most as many as it would take to fetch all of `wanted` in pieces of 2^20 voxels.
 inline std::size_t MostMissing(const Box& wanted) { return std::size_t(std::max<std::int64_t>(wanted.voxel_count() >> 20, 1)); }

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 #include <type_traits>
+#include <utility>
+#include <variant>
 
 namespace slabstream {
 namespace {
@@ -126,70 +128,114 @@ struct FloatPart {
 };
 
 template <class T>
-void FillSummary(const Volume& volume, VolumeSummary& summary) {
-  const ValueMapping& mapping = summary.description.mapping;
-  const Index3 size = summary.description.geometry.size, bricks = summary.brick_counts;
-  const auto row_at = [&](std::int32_t y, std::int32_t z) { return volume.block.samples<T>() + volume.block.Offset({0, y, z}); };
+class PiecesOf {
+ public:
+  void Add(const VoxelBlock& piece, VolumeSummary& summary) {
+    const Index3 begin = piece.box.begin, end = piece.box.end;
+    const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
+    tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
+      Part<T>& part = parts_.local();
+      BrickRow<T> brick_row(end.x - begin.x);
+      const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
+      for (std::int32_t z = row.z * kBrick; z < std::min((row.z + 1) * kBrick, end.z); ++z) {
+        for (std::int32_t y = row.y * kBrick; y < std::min((row.y + 1) * kBrick, end.y); ++y) {
+          const T* const samples = piece.samples<T>() + piece.Offset({begin.x, y, z});
+          brick_row.Fold(samples);
+          part.counts.Add(samples, end.x - begin.x);
+        }
+      }
+      ValueRange* out = &summary.bricks[NumberIn(summary.brick_counts, row)];
+      for (std::int32_t brick = 0; brick < bricks.x; ++brick) {
+        const StoredRange<T> range = brick_row.Brick(brick);
+        part.range.Include(range);
+        *out++ = ToDataValues(range, summary.description.mapping, kNoFiniteValue);
+      }
+    });
+  }
 
-  tbb::enumerable_thread_specific<Part<T>> parts;
-  summary.bricks.resize(CountIn(bricks));
-  tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
-    Part<T>& part = parts.local();
-    BrickRow<T> brick_row(size.x);
-    const std::int32_t y_begin = row_of_bricks % bricks.y * kBrick, z_begin = row_of_bricks / bricks.y * kBrick;
-    for (std::int32_t z = z_begin; z < std::min(z_begin + kBrick, size.z); ++z) {
-      for (std::int32_t y = y_begin; y < std::min(y_begin + kBrick, size.y); ++y) {
-        brick_row.Fold(row_at(y, z));
-        part.counts.Add(row_at(y, z), size.x);
+  // All pieces were added.
+  void FindRange(VolumeSummary& summary) {
+    const ValueMapping& mapping = summary.description.mapping;
+    StoredRange<T> whole;
+    for (const Part<T>& part : parts_) whole.Include(part.range);
+    summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
+    if constexpr (std::is_integral_v<T>) {
+      for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
+        std::uint64_t& bin = summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))];
+        for (const Part<T>& part : parts_) bin += part.counts[stored];
       }
     }
-    ValueRange* out = &summary.bricks[std::size_t(row_of_bricks) * std::size_t(bricks.x)];
-    for (std::int32_t brick = 0; brick < bricks.x; ++brick) {
-      const StoredRange<T> range = brick_row.Brick(brick);
-      part.range.Include(range);
-      *out++ = ToDataValues(range, mapping, kNoFiniteValue);
-    }
-  });
-  StoredRange<T> whole;
-  for (const Part<T>& part : parts) whole.Include(part.range);
-  summary.range = ToDataValues(whole, mapping, ValueRange{0, 0});
+  }
 
-  if constexpr (std::is_integral_v<T>) {
-    for (std::size_t stored = whole.low; stored <= whole.high; ++stored) {
-      std::uint64_t& bin = summary.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(stored))))];
-      for (const Part<T>& part : parts) bin += part.counts[stored];
-    }
-  } else {
-    // Bins need the range first, so these voxels are read a second time.
-    tbb::enumerable_thread_specific<FloatPart> float_parts;
+  // Bins need the range first, so floats are met a second time.
+  static void AddToHistogram(const VoxelBlock& piece, VolumeSummary& summary) {
+    tbb::enumerable_thread_specific<FloatPart> parts;
+    const Index3 begin = piece.box.begin, size = piece.box.size();
     tbb::parallel_for(0, size.z, [&](std::int32_t z) {
-      FloatPart& part = float_parts.local();
-      for (std::int32_t y = 0; y < size.y; ++y) {
-        const T* row = row_at(y, z);
-        for (std::int32_t x = 0; x < size.x; ++x) {
-          if (IsFinite(row[x])) {
-            ++part.histogram[std::size_t(HistogramBin(summary.range, DataValue(mapping, double(row[x]))))];
-          } else {
-            ++part.non_finite;
-          }
+      FloatPart& part = parts.local();
+      const T* const slice = piece.samples<T>() + piece.Offset({begin.x, begin.y, begin.z + z});
+      for (std::int64_t i = 0; i < std::int64_t{size.x} * size.y; ++i) {
+        if (IsFinite(slice[i])) {
+          ++part.histogram[std::size_t(HistogramBin(summary.range, DataValue(summary.description.mapping, double(slice[i]))))];
+        } else {
+          ++part.non_finite;
         }
       }
     });
-    for (const FloatPart& part : float_parts) {
+    for (const FloatPart& part : parts) {
       for (std::size_t bin = 0; bin < part.histogram.size(); ++bin) summary.histogram[bin] += part.histogram[bin];
       summary.non_finite += part.non_finite;
     }
   }
+
+ private:
+  tbb::enumerable_thread_specific<Part<T>> parts_;
+};
+
+template <class T>
+ValueRange AnyValueOf(const ValueMapping& mapping) {
+  return ToDataValues(StoredRange<T>{std::numeric_limits<T>::lowest(), std::numeric_limits<T>::max()}, mapping, {});
 }
 
 }  // namespace
 
-VolumeSummary Summarize(const Volume& volume) {
+ValueRange AnyValue(const VolumeDescription& description) {
+  return VisitScalarType(description.type, [&]<class T>(const T*) { return AnyValueOf<T>(description.mapping); });
+}
+
+struct PiecewiseSummary::State {
   VolumeSummary summary;
-  summary.description = volume.description;
-  summary.brick_counts = CubesOver(volume.description.geometry.size, kBrick);
-  VisitScalarType(volume.description.type, [&]<class T>(const T*) { FillSummary<T>(volume, summary); });
-  return summary;
+  std::variant<PiecesOf<std::uint8_t>, PiecesOf<std::uint16_t>, PiecesOf<float>> pieces;
+};
+
+PiecewiseSummary::PiecewiseSummary(const VolumeDescription& description) : state_(std::make_unique<State>()) {
+  VolumeSummary& summary = state_->summary;
+  summary.description = description;
+  summary.brick_counts = CubesOver(description.geometry.size, kBrick);
+  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
+  VisitScalarType(description.type, [&]<class T>(const T*) { state_->pieces.emplace<PiecesOf<T>>(); });
+}
+
+PiecewiseSummary::~PiecewiseSummary() = default;
+
+void PiecewiseSummary::Add(const VoxelBlock& piece) {
+  std::visit([&](auto& pieces) { pieces.Add(piece, state_->summary); }, state_->pieces);
+}
+
+bool PiecewiseSummary::EndOfPieces() {
+  std::visit([&](auto& pieces) { pieces.FindRange(state_->summary); }, state_->pieces);
+  return state_->summary.description.type == ScalarType::kFloat32;
+}
+
+void PiecewiseSummary::AddAgain(const VoxelBlock& piece) { PiecesOf<float>::AddToHistogram(piece, state_->summary); }
+
+VolumeSummary PiecewiseSummary::Take() { return std::move(state_->summary); }
+
+VolumeSummary Summarize(const Volume& volume) {
+  PiecewiseSummary pieces(volume.description);
+  pieces.Add(volume.block);
+  if (pieces.EndOfPieces()) pieces.AddAgain(volume.block);
+  return pieces.Take();
 }
 
 VolumeSummary Summarize(const LayeredVolume& volume) {

@@ -8,9 +8,11 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/volume/layers.h"
+#include "common/volume/stored_at.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
@@ -44,6 +46,8 @@ struct VolumeSummary {
   // Of its layers; null: there is no such layer. Values of labels are their numbers.
   std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
+  // Nobody holds the voxels, but they can be read there. Ranges of bricks may then be those of any value of the type. None: they are held.
+  std::optional<StoredAt> stored = {};
   std::vector<std::uint32_t> cells;  // of an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
   LayerTypes layers() const {
@@ -56,6 +60,28 @@ struct VolumeSummary {
   SampleTypes types() const { return {description.type, layers()}; }
 
   friend bool operator==(const VolumeSummary&, const VolumeSummary&) = default;
+};
+
+// The range of all values that samples of this type can stand for: of a brick of which nothing is known.
+ValueRange AnyValue(const VolumeDescription& description);
+
+// The summary of a volume that is given piece by piece, and is never in memory as a whole.
+class PiecewiseSummary {
+ public:
+  explicit PiecewiseSummary(const VolumeDescription& description);
+  ~PiecewiseSummary();
+
+  // The box of a piece begins at multiples of kBrick, and ends at such or at the volume's border. No voxel is given twice.
+  void Add(const VoxelBlock& piece);
+  // True: the same pieces must be given once more.
+  bool EndOfPieces();
+  void AddAgain(const VoxelBlock& piece);
+  // Bricks outside all pieces have any value.
+  VolumeSummary Take();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
 };
 
 // Reads every voxel once; those of float volumes a second time for the histogram. Parallel; the result is the same for any number of

@@ -106,12 +106,23 @@ void Fields(auto& io, Is<OverlayLook> auto& m) {
   io.Between("weight", m.weight, &P::weight, &P::set_weight, 0, 1);
 }
 
+v1::StoredAt ProtoOf(const StoredAt&);
+void Fields(auto& io, Is<StoredAt> auto& m) {
+  using P = v1::StoredAt;
+  io.Text("source", m.source, &P::source, &P::mutable_source, 1, kMaxSourceBytes);
+  io.Range("level", m.level, &P::level, &P::set_level, 0, kMaxLevels - 1);
+  io.Any(m.version, &P::version, &P::set_version);
+  io.Message("block", m.block, &P::block, &P::mutable_block);
+  io.Check([&](Checker& check) { check.That(m.block.begin == Index3{} && !m.block.empty(), "block", "does not begin at 0, or is empty"); });
+}
+
 void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets and the clip region
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
   io.Message("description", m.description, &P::description, &P::mutable_description);
   io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Message("range", m.range, &P::range, &P::mutable_range);
+  io.Optional("stored", m.stored, &P::has_stored, &P::stored, &P::mutable_stored);
   io.Message("camera", m.camera, &P::camera, &P::mutable_camera);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
   io.Optional("labels", m.looks.labels, &P::has_labels, &P::labels, &P::mutable_labels);

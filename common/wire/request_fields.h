@@ -196,6 +196,8 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {
   io.Message("shading", m.shading, &P::shading, &P::mutable_shading);
   io.Finite("termination", m.termination, &P::termination, &P::set_termination);
   io.Finite("brightness", m.brightness, &P::brightness, &P::set_brightness);
+  io.Finite("detail", m.detail, &P::detail, &P::set_detail);
+  io.Text("level", m.level, &P::level, &P::mutable_level, 1, kMaxNameBytes);
   io.Optional("labels", m.labels, &P::has_labels, &P::labels, &P::mutable_labels);
   io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/base/printable.h"
 #include "common/base/range_status.h"
 #include "common/renderers/registry.h"
 #include "common/wire/field_walk.h"
@@ -236,6 +237,10 @@ Status Validate(const FrameRequest& request) {
   if (Status s = CheckParameters(request.renderer, *renderers, request.parameters); !s.ok()) return s;
   if (Status s = SchemaCheck("", request.renderer, *renderers).Of(request); !s.ok()) return s;
   if (Status s = CheckRules(request.size); !s.ok()) return s;
+  if (!IsLevel(request.level)) {
+    return Status::InvalidArgument(
+        fmt::format("level is '{}', but must be {} or a number from 0 to {}", Printable(request.level), kAutomatic, kMaxLevels - 1));
+  }
   if (Status s = CheckRules(request.view); !s.ok()) return s;
   if (Status s = CheckRules(request.clipping); !s.ok()) return s;
   if (Status s = CheckRules(request.transfer); !s.ok()) return s;

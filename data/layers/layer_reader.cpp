@@ -18,8 +18,8 @@
 #include "common/volume/memory_budget.h"
 #include "data/layers/color_table.h"
 #include "data/layers/layer_sampling.h"
+#include "data/open/any_volume.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {
@@ -185,7 +185,7 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
   if (!source.ok()) return source.status();
   const Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
-  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
+  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   if (read->info.straightened) {
     return Status::InvalidArgument(source->path + ": its axes are not at right angles, and labels cannot be interpolated");
@@ -200,7 +200,7 @@ Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& la
 Status AddOverlay(const std::string& file, const VolumeGeometry& grid, Layers& layers) {
   const Result<SourceText> source = ParseSourceText(file);
   if (!source.ok()) return source.status();
-  const Result<LoadedVolume> read = ReadVolume(source->path, source->options);
+  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
   if (Status status = CheckSameWorld(read->info.description.geometry, grid); !status.ok()) {
     return Status(status.code(), source->path + ": " + status.message());
@@ -235,7 +235,7 @@ Result<std::vector<std::string>> CheckLayerHeaders(const LayerFiles& files) {
   const auto check = [&](const std::string& text, std::string_view what) {
     const Result<SourceText> source = ParseSourceText(text);
     if (!source.ok()) return Prefixed(what, source.status());
-    const Result<std::vector<std::string>> read = CheckVolumeHeaders(source->path, source->options);
+    const Result<std::vector<std::string>> read = CheckAnyVolumeHeaders(source->path, source->options);
     if (!read.ok()) return Prefixed(what, read.status());
     all.insert(all.end(), read->begin(), read->end());
     return Status::Ok();

@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "data/positional/positional_source.h"
 #include "data/zarr/zarr.h"
 
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {Zarr()};
+  static const std::vector<SourceFormat> kFormats = {Zarr(), UncompressedFile()};
   return kFormats;
 }
 

@@ -34,7 +34,10 @@ struct VolumeFormat {
   bool (*recognises)(const std::string& path, const ReadOptions& options) = nullptr;
   std::vector<std::string_view> options = {};   // names of the options (ReadOptionList) that it takes
   std::vector<std::string_view> required = {};  // those of them without which it cannot be read
-  // Errors as in volume_reader.h.
+  // Where the samples of a file lie, which are in one piece: binary, perhaps compressed. Null: they never are. InvalidArgument: not in this
+  // file. Errors as in volume_reader.h.
+  Result<LocatedSamples> (*locate)(const std::string& path, const ReadOptions& options) = nullptr;
+  // Null: as `locate` says. Errors as in volume_reader.h.
   Result<RawVolume> (*read)(const std::string& path, const ReadOptions& options) = nullptr;
 
   std::vector<std::string_view> written_endings = {};  // of files that can be written; none: it is only read

@@ -101,15 +101,15 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
   return payload;
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  return ReadTextVolume(path,
-                        {.name = "MetaImage",
-                         .separator = '=',
-                         .last_key = "ElementDataFile",
-                         .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
-                         .read_header = ReadHeader,
-                         .find_payload = FindPayload},
-                        options);
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
+  return LocateInTextVolume(path,
+                            {.name = "MetaImage",
+                             .separator = '=',
+                             .last_key = "ElementDataFile",
+                             .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
+                             .read_header = ReadHeader,
+                             .find_payload = FindPayload},
+                            options);
 }
 
 // A patient's space is left, posterior, superior in MetaImage. Its letters say where each axis begins: left, posterior, inferior, since
@@ -160,7 +160,7 @@ VolumeFormat MetaImage() {
   return {.name = "MetaImage",
           .endings = {".mhd", ".mha"},
           .options = {"time", "channel"},
-          .read = Read,
+          .locate = Locate,
           .written_endings = {".mha", ".mhd"},
           .write = Write,
           .second_file = SecondFile};

@@ -97,7 +97,7 @@ Result<RawHeader> HeaderOf(const BinaryHeader& fields, SampleType type, const st
   return header;
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
   Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
   std::array<std::byte, kHeaderBytes> bytes{};
   if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
@@ -113,21 +113,20 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
         fmt::format("{}: MRC mode {} is not supported; supported: 0, 1, 2, 6 and 12 (integers of 8 and 16 bits, floats)", path,
                     fields.At<std::int32_t>(Word(4))));
   }
-  const Result<RawHeader> header = HeaderOf(fields, mode->type, path, options);
+  Result<RawHeader> header = HeaderOf(fields, mode->type, path, options);
   if (!header.ok()) return header.status();
   const std::int32_t extension = fields.At<std::int32_t>(Word(24));
   if (extension < 0)
     return Status::InvalidArgument(fmt::format("{}: the extended header has {} bytes, must be at least 0", path, extension));
   (payload.compressed ? payload.skip : payload.offset) = std::int64_t{kHeaderBytes} + extension;
   payload.big_endian = big_endian;
-  Result<RawVolume> raw = ReadSamples(path, *header, payload, options);
-  return raw.ok() && mode->halves ? HalvesAsFloats(path, *std::move(raw)) : std::move(raw);
+  return LocatedSamples{*std::move(header), std::move(payload), mode->halves};
 }
 
 }  // namespace
 
 VolumeFormat Mrc() {
-  return {.name = "MRC", .endings = {".mrc", ".map", ".ccp4", ".rec", ".mrc.gz", ".map.gz"}, .options = {"time"}, .read = Read};
+  return {.name = "MRC", .endings = {".mrc", ".map", ".ccp4", ".rec", ".mrc.gz", ".map.gz"}, .options = {"time"}, .locate = Locate};
 }
 
 }  // namespace slabstream

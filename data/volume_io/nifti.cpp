@@ -139,13 +139,13 @@ Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path,
   return header;
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
   Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
   std::array<std::byte, kHeaderBytes> bytes{};
   if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
   const NiftiHeader fields(bytes);
   if (!fields.valid()) return Status::InvalidArgument(path + ": not a NIfTI volume: the header is not that of NIfTI-1 in one file");
-  const Result<RawHeader> header = ReadHeader(fields, path, options);
+  Result<RawHeader> header = ReadHeader(fields, path, options);
   if (!header.ok()) return header.status();
 
   const float offset = fields.vox_offset();
@@ -153,7 +153,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   if (!(offset <= 0x1p30F)) return Status::InvalidArgument(fmt::format("{}: vox_offset is {}, must be at most 2^30", path, offset));
   (payload.compressed ? payload.skip : payload.offset) = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
   payload.big_endian = fields.big_endian();
-  return ReadSamples(path, *header, payload, options);
+  return LocatedSamples{*std::move(header), std::move(payload)};
 }
 
 // The rotation whose columns are the axes, as b, c and d of a quaternion a + bi + cj + dk with a >= 0.
@@ -237,7 +237,7 @@ VolumeFormat Nifti() {
   return {.name = "NIfTI",
           .endings = {".nii", ".nii.gz"},
           .options = {"time", "channel"},
-          .read = Read,
+          .locate = Locate,
           .written_endings = {".nii", ".nii.gz"},
           .write = Write,
           .keeps = {.scene = false, .units = {LengthUnit::kMillimetre, LengthUnit::kMicrometre, LengthUnit::kMetre}}};

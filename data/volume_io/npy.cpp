@@ -105,7 +105,7 @@ Result<NpyHeader> ReadText(const std::string& path) {
   return header;
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
   const Result<NpyHeader> text = ReadText(path);
   if (!text.ok()) return text.status();
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": not a volume of NumPy: " + why); };
@@ -131,9 +131,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
     std::ranges::reverse(*shape);
   }
   if (Status status = SetSize(header, path, *std::move(shape), options); !status.ok()) return status;
-  const Payload payload{.file = path, .offset = text->end, .big_endian = dtype->big_endian};
-  Result<RawVolume> raw = ReadSamples(path, header, payload, options);
-  return raw.ok() && dtype->halves ? HalvesAsFloats(path, *std::move(raw)) : std::move(raw);
+  return LocatedSamples{header, {.file = path, .offset = text->end, .big_endian = dtype->big_endian}, dtype->halves};
 }
 
 Status Write(const FileSamples& samples, const std::string& path) {
@@ -154,7 +152,7 @@ VolumeFormat Npy() {
   return {.name = "NumPy",
           .endings = {".npy"},
           .options = {"time", "spacing"},
-          .read = Read,
+          .locate = Locate,
           .written_endings = {".npy"},
           .write = Write,
           .keeps = {.spacing = false, .axes = false, .units = {}}};

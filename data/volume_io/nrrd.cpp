@@ -133,16 +133,16 @@ Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
   return payload;
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  return ReadTextVolume(path,
-                        {.name = "NRRD",
-                         .first_line = "NRRD000",
-                         .separator = ':',
-                         .ignores_case = true,
-                         .required = {"type", "dimension", "sizes", "encoding"},
-                         .read_header = ReadHeader,
-                         .find_payload = FindPayload},
-                        options);
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
+  return LocateInTextVolume(path,
+                            {.name = "NRRD",
+                             .first_line = "NRRD000",
+                             .separator = ':',
+                             .ignores_case = true,
+                             .required = {"type", "dimension", "sizes", "encoding"},
+                             .read_header = ReadHeader,
+                             .find_payload = FindPayload},
+                            options);
 }
 
 // The header's lines about the spacing and, if it is known, the orientation.
@@ -170,7 +170,7 @@ VolumeFormat Nrrd() {
   return {.name = "NRRD",
           .endings = {".nrrd", ".nhdr"},
           .options = {"time", "channel"},
-          .read = Read,
+          .locate = Locate,
           .written_endings = {".nrrd"},
           .write = Write};
 }

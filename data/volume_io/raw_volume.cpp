@@ -16,23 +16,23 @@
 namespace slabstream {
 namespace {
 
-Status CheckChannel(const std::string& path, int components, const ReadOptions& options) {
-  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
-  const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
-  if (components == 1 && options.channel.value_or(0) == 0) return Status::Ok();
-  if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
-  const std::string which = fmt::format("0 to {}{}", components - 1, colour ? ", or luminance, of red, green and blue" : "");
-  if (!options.channel) return wrong(fmt::format("has {} components a voxel, of which --channel takes one: {}", components, which));
-  if (luminance ? colour : *options.channel < components) return Status::Ok();
-  return wrong(fmt::format("has {} components a voxel, so channel must be {}", components, which));
-}
-
 float FromHalf(std::uint16_t half) {
   const int exponent = (half >> 10) & 0x1f, fraction = half & 0x3ff;
   const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
   if (exponent == 0x1f) return fraction != 0 ? std::numeric_limits<float>::quiet_NaN() : sign * std::numeric_limits<float>::infinity();
   // Without the leading 1, subnormal numbers have the exponent of the least normal ones.
   return sign * (exponent == 0 ? std::ldexp(float(fraction), -24) : std::ldexp(float(fraction + 0x400), exponent - 25));
+}
+
+// Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.
+Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
+  RawVolume floats{.header = halves.header, .samples_file = std::move(halves.samples_file)};
+  floats.header.type = SampleType::kFloat32;
+  if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
+  floats.bytes.resize(2 * halves.bytes.size());
+  const std::span in(reinterpret_cast<const std::uint16_t*>(halves.bytes.data()), halves.bytes.size() / sizeof(std::uint16_t));
+  std::ranges::transform(in, reinterpret_cast<float*>(floats.bytes.data()), FromHalf);
+  return floats;
 }
 
 template <class T>
@@ -62,6 +62,7 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
   }
   const Result<std::int64_t> number = ChosenVolume(path, std::int64_t(count), options);
   if (!number.ok()) return number.status();
+  header.volumes = std::int64_t(count);
   header.number = *number;
   return Status::Ok();
 }
@@ -80,6 +81,17 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
   return std::int64_t{options.time.value_or(TimeRange{}).first};
 }
 
+Status CheckChannel(const std::string& path, int components, const ReadOptions& options) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
+  const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
+  if (components == 1 && options.channel.value_or(0) == 0) return Status::Ok();
+  if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
+  const std::string which = fmt::format("0 to {}{}", components - 1, colour ? ", or luminance, of red, green and blue" : "");
+  if (!options.channel) return wrong(fmt::format("has {} components a voxel, of which --channel takes one: {}", components, which));
+  if (luminance ? colour : *options.channel < components) return Status::Ok();
+  return wrong(fmt::format("has {} components a voxel, so channel must be {}", components, which));
+}
+
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {
   if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
@@ -87,34 +99,38 @@ Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, c
   return RawVolume{header, AlignedVector<std::byte>(options.headers_only ? 0 : std::size_t(header.sample_bytes())), {}};
 }
 
-Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options) {
-  // Samples in a file of their own: the volume's name first.
-  const auto failed = [&](const Status& status) {
-    return payload.file == path ? status : Status(status.code(), path + ": samples in " + status.message());
-  };
-  constexpr std::int64_t kMost = std::int64_t{1} << 61;  // longer than any file
-  if (header.number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
-  Payload chosen = payload;
-  (chosen.compressed ? chosen.skip : chosen.offset) += header.number * header.sample_bytes();
-  if (Status status = CheckHolds(chosen, header.sample_bytes()); !status.ok()) return failed(status);
-  Result<RawVolume> raw = TakeMemory(path, header, options);
-  if (!raw.ok()) return raw;
-  if (payload.file != path) raw->samples_file = payload.file;
-  if (options.headers_only) return raw;
-  if (Status status = ReadPayload(chosen, raw->bytes, Extent::kWholeStream, options.progress); !status.ok()) return failed(status);
-  static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
-  if (payload.big_endian) SwapByteOrder(header.type, raw->bytes);
-  return raw;
+namespace {
+
+// Samples in a file of their own: the volume's name first.
+Status OfSamples(const std::string& path, const Payload& payload, const Status& status) {
+  return payload.file == path || status.ok() ? status : Status(status.code(), path + ": samples in " + status.message());
 }
 
-Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
-  RawVolume floats{.header = halves.header, .samples_file = std::move(halves.samples_file)};
-  floats.header.type = SampleType::kFloat32;
-  if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
-  floats.bytes.resize(2 * halves.bytes.size());
-  const std::span in(reinterpret_cast<const std::uint16_t*>(halves.bytes.data()), halves.bytes.size() / sizeof(std::uint16_t));
-  std::ranges::transform(in, reinterpret_cast<float*>(floats.bytes.data()), FromHalf);
-  return floats;
+}  // namespace
+
+Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& located) {
+  const RawHeader& header = located.header;
+  constexpr std::int64_t kMost = std::int64_t{1} << 61;  // longer than any file
+  if (header.number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
+  Payload payload = located.payload;
+  (payload.compressed ? payload.skip : payload.offset) += header.number * header.sample_bytes();
+  const Status holds = OfSamples(path, payload, CheckHolds(payload, header.sample_bytes()));
+  return holds.ok() ? Result<Payload>(std::move(payload)) : holds;
+}
+
+Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& located, const ReadOptions& options) {
+  const Result<Payload> payload = PayloadOfVolume(path, located);
+  if (!payload.ok()) return payload.status();
+  Result<RawVolume> raw = TakeMemory(path, located.header, options);
+  if (!raw.ok()) return raw;
+  if (payload->file != path) raw->samples_file = payload->file;
+  if (!options.headers_only) {
+    const Status read = ReadPayload(*payload, raw->bytes, Extent::kWholeStream, options.progress);
+    if (!read.ok()) return OfSamples(path, *payload, read);
+    static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
+    if (payload->big_endian) SwapByteOrder(located.header.type, raw->bytes);
+  }
+  return located.halves ? HalvesAsFloats(path, *std::move(raw)) : std::move(raw);
 }
 
 void TakeChannel(RawVolume& raw, const ReadOptions& options) {

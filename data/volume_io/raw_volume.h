@@ -25,8 +25,9 @@ inline constexpr int kMaxComponents = 1024;  // of a voxel
 struct RawHeader {
   Index3 size;
   // Samples of one voxel, which lie together; above 1 only where options.channel takes one of them.
-  int components = 1;       // in [1, kMaxComponents]
-  std::int64_t number = 0;  // in [0, kMaxVolumes): which of the volumes that lie one after the other in the payload
+  int components = 1;        // in [1, kMaxComponents]
+  std::int64_t volumes = 1;  // in [1, kMaxVolumes], one after the other in the payload
+  std::int64_t number = 0;   // which of them: in [0, volumes)
   World world = World::kVoxels;
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
@@ -42,6 +43,13 @@ struct RawHeader {
   std::int64_t sample_bytes() const {
     return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)) * components;
   }
+};
+
+// What a header says: the volume, and where its samples lie in one piece.
+struct LocatedSamples {
+  RawHeader header;
+  Payload payload;      // of all volumes
+  bool halves = false;  // samples are half floats, which are read as uint16 and then become float32
 };
 
 struct RawVolume {
@@ -64,15 +72,18 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
 // Which of `count` volumes options.time takes. InvalidArgument: none, although there are several, or one that there is not.
 Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
 
-// Takes memory for the samples, unless only headers are read. InvalidArgument: several components, of which options.channel takes none.
-// ResourceExhausted: too large.
+// InvalidArgument, naming `path`: of several components a voxel options.channel takes none, or one that there is not.
+Status CheckChannel(const std::string& path, int components, const ReadOptions& options);
+
+// Takes memory for the samples, unless only headers are read. Errors of CheckChannel. ResourceExhausted: too large.
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options);
 
-// Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
-Result<RawVolume> ReadSamples(const std::string& path, const RawHeader& header, const Payload& payload, const ReadOptions& options);
+// The payload of the chosen volume alone. DataLoss: the file is too short for it. NotFound: there is no such file. Messages begin with
+// `path`.
+Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& located);
 
-// Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.
-Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves);
+// Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
+Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& located, const ReadOptions& options);
 
 // Of several components the one that options.channel takes, or their luminance, in place.
 void TakeChannel(RawVolume& raw, const ReadOptions& options);

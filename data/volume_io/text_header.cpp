@@ -112,14 +112,14 @@ Result<std::int64_t> TextHeader::BytesToSkip(const char* key, const std::string&
   return std::max<std::int64_t>(std::int64_t(file_bytes) - payload.offset - sample_bytes, 0);
 }
 
-Result<RawVolume> ReadTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options) {
+Result<LocatedSamples> LocateInTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options) {
   const Result<TextHeader> text = ReadTextHeader(path, format);
   if (!text.ok()) return text.status();
-  const Result<RawHeader> header = format.read_header(*text, options);
+  Result<RawHeader> header = format.read_header(*text, options);
   if (!header.ok()) return header.status();
-  const Result<Payload> payload = format.find_payload(*text, header->sample_bytes());
+  Result<Payload> payload = format.find_payload(*text, header->sample_bytes());
   if (!payload.ok()) return payload.status();
-  return ReadSamples(path, *header, *payload, options);
+  return LocatedSamples{*std::move(header), *std::move(payload)};
 }
 
 std::string ToLower(std::string text) {

@@ -56,7 +56,7 @@ struct TextFormat {
 };
 
 // Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.
-Result<RawVolume> ReadTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options);
+Result<LocatedSamples> LocateInTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options);
 
 std::string ToLower(std::string text);
 

@@ -70,6 +70,12 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   return loaded;
 }
 
+Result<RawVolume> ReadAs(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
+  if (format.read != nullptr) return format.read(path, options);
+  const Result<LocatedSamples> located = format.locate(path, options);
+  return located.ok() ? ReadSamples(path, *located, options) : located.status();
+}
+
 struct ReadFile {
   RawVolume raw;
   const VolumeFormat* format = nullptr;
@@ -78,7 +84,7 @@ struct ReadFile {
 Result<ReadFile> ReadRaw(const std::string& path, const ReadOptions& options) {
   if (Status status = CheckVolume(path, options); !status.ok()) return status;
   const VolumeFormat* const format = FindFormat(path, options);
-  Result<RawVolume> raw = format->read(path, options);
+  Result<RawVolume> raw = ReadAs(*format, path, options);
   if (!raw.ok()) return Printable(raw.status());
   return ReadFile{std::move(*raw), format};
 }

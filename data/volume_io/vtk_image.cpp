@@ -55,22 +55,45 @@ Result<VtkArray> ChooseArray(const VtkXmlFile& file) {
                              : "has no samples of points (PointData)");
 }
 
-Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  const Result<VtkXmlFile> file = VtkXmlFile::Open(path, "ImageData");
+struct ImageFile {
+  VtkXmlFile file;
+  VtkArray array;
+  RawHeader header;
+
+  std::int64_t samples() const { return header.sample_bytes() / std::int64_t(BytesPerSample(header.type)); }
+};
+
+Result<ImageFile> OpenImage(const std::string& path, const ReadOptions& options) {
+  Result<VtkXmlFile> file = VtkXmlFile::Open(path, "ImageData");
   if (!file.ok()) return file.status();
   Result<RawHeader> header = HeaderOf(*file, path, options);
   if (!header.ok()) return header.status();
-  const Result<VtkArray> array = ChooseArray(*file);
+  Result<VtkArray> array = ChooseArray(*file);
   if (!array.ok()) return array.status();
   const Result<VtkArrayType> type = file->TypeOf(*array, kMaxComponents);
   if (!type.ok()) return type.status();
   header->type = type->type;
   header->components = type->components;
-  const std::int64_t samples = header->sample_bytes() / std::int64_t(BytesPerSample(type->type));
-  if (Status status = file->CheckHolds(*array, type->type, samples); !status.ok()) return status;
-  Result<RawVolume> raw = TakeMemory(path, *header, options);
+  return ImageFile{*std::move(file), *std::move(array), *std::move(header)};
+}
+
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
+  Result<ImageFile> image = OpenImage(path, options);
+  if (!image.ok()) return image.status();
+  const auto plain = image->file.FindPlainSamples(image->array, image->header.type, image->samples());
+  if (!plain.ok()) return plain.status();
+  return LocatedSamples{std::move(image->header), {.file = path, .offset = plain->begin, .big_endian = plain->big_endian}};
+}
+
+// Samples of any encoding, also those that `Locate` finds.
+Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  const Result<ImageFile> image = OpenImage(path, options);
+  if (!image.ok()) return image.status();
+  const auto& [file, array, header] = *image;
+  if (Status status = file.CheckHolds(array, header.type, image->samples()); !status.ok()) return status;
+  Result<RawVolume> raw = TakeMemory(path, header, options);
   if (!raw.ok() || options.headers_only) return raw;
-  if (Status status = file->ReadSamples(*array, type->type, raw->bytes); !status.ok()) return status;
+  if (Status status = file.ReadSamples(array, header.type, raw->bytes); !status.ok()) return status;
   return raw;
 }
 
@@ -110,6 +133,7 @@ VolumeFormat VtkImage() {
   return {.name = "VTK image",
           .endings = {".vti"},
           .options = {"channel"},
+          .locate = Locate,
           .read = Read,
           .written_endings = {".vti"},
           .write = Write,

@@ -88,20 +88,31 @@ class ByteSource {
 struct HeaderFormat {
   bool wide = false;  // 8 bytes, else 4
   bool big_endian = false;
+
+  int bytes() const { return wide ? 8 : 4; }  // of a number
 };
+
+HeaderFormat HeaderOf(const XmlTag& file) {
+  return {file.Attribute("header_type") == "UInt64", file.Attribute("byte_order") == "BigEndian"};
+}
 
 Result<std::uint64_t> ReadCount(ByteSource& source, const HeaderFormat& header) {
   std::array<std::byte, 8> bytes{};
-  const std::span word = std::span(bytes).first(header.wide ? 8 : 4);
+  const std::span word = std::span(bytes).first(std::size_t(header.bytes()));
   if (source.Read(word) != word.size()) return Status::DataLoss("truncated in the header of its samples");
   if (header.big_endian) std::ranges::reverse(word);
   return std::bit_cast<std::uint64_t>(bytes);
 }
 
-Status ReadPlain(ByteSource& source, const HeaderFormat& header, std::span<std::byte> out) {
+// Of samples that are not compressed: they must have that many bytes.
+Status CheckCount(ByteSource& source, const HeaderFormat& header, std::uint64_t wanted) {
   const Result<std::uint64_t> bytes = ReadCount(source, header);
   if (!bytes.ok()) return bytes.status();
-  if (*bytes != out.size()) return Status::DataLoss(fmt::format("has {} bytes, must have {}", *bytes, out.size()));
+  return *bytes == wanted ? Status::Ok() : Status::DataLoss(fmt::format("has {} bytes, must have {}", *bytes, wanted));
+}
+
+Status ReadPlain(ByteSource& source, const HeaderFormat& header, std::span<std::byte> out) {
+  if (Status status = CheckCount(source, header, out.size()); !status.ok()) return status;
   const std::size_t found = source.Read(out);
   return found == out.size() ? Status::Ok() : Status::DataLoss(fmt::format("truncated: has {} of {} bytes", found, out.size()));
 }
@@ -278,6 +289,24 @@ Status VtkXmlFile::CheckHolds(const VtkArray& array, SampleType type, std::int64
                              std::max<std::int64_t>(place->end - place->begin, 0), samples, least));
 }
 
+Status VtkXmlFile::InArray(const VtkArray& array, const Status& status) const {
+  return status.ok() ? status : Status(status.code(), fmt::format("{}: array {}: {}", path_, array.name(), status.message()));
+}
+
+Result<VtkXmlFile::PlainSamples> VtkXmlFile::FindPlainSamples(const VtkArray& array, SampleType type, std::int64_t samples) const {
+  if (Status status = CheckHolds(array, type, samples); !status.ok()) return status;
+  const Result<Place> place = PlaceOf(array);
+  if (!place.ok()) return place.status();
+  if (place->text || place->base64 || place->compressed) {
+    return Wrong(fmt::format("array {}: its samples are text, base64 or compressed", array.name()));
+  }
+  ByteSource source(path_, place->begin, place->end, false);
+  const HeaderFormat header = HeaderOf(file_);
+  const std::uint64_t bytes = std::uint64_t(samples) * BytesPerSample(type);
+  if (Status status = InArray(array, CheckCount(source, header, bytes)); !status.ok()) return status;
+  return PlainSamples{place->begin + header.bytes(), header.big_endian};
+}
+
 Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVector<std::byte>& out) const {
   const Result<Place> place = PlaceOf(array);
   if (!place.ok()) return place.status();
@@ -287,11 +316,11 @@ Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVe
     status = ReadTextSamples(cursor, type, out);
   } else {
     ByteSource source(path_, place->begin, place->end, place->base64);
-    const HeaderFormat header = {file_.Attribute("header_type") == "UInt64", file_.Attribute("byte_order") == "BigEndian"};
+    const HeaderFormat header = HeaderOf(file_);
     status = place->compressed ? ReadBlocks(source, header, place->file_bytes, out) : ReadPlain(source, header, out);
     if (header.big_endian) SwapByteOrder(type, out);
   }
-  return status.ok() ? status : Status(status.code(), fmt::format("{}: array {}: {}", path_, array.name(), status.message()));
+  return InArray(array, status);
 }
 
 }  // namespace slabstream

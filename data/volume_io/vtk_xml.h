@@ -49,6 +49,13 @@ class VtkXmlFile {
   // Whether the file can hold that many samples, before memory is taken for them. InvalidArgument: an encoding that is not supported.
   // DataLoss: it is too short.
   Status CheckHolds(const VtkArray& array, SampleType type, std::int64_t samples) const;
+  // The byte of the file at which that many samples begin, and whether they are big endian. InvalidArgument: they are text, base64 or
+  // compressed. DataLoss: the file has another number of bytes for them, or is too short.
+  struct PlainSamples {
+    std::int64_t begin = 0;
+    bool big_endian = false;
+  };
+  Result<PlainSamples> FindPlainSamples(const VtkArray& array, SampleType type, std::int64_t samples) const;
   // Fills `out`, whole samples in this machine's byte order. The array was checked for as many (CheckHolds). DataLoss: truncated, damaged.
   Status ReadSamples(const VtkArray& array, SampleType type, AlignedVector<std::byte>& out) const;
 
@@ -68,6 +75,7 @@ class VtkXmlFile {
   void OnEnd(const XmlTag& tag);
   Status FindAppended();
   Result<Place> PlaceOf(const VtkArray& array) const;
+  Status InArray(const VtkArray& array, const Status& status) const;
 
   std::string path_;
   XmlTag file_, dataset_, piece_;

@@ -1,0 +1,36 @@
+// Levels: which level of a dataset a request draws, and what the request says in terms of that level.
+//
+// Positions in the world are the same at all levels. What a request says in voxels, in percent of the volume or in terms of its bounding
+// sphere means the finest level. So a picture shows the same part of the world at the same scale, whichever level it is drawn from.
+//
+// Pure.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/volume/summary.h"
+
+namespace slabstream {
+
+struct VolumeLevels {
+  std::vector<VolumeDescription> levels;  // finest first; more than one
+  // Of the level that statistics are taken from: its range and histogram are those of the dataset, at every level.
+  std::shared_ptr<const VolumeSummary> overview;
+  int overview_level = 0;
+};
+
+// Of the dataset, without bricks.
+VolumeSummary StatisticsOf(const VolumeLevels& levels);
+
+// The coarsest level whose voxels are at most request.detail pixels wide wherever the picture shows the volume, or the one that
+// request.level names. Counts are those axes along which a level has coarser voxels than the finest one. Errors of ResolveRequest and
+// MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
+Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels);
+
+// The request that shows of `level` what `request` shows of `finest`. `level` describes the same part of the world.
+FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level);
+
+}  // namespace slabstream

@@ -1,0 +1,96 @@
+#include "data/open/any_volume.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "common/volume/memory_budget.h"
+#include "data/open/open_source.h"
+#include "data/survey/survey.h"
+#include "data/volume_io/formats.h"
+
+namespace slabstream {
+namespace {
+
+bool IsReadWhole(const std::string& path, const ReadOptions& options) {
+  return FindFormat(path, options) != nullptr || FindSourceFormat(path) == nullptr;
+}
+
+// Half of it each for chunks under way and for those that may be needed again.
+ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
+  const std::uint64_t half = process_bytes / 16;
+  return {.under_way_bytes = std::clamp<std::uint64_t>(half, 16U << 20, 128U << 20),
+          .cache_bytes = std::clamp<std::uint64_t>(half, 16U << 20, 1U << 30)};
+}
+
+std::atomic<std::uint64_t> process_memory = 0;  // 0: not said
+
+}  // namespace
+
+const SourceContext& ProcessReadContext() {
+  static const SourceContext kContext = [] {
+    const std::uint64_t said = process_memory;
+    return std::make_shared<ReadContext>(LimitsFor(said > 0 ? said : std::uint64_t(std::max<std::int64_t>(AvailableMemoryBytes(), 0))));
+  }();
+  return kContext;
+}
+
+void SetReadMemory(std::uint64_t process_bytes) { process_memory = process_bytes; }
+
+Result<std::uint64_t> VersionOf(const std::vector<std::string>& files) {
+  std::string text;
+  for (const std::string& file : files) {
+    struct stat found {};
+    if (::stat(file.c_str(), &found) != 0) {
+      const int error = errno;
+      return Status(error == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable,
+                    file + ": " + std::generic_category().message(error));
+    }
+    text += fmt::format("{} {}.{} ", found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec);
+  }
+  return XXH3_64bits(text.data(), text.size());
+}
+
+Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
+  if (IsReadWhole(path, options)) return ReadVolume(path, options);
+  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+  if (!source.ok()) return source.status();
+  if (options.progress != nullptr) options.progress->Begin(100);
+  int told = 0;
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, [&](int percent) {
+    if (options.progress != nullptr) options.progress->Add(percent - std::exchange(told, percent));
+  });
+  if (!volume.ok()) return volume.status();
+  LoadedVolume loaded{.volume = *std::move(volume)};
+  const SourceInfo& info = (*source)->info();
+  const VolumeGeometry& geometry = loaded.volume->description.geometry;
+  loaded.info.description = loaded.volume->description;
+  loaded.info.file_type = info.file_type;
+  loaded.info.format = info.format;
+  loaded.info.stored_size = geometry.size;
+  loaded.info.steps = StepsOf(geometry.spacing);
+  loaded.info.labels = info.labels;
+  return loaded;
+}
+
+Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {
+  if (IsReadWhole(path, options)) return CheckVolumeHeaders(path, options);
+  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+  if (!source.ok()) return source.status();
+  return (*source)->info().files;
+}
+
+Status CheckAnyVolume(const std::string& path, const ReadOptions& options) {
+  return IsReadWhole(path, options) ? CheckVolume(path, options) : Status::Ok();
+}
+
+bool LooksLikeAnyVolume(const std::string& path) { return CheckAnyVolume(path).ok(); }
+
+}  // namespace slabstream

@@ -1,0 +1,33 @@
+// Volumes of any format, whether it is read as a whole (data/volume_io) or in parts (data/sources). Where both know a path, the first one
+// reads it as a whole, and the second one in parts.
+//
+// Any thread.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/status.h"
+#include "data/sources/source_format.h"
+#include "data/volume_io/volume_reader.h"
+
+namespace slabstream {
+
+// The context of this process, made at its first use. It takes about SourceBytes of the memory that was said before, or else of what the
+// machine has for the process (common/planning/worker_memory.h).
+const SourceContext& ProcessReadContext();
+void SetReadMemory(std::uint64_t process_bytes);
+
+// Of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one cannot be looked at.
+Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
+
+// ReadVolume, or the finest level of a source.
+Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
+// CheckVolumeHeaders, or the files of a source, which it opens.
+Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});
+// CheckVolume, or whether a format of sources knows the path.
+Status CheckAnyVolume(const std::string& path, const ReadOptions& options = {});
+bool LooksLikeAnyVolume(const std::string& path);
+
+}  // namespace slabstream

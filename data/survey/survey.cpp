@@ -1,0 +1,141 @@
+#include "data/survey/survey.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <future>
+#include <utility>
+#include <vector>
+
+#include "common/volume/memory_budget.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::int64_t kPieceBytes = std::int64_t{16} << 20;
+
+// Voxels along each axis of pieces: whole blocks of the source and whole bricks as far as that fits into kPieceBytes, then more of them
+// along x, y and z.
+Index3 PieceSize(const SourceLevel& level) {
+  const Index3& size = level.description.geometry.size;
+  const auto bytes = [&](const Index3& piece) {
+    return std::int64_t(CountIn(piece)) * std::int64_t(BytesPerSample(level.description.type));
+  };
+  Index3 piece;
+  for (const Axis axis : kAxes)
+    piece[axis] = std::min((level.block[axis] + kBrick - 1) / kBrick * kBrick, CubesOver(size, kBrick)[axis] * kBrick);
+  for (const Axis axis : {Axis::kZ, Axis::kY, Axis::kX}) {
+    while (bytes(piece) > 2 * kPieceBytes && piece[axis] > kBrick) piece[axis] = (piece[axis] / kBrick + 1) / 2 * kBrick;
+  }
+  for (const Axis axis : kAxes) {
+    while (2 * bytes(piece) <= kPieceBytes && piece[axis] < size[axis]) piece[axis] *= 2;
+  }
+  return piece;
+}
+
+std::vector<Box> PiecesOf(const SourceLevel& level) {
+  const Box bounds = level.description.geometry.bounds();
+  const Index3 piece = PieceSize(level);
+  std::vector<Box> pieces;
+  for (std::int32_t z = 0; z < bounds.end.z; z += piece.z) {
+    for (std::int32_t y = 0; y < bounds.end.y; y += piece.y) {
+      for (std::int32_t x = 0; x < bounds.end.x; x += piece.x) {
+        pieces.push_back(Intersection({{x, y, z}, Index3{x, y, z} + piece}, bounds));
+      }
+    }
+  }
+  return pieces;
+}
+
+// At most `most` bytes of them, spread evenly.
+std::vector<Box> Sampled(const std::vector<Box>& pieces, const VolumeDescription& description, std::int64_t most) {
+  const double share = std::min(1.0, double(most) / double(description.voxel_bytes()));
+  const auto count = std::clamp<std::size_t>(std::size_t(share * double(pieces.size())), 1, pieces.size());
+  std::vector<Box> sample;
+  for (std::size_t i = 0; i < count; ++i) sample.push_back(pieces[std::size_t((double(i) + 0.5) * double(pieces.size()) / double(count))]);
+  return sample;
+}
+
+// Calls take(block) for each box in turn, while the next one is being read.
+template <class Take>
+Status ReadPieces(VolumeSource& source, int level, const std::vector<Box>& boxes, Take&& take) {
+  struct Piece {
+    VoxelBlock block;
+    std::promise<Status> end;
+  };
+  const ScalarType type = source.info().levels[std::size_t(level)].description.type;
+  std::vector<std::unique_ptr<Piece>> under_way(boxes.size());
+  const auto begin = [&](std::size_t i) {
+    under_way[i] = std::make_unique<Piece>(Piece{MakeVoxelBlock(boxes[i], type), {}});
+    Piece& piece = *under_way[i];
+    source.Read(level, boxes[i], piece.block.bytes, {}, [&piece](Status status) { piece.end.set_value(std::move(status)); });
+  };
+  Status first_error;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    if (i == 0) begin(i);
+    if (i + 1 < boxes.size() && first_error.ok()) begin(i + 1);
+    if (under_way[i] == nullptr) break;
+    const Status status = under_way[i]->end.get_future().get();
+    if (status.ok() && first_error.ok()) take(under_way[i]->block);
+    if (first_error.ok()) first_error = status;
+    under_way[i].reset();
+  }
+  return first_error;
+}
+
+}  // namespace
+
+Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int percent)>& tell) {
+  const std::vector<SourceLevel>& levels = source.info().levels;
+  const auto bytes = [&](std::size_t level) { return levels[level].description.voxel_bytes(); };
+  std::size_t level = 0;
+  if (bytes(0) > kExactBytes) {
+    while (level + 1 < levels.size() && bytes(level) > kSurveyBytes) ++level;
+  }
+  const VolumeDescription& description = levels[level].description;
+  std::vector<Box> boxes = PiecesOf(levels[level]);
+  if (bytes(level) > kExactBytes) boxes = Sampled(boxes, description, kSurveyBytes);
+
+  PiecewiseSummary pieces(description);
+  std::size_t done = 0;
+  const auto count = [&] { tell(int(100 * ++done / boxes.size())); };
+  Status read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) {
+    pieces.Add(block);
+    count();
+  });
+  if (read.ok() && pieces.EndOfPieces()) {
+    read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) { pieces.AddAgain(block); });
+  }
+  if (!read.ok()) return read;
+  return Survey{int(level), std::make_shared<const VolumeSummary>(pieces.Take())};
+}
+
+VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
+  VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
+  summary.non_finite = surveyed.non_finite;
+  summary.brick_counts = CubesOver(description.geometry.size, kBrick);
+  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
+  return summary;
+}
+
+Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, const std::function<void(int percent)>& tell) {
+  const SourceLevel& of = source.info().levels[std::size_t(level)];
+  if (Status fits = CheckFitsMemory(of.description.voxel_bytes(), source.info().format + " volume"); !fits.ok()) return fits;
+  auto volume = std::make_shared<Volume>();
+  volume->description = of.description;
+  volume->block = MakeVoxelBlock(of.description.geometry.bounds(), of.description.type);
+  // Stretches of whole slices, so that each lies in one piece of memory.
+  const Index3& size = of.description.geometry.size;
+  const std::size_t slice_bytes = std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(of.description.type);
+  const std::int32_t step = std::max(of.block.z, std::int32_t(kPieceBytes / std::int64_t(slice_bytes)) / of.block.z * of.block.z);
+  for (std::int32_t z = 0; z < size.z; z += step) {
+    const std::int32_t end = std::min(z + step, size.z);
+    const std::span<std::byte> out =
+        std::span(volume->block.bytes).subspan(std::size_t(z) * slice_bytes, std::size_t(end - z) * slice_bytes);
+    if (Status read = source.ReadNow(level, {{0, 0, z}, {size.x, size.y, end}}, out); !read.ok()) return read;
+    tell(int(100 * std::int64_t{end} / size.z));
+  }
+  return std::shared_ptr<const Volume>(std::move(volume));
+}
+
+}  // namespace slabstream

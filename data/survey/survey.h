@@ -1,0 +1,43 @@
+// Survey: what is known about a source before anybody draws it. Statistics are those of the whole volume, or, of a large one, of a coarse
+// level or of a sample; so the first picture waits for no pass over all voxels.
+//
+//   level 0 takes at most kExactBytes   range, histogram and ranges of bricks of level 0
+//   else                                range and histogram of the finest level of at most kSurveyBytes, or of a sample of as many bytes of
+//                                       the coarsest one, spread evenly
+// This depends on the source alone, never on the memory of a process: a transfer function that is made for the range of a dataset must not
+// depend on it either. Values beyond that range are drawn as the nearest one in it.
+//
+// Any thread. Reads in pieces; takes some tens of MiB.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stop_token>
+
+#include "common/base/status.h"
+#include "common/volume/summary.h"
+#include "data/sources/volume_source.h"
+
+namespace slabstream {
+
+inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes = std::int64_t{128} << 20;
+
+struct Survey {
+  int level = 0;  // of `summary`
+  // Of that level. Ranges of bricks are those of any value if only a sample was read.
+  std::shared_ptr<const VolumeSummary> summary;
+};
+
+// `tell`: hears each whole percent, on this thread. Errors of VolumeSource::Read.
+Result<Survey> SurveySource(
+    VolumeSource& source, const std::function<void(int percent)>& tell = [](int) {});
+
+// What is known of a level of which nobody has read all voxels: the statistics of the survey, and bricks of any value.
+VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+
+// A whole level in memory. ResourceExhausted: it does not fit; errors of VolumeSource::Read.
+Result<std::shared_ptr<const Volume>> ReadLevel(
+    VolumeSource& source, int level, const std::function<void(int percent)>& tell = [](int) {});
+
+}  // namespace slabstream

@@ -1,0 +1,32 @@
+// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds out
+// by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked.
+//
+// One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "common/volume/stored_at.h"
+#include "common/wire/any_message.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+class StoredVoxels {
+ public:
+  // `deliver`: called on any thread, never once this is destroyed.
+  explicit StoredVoxels(std::function<void(MessageReceived)> deliver);
+  ~StoredVoxels();
+  StoredVoxels(const StoredVoxels&) = delete;
+  StoredVoxels& operator=(const StoredVoxels&) = delete;
+
+  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come. False: the coordinator must be asked.
+  bool Read(const ChunkRequest& request, const StoredAt& stored);
+
+ private:
+  struct Shared;  // with reads that outlive this
+  const std::shared_ptr<Shared> shared_;
+};
+
+}  // namespace slabstream
