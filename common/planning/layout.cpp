@@ -96,31 +96,64 @@ struct LayoutMaker::State {
                                        .shape = shape});
   }
 
-  // Boxes of voxels that are read in parts end where blocks of their source end, so that few blocks are read for two boxes. The
-  // decomposition of the policy divides the volume in blocks; if its boxes are too large, cubes of blocks do.
-  Partition MakeStoredPartition(const ResolvedPolicy& policy) {
+  // Blocks of the source that are read for the boxes, in voxels.
+  std::int64_t VoxelsRead(const Partition& partition, const Index3& block) {
+    std::int64_t voxels = 0;
+    for (const Box& box : partition.boxes()) {
+      if (!fields.Shows(box)) continue;
+      Box read = Grown(box, request.volume->renderer()->reach(), partition.bounds());
+      for (const Axis axis : kAxes) {
+        read.begin[axis] = read.begin[axis] / block[axis] * block[axis];
+        read.end[axis] = (read.end[axis] - 1) / block[axis] * block[axis] + block[axis];
+      }
+      voxels += Intersection(read, partition.bounds()).voxel_count();
+    }
+    return voxels;
+  }
+
+  // The volume divided in units of `unit` voxels, in the fewest groups with which boxes are not too large. Nothing: they are, whatever the
+  // number of groups.
+  std::optional<Partition> PartitionInUnits(const ResolvedPolicy& policy, Partition (*make)(const DecompositionRequest&),
+                                            const Index3& unit) {
     const Box bounds = request.summary->description.geometry.bounds();
-    const Index3 block = request.summary->stored->block.end;
-    const Index3 blocks = {(bounds.end.x - 1) / block.x + 1, (bounds.end.y - 1) / block.y + 1, (bounds.end.z - 1) / block.z + 1};
-    const std::int64_t slots = request.slots;
+    const Index3 units = {(bounds.end.x - 1) / unit.x + 1, (bounds.end.y - 1) / unit.y + 1, (bounds.end.z - 1) / unit.z + 1};
+    const WorkField work = WorkField::Uniform(units);
+    const std::int64_t slots = request.slots, count = std::int64_t(CountIn(units));
     const std::int64_t bytes = bounds.voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
     const int least = int(std::clamp<std::int64_t>(bytes / (request.box_bytes_target * slots), 1, kMaxGroups));
-    std::optional<Partition> made;
-    for (const auto make : {policy.decomposition->make, &MakeSubcubes}) {
-      const WorkField work = WorkField::Uniform(blocks);
-      for (int groups = policy.groups > 0 ? policy.groups : least; groups <= kMaxGroups; groups += std::max(1, groups / 8)) {
-        const auto boxes = std::int64_t(groups) * slots;
-        if (made && boxes > std::int64_t(CountIn(blocks))) break;
-        made = make({.work = &work,
-                     .boxes = int(std::min({boxes, std::int64_t(CountIn(blocks)), kMostBoxes})),
-                     .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
-                     .together = int(std::min(slots, kMostBoxes)),
-                     .axis = policy.axis})
-                   .OfBlocks(block, bounds, request.volume->renderer()->reach());
-        if (stopped() || policy.groups > 0 || BoxesFit(*made)) return *std::move(made);
-      }
+    for (int groups = policy.groups > 0 ? policy.groups : least; groups <= kMaxGroups; groups += std::max(1, groups / 8)) {
+      const std::int64_t boxes = std::min(groups * slots, kMostBoxes);
+      Partition made = make({.work = &work,
+                             .boxes = int(std::min(boxes, count)),
+                             .most_boxes = int(std::min(kMaxGroups * slots, kMostBoxes)),
+                             .together = int(std::min(slots, kMostBoxes)),
+                             .axis = policy.axis})
+                           .OfBlocks(unit, bounds, request.volume->renderer()->reach());
+      if (policy.groups > 0 || BoxesFit(made)) return made;
+      if (boxes >= count || stopped()) break;
     }
-    return *std::move(made);
+    return std::nullopt;
+  }
+
+  // Boxes of voxels that are read in parts end where blocks of their source end, so that few blocks are read for two boxes: those of the
+  // policy's decomposition, or if they are too large or blocks would be read much more often, cubes of blocks or smaller ones.
+  Partition MakeStoredPartition(const ResolvedPolicy& policy) {
+    constexpr double kWorthIt = 0.8;
+    constexpr std::int32_t kSmallUnit = 32;
+    const Index3 block = request.summary->stored->block.end;
+    const Index3 small = Min(block, Uniform(kSmallUnit));
+    std::optional<Partition> best = PartitionInUnits(policy, policy.decomposition->make, block);
+    double read = best ? double(VoxelsRead(*best, block)) : std::numeric_limits<double>::infinity();
+    for (const Index3& unit : {block, small}) {
+      std::optional<Partition> cubes = PartitionInUnits(policy, &MakeSubcubes, unit);
+      if (!cubes) continue;
+      const auto voxels = double(VoxelsRead(*cubes, block));
+      if (voxels > kWorthIt * read) continue;
+      best = std::move(cubes);
+      read = voxels;
+    }
+    // Too large even so: whoever wants the frame is told (FramesThatFit).
+    return best ? *std::move(best) : MakePartition(policy, MostGroups(request, policy), fields.Of(BalanceBy::kVoxels));
   }
 
   bool stopped() const { return request.stop.stop_requested(); }

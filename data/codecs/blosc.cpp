@@ -26,6 +26,6 @@ class Blosc : public ChunkCodec {
 
 }  // namespace
 
-Codec BloscCodec() { return std::make_shared<Blosc>(); }
+SharedCodec BloscCodec() { return std::make_shared<Blosc>(); }
 
 }  // namespace slabstream

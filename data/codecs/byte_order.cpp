@@ -51,7 +51,7 @@ class SwapBytes : public ChunkCodec {
 
 }  // namespace
 
-Codec SwapBytesCodec(std::size_t element_bytes) {
+SharedCodec SwapBytesCodec(std::size_t element_bytes) {
   CHECK(element_bytes == 1 || element_bytes == 2 || element_bytes == 4 || element_bytes == 8) << element_bytes;
   return std::make_shared<SwapBytes>(element_bytes);
 }

@@ -10,23 +10,23 @@
 
 namespace slabstream {
 
-using Codec = std::shared_ptr<const ChunkCodec>;
+using SharedCodec = std::shared_ptr<const ChunkCodec>;
 
 // RFC 1952, of one or more members; RFC 1950.
-Codec GzipCodec();
-Codec ZlibCodec();
+SharedCodec GzipCodec();
+SharedCodec ZlibCodec();
 // RFC 8878, of one or more frames.
-Codec ZstdCodec();
+SharedCodec ZstdCodec();
 // A chunk of Blosc 1, with any of its inner codecs and shuffles.
-Codec BloscCodec();
+SharedCodec BloscCodec();
 // A block of LZ4 behind the number of its decoded bytes (32 bits, little endian), as numcodecs writes it.
-Codec Lz4Codec();
+SharedCodec Lz4Codec();
 // Four bytes behind the others: their CRC-32C, little endian (RFC 3720). DataLoss unless it is theirs.
-Codec Crc32cCodec();
+SharedCodec Crc32cCodec();
 // Elements of so many bytes (1, 2, 4 or 8) in the other byte order.
-Codec SwapBytesCodec(std::size_t element_bytes);
+SharedCodec SwapBytesCodec(std::size_t element_bytes);
 // The first byte of each element, then the second one of each, and so on. `element_bytes` is at least 1.
-Codec ShuffleCodec(std::size_t element_bytes);
+SharedCodec ShuffleCodec(std::size_t element_bytes);
 
 std::uint32_t Crc32c(std::span<const std::byte> bytes);
 

@@ -63,6 +63,6 @@ std::uint32_t Crc32c(std::span<const std::byte> bytes) {
   return ~remainder;
 }
 
-Codec Crc32cCodec() { return std::make_shared<CheckedSum>(); }
+SharedCodec Crc32cCodec() { return std::make_shared<CheckedSum>(); }
 
 }  // namespace slabstream

@@ -76,7 +76,7 @@ constexpr int kLargestWindow = 15, kGzipHeader = 16;  // zlib's numbers
 
 }  // namespace
 
-Codec GzipCodec() { return std::make_shared<Inflate>("gzip", kLargestWindow + kGzipHeader, true); }
-Codec ZlibCodec() { return std::make_shared<Inflate>("zlib", kLargestWindow, false); }
+SharedCodec GzipCodec() { return std::make_shared<Inflate>("gzip", kLargestWindow + kGzipHeader, true); }
+SharedCodec ZlibCodec() { return std::make_shared<Inflate>("zlib", kLargestWindow, false); }
 
 }  // namespace slabstream

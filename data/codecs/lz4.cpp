@@ -31,6 +31,6 @@ class Lz4 : public ChunkCodec {
 
 }  // namespace
 
-Codec Lz4Codec() { return std::make_shared<Lz4>(); }
+SharedCodec Lz4Codec() { return std::make_shared<Lz4>(); }
 
 }  // namespace slabstream

@@ -33,7 +33,7 @@ class Shuffle : public ChunkCodec {
 
 }  // namespace
 
-Codec ShuffleCodec(std::size_t element_bytes) {
+SharedCodec ShuffleCodec(std::size_t element_bytes) {
   CHECK(element_bytes >= 1);
   return std::make_shared<Shuffle>(element_bytes);
 }

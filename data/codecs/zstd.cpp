@@ -59,6 +59,6 @@ class Zstd : public ChunkCodec {
 
 }  // namespace
 
-Codec ZstdCodec() { return std::make_shared<Zstd>(); }
+SharedCodec ZstdCodec() { return std::make_shared<Zstd>(); }
 
 }  // namespace slabstream

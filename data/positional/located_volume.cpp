@@ -12,12 +12,9 @@
 namespace slabstream {
 namespace {
 
-// Whole slices, of about so many bytes in the file: rows of a slice lie together.
+// A row: its samples lie together.
 Index3 BlockOf(const RawHeader& header, const AxisTurn& turn) {
-  constexpr std::int64_t kBytes = std::int64_t{1} << 20;
-  const std::int64_t slice_bytes = header.sample_bytes() / header.size.z;
-  Index3 stored = header.size;
-  stored.z = std::int32_t(std::clamp<std::int64_t>(kBytes / slice_bytes, 1, header.size.z));
+  const Index3 stored = {header.size.x, 1, 1};
   return {stored[turn.from[0]], stored[turn.from[1]], stored[turn.from[2]]};
 }
 

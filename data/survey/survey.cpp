@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
@@ -33,36 +34,21 @@ Index3 PieceSize(const SourceLevel& level) {
   return piece;
 }
 
-std::vector<Box> PiecesOf(const SourceLevel& level) {
-  const Box bounds = level.description.geometry.bounds();
-  const Index3 piece = PieceSize(level);
-  std::vector<Box> pieces;
-  for (std::int32_t z = 0; z < bounds.end.z; z += piece.z) {
-    for (std::int32_t y = 0; y < bounds.end.y; y += piece.y) {
-      for (std::int32_t x = 0; x < bounds.end.x; x += piece.x) {
-        pieces.push_back(Intersection({{x, y, z}, Index3{x, y, z} + piece}, bounds));
-      }
-    }
-  }
-  return pieces;
-}
+std::vector<Box> PiecesOf(const SourceLevel& level) { return CutAtBlocks(level.description.geometry.bounds(), PieceSize(level)); }
 
-// Blocks of the source, spread evenly, of about `most` bytes in all.
+// Blocks of the source, or several of them together, spread evenly: about `most` bytes in all.
 std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
+  constexpr std::size_t kLeastBytes = 1U << 20;
   const Box bounds = level.description.geometry.bounds();
-  const Index3 blocks = {(bounds.end.x - 1) / level.block.x + 1, (bounds.end.y - 1) / level.block.y + 1,
-                         (bounds.end.z - 1) / level.block.z + 1};
-  const std::size_t all = CountIn(blocks);
-  const auto count = std::clamp<std::size_t>(std::size_t(double(most) / double(level.description.voxel_bytes()) * double(all)), 1, all);
-  std::vector<Box> sample;
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto number = std::size_t((double(i) + 0.5) * double(all) / double(count));
-    const Index3 block = {std::int32_t(number % std::size_t(blocks.x)),
-                          std::int32_t(number / std::size_t(blocks.x) % std::size_t(blocks.y)),
-                          std::int32_t(number / std::size_t(blocks.x) / std::size_t(blocks.y))};
-    const Index3 begin = {block.x * level.block.x, block.y * level.block.y, block.z * level.block.z};
-    sample.push_back(Intersection({begin, begin + level.block}, bounds));
+  Index3 block = level.block;
+  for (const Axis axis : kAxes) {
+    while (CountIn(block) * BytesPerSample(level.description.type) < kLeastBytes && block[axis] < bounds.end[axis]) block[axis] *= 2;
   }
+  const std::vector<Box> all = CutAtBlocks(bounds, block);
+  const double share = std::min(1.0, double(most) / double(level.description.voxel_bytes()));
+  const auto count = std::clamp<std::size_t>(std::size_t(share * double(all.size())), 1, all.size());
+  std::vector<Box> sample;
+  for (std::size_t i = 0; i < count; ++i) sample.push_back(all[std::size_t((double(i) + 0.5) * double(all.size()) / double(count))]);
   return sample;
 }
 

@@ -1,7 +1,6 @@
 #include "data/zarr/zarr_array.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <array>
 #include <utility>
@@ -28,13 +27,14 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
     if (layout_.sharding) return ReadFromShard(*layout_.sharding, index, std::move(done));
     const std::string key = Join(path_, layout_.Key(index));
-    auto decode = [self = shared_from_this(), what = NameOf(key), done = std::move(done)](Result<Bytes> answer) mutable {
-      // A chunk that is much longer than any codec would make it is damaged.
-      if (answer.status().code() == StatusCode::kResourceExhausted) answer = Status::DataLoss("damaged: " + answer.status().message());
+    const std::uint64_t most = MostStored(shape().chunk_bytes());
+    auto decode = [self = shared_from_this(), what = NameOf(key), most, done = std::move(done)](Result<Bytes> answer) mutable {
+      if (answer.ok() && answer->size() > most) answer = Status::DataLoss(fmt::format("{}: damaged: has more than {} bytes", what, most));
       DecodeOn(self->context_.source, self->layout_.codecs, std::move(answer), self->shape().chunk_bytes(), std::move(what),
                std::move(done));
     };
-    context_.store->Read(key, {}, MostStored(shape().chunk_bytes()), std::move(decode));
+    // One byte more than there may be tells that there are more.
+    context_.store->Read(key, {.bytes = most + 1}, most + 1, std::move(decode));
   }
 
  private:

@@ -15,7 +15,7 @@ namespace {
 
 struct NamedCodec {
   std::string_view name;
-  Codec (*make)();
+  SharedCodec (*make)();
 };
 
 // Those of numcodecs, by which version 2 knows them.
@@ -26,7 +26,7 @@ constexpr std::array<NamedCodec, 4> kByteCodecs = {
     {{"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"crc32c", Crc32cCodec}}};
 constexpr std::string_view kNumcodecs = "numcodecs.";  // before their names in version 3
 
-Result<Codec> ReadShuffle(const Field& settings) {
+Result<SharedCodec> ReadShuffle(const Field& settings) {
   const Field element = settings["elementsize"];
   constexpr std::uint64_t kUsual = 4, kMost = 255;
   const Result<std::uint64_t> bytes = element.stated() ? element.Whole(1, kMost) : kUsual;
@@ -38,7 +38,7 @@ Result<Codec> ReadShuffle(const Field& settings) {
 Result<std::string> NameOf(const Field& codec) { return codec.is_text() ? codec.Text() : codec["name"].Text(); }
 Status WrongName(const Field& codec, std::string_view must_be) { return (codec.is_text() ? codec : codec["name"]).Wrong(must_be); }
 
-Result<Codec> ReadByteCodec(const Field& codec, std::string_view name) {
+Result<SharedCodec> ReadByteCodec(const Field& codec, std::string_view name) {
   const NamedCodec* named = FindNamed(kByteCodecs, name);
   if (named == nullptr && name.starts_with(kNumcodecs)) {
     if (name == "numcodecs.shuffle") return ReadShuffle(codec["configuration"]);
@@ -69,7 +69,7 @@ Result<bool> ReadBigEndian(const Field& endian, SampleType type) {
 
 }  // namespace
 
-Result<Codec> ReadCompressor(const Field& compressor) {
+Result<SharedCodec> ReadCompressor(const Field& compressor) {
   const Result<std::string> id = compressor["id"].Text();
   if (!id.ok()) return id.status();
   const NamedCodec* const named = FindNamed(kCompressors, *id);
@@ -77,7 +77,7 @@ Result<Codec> ReadCompressor(const Field& compressor) {
   return named->make();
 }
 
-Result<Codec> ReadFilter(const Field& filter) {
+Result<SharedCodec> ReadFilter(const Field& filter) {
   const Result<std::string> id = filter["id"].Text();
   if (!id.ok()) return id.status();
   if (*id == "shuffle") return ReadShuffle(filter);
@@ -101,7 +101,7 @@ Result<CodecList> ReadCodecList(const Field& codecs, std::size_t axes, SampleTyp
     if (!name.ok()) return name.status();
     if (list.sharding) return WrongName(codec, "left out: codecs behind sharding_indexed are not supported");
     if (in_bytes) {
-      Result<Codec> byte_codec = ReadByteCodec(codec, *name);
+      Result<SharedCodec> byte_codec = ReadByteCodec(codec, *name);
       if (!byte_codec.ok()) return byte_codec.status();
       list.chain.push_back(*std::move(byte_codec));
     } else if (*name == "transpose") {

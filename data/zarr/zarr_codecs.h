@@ -14,8 +14,8 @@
 namespace slabstream::zarr {
 
 // Version 2: a compressor or filter, {"id": "zlib", ...}.
-Result<Codec> ReadCompressor(const Field& compressor);
-Result<Codec> ReadFilter(const Field& filter);
+Result<SharedCodec> ReadCompressor(const Field& compressor);
+Result<SharedCodec> ReadFilter(const Field& filter);
 
 // Version 3: a list of codecs, as far as they concern the elements of one chunk.
 struct CodecList {

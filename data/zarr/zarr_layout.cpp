@@ -174,12 +174,12 @@ Result<ZarrLayout> ParseLayout2(const Field& metadata) {
   if (filters.given() && (!filters.is_array() || filters.size() > kMostFilters))
     return filters.Wrong("a list of at most 16 filters, or null");
   for (std::size_t i = 0; i < filters.size(); ++i) {
-    Result<Codec> filter = ReadFilter(filters[i]);
+    Result<SharedCodec> filter = ReadFilter(filters[i]);
     if (!filter.ok()) return filter.status();
     layout.codecs.push_back(*std::move(filter));
   }
   if (const Field compressor = metadata["compressor"]; compressor.given()) {
-    Result<Codec> codec = ReadCompressor(compressor);
+    Result<SharedCodec> codec = ReadCompressor(compressor);
     if (!codec.ok()) return codec.status();
     layout.codecs.push_back(*std::move(codec));
   }

@@ -29,6 +29,12 @@ std::vector<FuzzBytes> ColorTableSeeds();
 bool DecodeVolumeFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> VolumeFileSeeds();
 
+bool DecodeChunkCodec(std::span<const std::byte> input);
+std::vector<FuzzBytes> ChunkCodecSeeds();
+
+bool DecodeZarr(std::span<const std::byte> input);
+std::vector<FuzzBytes> ZarrSeeds();
+
 bool DecodeDicomFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> DicomFileSeeds();
 

@@ -18,6 +18,8 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"transfer-functions", "ParaView's colour maps", DecodeTransferFunction, TransferFunctionSeeds},
       {"color-tables", "tables of label colours", DecodeColorTable, ColorTableSeeds},
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
+      {"chunk-codecs", "codecs of chunks", DecodeChunkCodec, ChunkCodecSeeds},
+      {"zarr", "metadata, shards and chunks of Zarr", DecodeZarr, ZarrSeeds},
       {"dicom-files", "DICOM files, but for their pixels", DecodeDicomFile, DicomFileSeeds},
       {"mesh-files", "files of unstructured grids", DecodeMeshFile, MeshFileSeeds},
       {"hdf5-files", "HDF5 files and their chunks", DecodeHdf5File, Hdf5FileSeeds},

@@ -29,7 +29,7 @@ std::string SomeBytes(Random& random, std::size_t count) {
 
 struct Case {
   std::string name;
-  Codec codec;
+  SharedCodec codec;
   std::string (*pack)(const std::string& bytes);
   bool checks = true;  // its bytes tell damage and their number
 };
@@ -140,7 +140,7 @@ TEST(Codecs, WhatDoesNothingReturnsItsInput) {
 }
 
 TEST(Codecs, PartsOfElementsAreDamage) {
-  for (const Codec& codec : {SwapBytesCodec(2), ShuffleCodec(2)}) {
+  for (const SharedCodec& codec : {SwapBytesCodec(2), ShuffleCodec(2)}) {
     const Status status = codec->Decode(ToBytes("odd"), 100).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss);
     EXPECT_THAT(status.message(), HasSubstr("has 3 bytes"));

@@ -114,7 +114,7 @@ TEST(ZarrArrayTest, HasTheFillValueThatTheMetadataWrite) {
   const TemporaryDirectory folder;
   const struct {
     SampleType type;
-    Json fill;
+    ZarrJson fill;
     double value;
   } cases[] = {{SampleType::kUint8, 255, 255},
                {SampleType::kInt8, -128, -128},

@@ -18,10 +18,10 @@ struct Wrong {
   std::string named;  // in the message
 };
 
-Json Changed(Json metadata, const Wrong& wrong) {
-  const Json::json_pointer at(wrong.at);
+ZarrJson Changed(ZarrJson metadata, const Wrong& wrong) {
+  const ZarrJson::json_pointer at(wrong.at);
   if (!wrong.value.empty()) {
-    metadata[at] = Json::parse(wrong.value);
+    metadata[at] = ZarrJson::parse(wrong.value);
   } else {
     metadata.at(at.parent_pointer()).erase(at.back());
   }
@@ -29,10 +29,10 @@ Json Changed(Json metadata, const Wrong& wrong) {
 }
 
 template <class Parse>
-void ExpectRefused(const Json& right, const std::vector<Wrong>& table, const Parse& parse) {
+void ExpectRefused(const ZarrJson& right, const std::vector<Wrong>& table, const Parse& parse) {
   ASSERT_TRUE(parse(right).ok()) << parse(right).message();
   for (const Wrong& wrong : table) {
-    const Json metadata = Changed(right, wrong);
+    const ZarrJson metadata = Changed(right, wrong);
     const Status status = parse(metadata);
     EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << wrong.at << " " << wrong.value;
     EXPECT_THAT(status.message(), HasSubstr("object: " + wrong.named)) << wrong.at << " " << wrong.value;
@@ -79,7 +79,7 @@ TEST(ZarrMetadataTest, Version2NamesTheFieldThatIsWrong) {
                  {"/filters", "{}", "filters is {}"},
                  {"/filters/0/id", "\"delta\"", "filters[0].id is \"delta\""},
                  {"/filters/0/elementsize", "0", "filters[0].elementsize is 0"}},
-                [](const Json& metadata) { return zarr::ParseLayout2(Field("object", metadata)).status(); });
+                [](const ZarrJson& metadata) { return zarr::ParseLayout2(Field("object", metadata)).status(); });
 }
 
 TEST(ZarrMetadataTest, Version3NamesTheFieldThatIsWrong) {
@@ -125,14 +125,14 @@ TEST(ZarrMetadataTest, Version3NamesTheFieldThatIsWrong) {
                  {"/storage_transformers", "[{}]", "storage_transformers is [{}]"},
                  {"/new_extension", "{}", "new_extension is {}"},
                  {"/new_extension", "{\"must_understand\":true}", "new_extension is {"}},
-                [](const Json& metadata) { return zarr::ParseLayout3(Field("object", metadata)).status(); });
-  Json extended = MetadataOf(spec);
+                [](const ZarrJson& metadata) { return zarr::ParseLayout3(Field("object", metadata)).status(); });
+  ZarrJson extended = MetadataOf(spec);
   extended["new_extension"] = {{"must_understand", false}};
   EXPECT_TRUE(zarr::ParseLayout3(Field("object", extended)).ok());
 }
 
-Json RightImage() {
-  return Json::parse(R"({"multiscales": [{"version": "0.4",
+ZarrJson RightImage() {
+  return ZarrJson::parse(R"({"multiscales": [{"version": "0.4",
     "axes": [{"name": "c", "type": "channel"}, {"name": "z", "type": "space", "unit": "micrometer"}, {"name": "y", "type": "space"},
              {"name": "x", "type": "space"}],
     "datasets": [{"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [1, 2, 0.5, 0.5]},
@@ -163,11 +163,11 @@ TEST(ZarrMetadataTest, ImagesNameTheFieldThatIsWrong) {
                  {transformations + "/1/translation/3", "null", of_level + "coordinateTransformations[1].translation[3] is null"},
                  {transformations + "/0/scale/3", "1e308", named + "coordinateTransformations[0].scale[3] is 10"},
                  {image + "/coordinateTransformations", "3", named + "coordinateTransformations is 3"}},
-                [](const Json& metadata) { return zarr::ParseOmeImage(Field("object", metadata), 2).status(); });
+                [](const ZarrJson& metadata) { return zarr::ParseOmeImage(Field("object", metadata), 2).status(); });
 }
 
 TEST(ZarrMetadataTest, AnImageHasTheTransformationsOfItsLevelAndThenItsOwn) {
-  const Json metadata = RightImage();
+  const ZarrJson metadata = RightImage();
   const Result<zarr::OmeImage> image = zarr::ParseOmeImage(Field("object", metadata), 2);
   ASSERT_TRUE(image.ok());
   EXPECT_THAT(image->levels[0].scale, testing::ElementsAre(1, 20, 5, 5));

@@ -77,27 +77,27 @@ ZarrSpec SpecOf(const std::string& axes, int version) {
 }
 
 // The attributes of an image whose levels are called 0, 1, ...; a scale for each level and axis.
-Json ImageAttributes(const std::string& axes, int version, const std::vector<std::vector<double>>& scales, bool types = true) {
-  Json image = {{"axes", Json::array()}, {"datasets", Json::array()}};
+ZarrJson ImageAttributes(const std::string& axes, int version, const std::vector<std::vector<double>>& scales, bool types = true) {
+  ZarrJson image = {{"axes", ZarrJson::array()}, {"datasets", ZarrJson::array()}};
   if (version == 2) image["version"] = "0.4";
   for (const char axis : axes) {
-    Json described = {{"name", std::string(1, axis)}};
+    ZarrJson described = {{"name", std::string(1, axis)}};
     if (types) described["type"] = axis == 't' ? "time" : axis == 'c' ? "channel" : "space";
     if (axis >= 'x') described["unit"] = "micrometer";
     image["axes"].push_back(described);
   }
   for (std::size_t level = 0; level < scales.size(); ++level) {
-    const Json scale = {{"type", "scale"}, {"scale", scales[level]}};
-    image["datasets"].push_back({{"path", std::to_string(level)}, {"coordinateTransformations", Json::array({scale})}});
+    const ZarrJson scale = {{"type", "scale"}, {"scale", scales[level]}};
+    image["datasets"].push_back({{"path", std::to_string(level)}, {"coordinateTransformations", ZarrJson::array({scale})}});
   }
-  const Json attributes = {{"multiscales", Json::array({image})}};
+  const ZarrJson attributes = {{"multiscales", ZarrJson::array({image})}};
   if (version == 2) return attributes;
-  Json ome = attributes;
+  ZarrJson ome = attributes;
   ome["version"] = "0.5";
   return {{"ome", ome}};
 }
 
-Json& OmePart(Json& attributes) { return attributes.contains("ome") ? attributes["ome"] : attributes; }
+ZarrJson& OmePart(ZarrJson& attributes) { return attributes.contains("ome") ? attributes["ome"] : attributes; }
 
 void WriteImage(const std::string& path, const std::string& axes, int version, bool types = true) {
   WriteZarrGroup(path, version, ImageAttributes(axes, version, {std::vector<double>(axes.size(), 1)}, types));
@@ -140,8 +140,8 @@ TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
   for (const int version : {2, 3}) {
     for (const bool translated : {false, true}) {
       const std::string path = folder / (std::to_string(version) + (translated ? "t" : "") + ".zarr");
-      Json attributes = ImageAttributes("zyx", version, scales);
-      Json& image = OmePart(attributes)["multiscales"][0];
+      ZarrJson attributes = ImageAttributes("zyx", version, scales);
+      ZarrJson& image = OmePart(attributes)["multiscales"][0];
       if (translated) {
         for (std::size_t level = 0; level < scales.size(); ++level) {
           const std::vector<double> by = {100 + double(level), 10, 5};
@@ -180,7 +180,7 @@ TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
 
 TEST(ZarrSourceTest, UnitsAreThatOfX) {
   const TemporaryDirectory folder;
-  Json attributes = ImageAttributes("zyx", 2, {{2, 3, 4}});
+  ZarrJson attributes = ImageAttributes("zyx", 2, {{2, 3, 4}});
   attributes["multiscales"][0]["axes"][0]["unit"] = "millimeter";
   WriteImage(folder / "a", "zyx", 2);
   WriteZarrGroup(folder / "a", 2, attributes);
@@ -199,8 +199,8 @@ TEST(ZarrSourceTest, LabelImagesSayThatTheyAre) {
   for (const int version : {2, 3}) {
     const std::string path = folder / std::to_string(version);
     WriteImage(path, "zyx", version);
-    Json attributes = ImageAttributes("zyx", version, {{1, 1, 1}});
-    OmePart(attributes)["image-label"] = {{"colors", Json::array()}};
+    ZarrJson attributes = ImageAttributes("zyx", version, {{1, 1, 1}});
+    OmePart(attributes)["image-label"] = {{"colors", ZarrJson::array()}};
     WriteZarrGroup(path + "/labels", version);
     WriteZarrGroup(path + "/labels/cells", version, attributes);
     WriteZarrArray(path + "/labels/cells/0", SpecOf("zyx", version), ElementsOf("zyx"));
@@ -235,9 +235,9 @@ TEST(ZarrSourceTest, ArchivesHoldWhatFoldersHold) {
 
 TEST(ZarrSourceTest, PlainArraysTakeTheirAxesFromNamesOrFromTheirOrder) {
   const TemporaryDirectory folder;
-  const auto write = [&](const std::string& name, const std::string& axes, const Json& names, int version) {
+  const auto write = [&](const std::string& name, const std::string& axes, const ZarrJson& names, int version) {
     ZarrSpec spec = SpecOf(axes, version);
-    spec.names = version == 3 ? names : Json();
+    spec.names = version == 3 ? names : ZarrJson();
     WriteZarrArray(folder / name, spec, ElementsOf(axes));
     if (version == 2 && !names.is_null()) WriteJson(folder / (name + "/.zattrs"), {{"_ARRAY_DIMENSIONS", names}});
     return folder / name;
@@ -294,7 +294,7 @@ TEST(ZarrSourceTest, SeriesOfImagesOpenTheFirst) {
   const TemporaryDirectory folder;
   for (const int version : {2, 3}) {
     const std::string path = folder / std::to_string(version);
-    Json attributes = Json::object();
+    ZarrJson attributes = ZarrJson::object();
     (version == 3 ? attributes["ome"] : attributes)["bioformats2raw.layout"] = 3;
     WriteZarrGroup(path, version, attributes);
     WriteImage(path + "/0", "zyx", version);
@@ -325,7 +325,7 @@ TEST(ZarrSourceTest, OneLineSaysWhatIsWrongWithAnImage) {
   const std::string path = folder / "a";
   WriteImage(path, "zyx", 2);
   const auto message = [&] { return OpenText(path).status().message(); };
-  Json attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
+  ZarrJson attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
   attributes["multiscales"][0]["datasets"][0]["path"] = "gone";
   WriteZarrGroup(path, 2, attributes);
   EXPECT_THAT(message(), HasSubstr("a/gone: no Zarr array or group is there"));
