@@ -97,6 +97,6 @@ class Jpeg : public ChunkCodec {
 
 }  // namespace
 
-Codec JpegCodec(std::uint64_t voxels, int channels) { return std::make_shared<Jpeg>(voxels, channels); }
+SharedCodec JpegCodec(std::uint64_t voxels, int channels) { return std::make_shared<Jpeg>(voxels, channels); }
 
 }  // namespace slabstream::precomputed

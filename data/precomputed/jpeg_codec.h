@@ -8,6 +8,6 @@
 namespace slabstream::precomputed {
 
 // Of chunks of so many voxels. Decoded: one channel behind the other. DataLoss: no such picture.
-Codec JpegCodec(std::uint64_t voxels, int channels);
+SharedCodec JpegCodec(std::uint64_t voxels, int channels);
 
 }  // namespace slabstream::precomputed

@@ -107,7 +107,7 @@ class Segmentation : public ChunkCodec {
 
 }  // namespace
 
-Codec SegmentationCodec(const std::array<std::uint64_t, 3>& size, const std::array<std::uint64_t, 3>& block, std::uint64_t channels,
+SharedCodec SegmentationCodec(const std::array<std::uint64_t, 3>& size, const std::array<std::uint64_t, 3>& block, std::uint64_t channels,
                         std::size_t label_bytes) {
   return std::make_shared<Segmentation>(size, block, channels, label_bytes);
 }
