@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "data/zarr/zarr.h"
+
 namespace slabstream {
 
 const std::vector<SourceFormat>& SourceFormats() {
-  static const std::vector<SourceFormat> kFormats = {};
+  static const std::vector<SourceFormat> kFormats = {Zarr()};
   return kFormats;
 }
 

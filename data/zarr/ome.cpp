@@ -13,7 +13,7 @@
 namespace slabstream::zarr {
 namespace {
 
-constexpr std::size_t kMostLevels = 64, kMostChannels = 4096, kMostTransformations = 8;
+constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostTransformations = 8;
 
 // From Zarr 3 on, what OME says has a member of its own.
 Field OmeField(const Field& attributes, int zarr_version) { return zarr_version == 3 ? attributes["ome"] : attributes; }
@@ -153,7 +153,7 @@ Result<OmeImage> ParseOmeImage(const Field& attributes, int zarr_version) {
   }
 
   const Field channels = ome["omero"]["channels"];
-  for (std::size_t i = 0; channels.is_array() && i < std::min(channels.size(), kMostChannels); ++i) {
+  for (std::size_t i = 0; channels.is_array() && i < std::min(channels.size(), kMostDescribed); ++i) {
     read.channels.push_back(ReadChannel(channels[i]));
   }
   read.labels = ome["image-label"].stated();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <numeric>
 #include <utility>
@@ -18,10 +19,11 @@ struct NamedCodec {
 };
 
 // Those of numcodecs, by which version 2 knows them.
-constexpr NamedCodec kCompressors[] = {
-    {"zlib", ZlibCodec}, {"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"lz4", Lz4Codec}};
+constexpr std::array<NamedCodec, 5> kCompressors = {
+    {{"zlib", ZlibCodec}, {"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"lz4", Lz4Codec}}};
 // Those of version 3 from bytes to bytes.
-constexpr NamedCodec kByteCodecs[] = {{"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"crc32c", Crc32cCodec}};
+constexpr std::array<NamedCodec, 4> kByteCodecs = {
+    {{"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"crc32c", Crc32cCodec}}};
 constexpr std::string_view kNumcodecs = "numcodecs.";  // before their names in version 3
 
 Result<Codec> ReadShuffle(const Field& settings) {

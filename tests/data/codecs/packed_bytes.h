@@ -1,0 +1,23 @@
+// Bytes as writers of chunked volumes pack them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace slabstream {
+
+// The names that files give to codecs: "gzip", "zlib", "zstd", "blosc" (with zstd and a shuffle), "lz4", "crc32c". "": as they are.
+std::string PackBytes(const std::string& codec, const std::string& bytes, std::size_t element_bytes = 1);
+
+// shuffle: 0 none, 1 of bytes, 2 of bits. `inner`: "blosclz", "lz4", "lz4hc", "snappy", "zlib", "zstd". "": this libblosc does not have it.
+std::string PackBlosc(const std::string& inner, int shuffle, std::size_t element_bytes, const std::string& bytes);
+
+// A frame that does not say how many bytes it holds.
+std::string PackZstdStream(const std::string& bytes);
+
+// Of elements of so many bytes.
+std::string ShuffledBytes(const std::string& bytes, std::size_t element_bytes);
+std::string SwappedBytes(const std::string& bytes, std::size_t element_bytes);
+
+}  // namespace slabstream
