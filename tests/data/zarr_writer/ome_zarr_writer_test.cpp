@@ -239,6 +239,57 @@ TEST(OmeZarrWriterTest, GoesOnAfterEveryStop) {
   }
 }
 
+// Counts the reads of a source, which are as many regions of level 0 in memory.
+class CountedSource : public VolumeSource {
+ public:
+  explicit CountedSource(std::shared_ptr<VolumeSource> source) : source_(std::move(source)) {}
+  const SourceInfo& info() const override { return source_->info(); }
+  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+    ++reads;
+    largest = std::max(largest, out.size());
+    source_->Read(level, box, out, std::move(stop), std::move(done));
+  }
+  Counts counts() const override { return source_->counts(); }
+
+  int reads = 0;
+  std::size_t largest = 0;  // bytes
+
+ private:
+  const std::shared_ptr<VolumeSource> source_;
+};
+
+TEST(OmeZarrWriterTest, ReadsAheadOnlyIfThereIsMemoryForIt) {
+  const TemporaryDirectory directory;
+  Random random(3);
+  Case made = RandomCase(random, {50, 30, 30});
+  made.options.shard_side = 16;
+  // The least memory that is enough.
+  std::uint64_t least = 1 << 30;
+  const auto folder = [&] { return directory / std::to_string(made.options.memory); };
+  std::stop_source stopped;
+  stopped.request_stop();
+  for (std::uint64_t too_little = 0; least - too_little > 1;) {
+    made.options.memory = (least + too_little) / 2;
+    made.options.stop = stopped.get_token();
+    const Status status = WriteOmeZarr(*made.source(), folder(), made.options);
+    (status.code() == StatusCode::kResourceExhausted ? too_little : least) = made.options.memory;
+  }
+  made.options.stop = {};
+  const std::uint64_t region = 16 * 16 * 16 * BytesPerSample(made.volume->description.type);
+  for (const bool ahead : {false, true}) {
+    CountedSource source(made.source());
+    made.options.memory = least + (ahead ? region : region - 1);
+    int finished = 0, most_ahead = 0;
+    made.options.progress = [&](const OmeZarrProgress& progress) {
+      if (progress.done_bytes > 0 && progress.level == 0) most_ahead = std::max(most_ahead, source.reads - ++finished);
+    };
+    EXPECT_TRUE(WriteOmeZarr(source, folder(), made.options).ok());
+    EXPECT_EQ(most_ahead, ahead ? 1 : 0);
+    EXPECT_EQ(source.largest, region);
+    EXPECT_EQ(source.reads, 4 * 2 * 2);  // each voxel once
+  }
+}
+
 Case SmallCase() {
   Random random(5);
   return RandomCase(random, {30, 20, 20});
