@@ -4,10 +4,13 @@
 #include <fmt/format.h>
 #include <sys/file.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <future>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -45,28 +48,52 @@ Status CheckOptions(const OmeZarrOptions& options) {
   return Status::Ok();
 }
 
-// What the elements of level 0 are: samples as the source keeps them, or the signed integers from which they were shifted.
+// What the elements of level 0 are: samples as the source keeps them, or the integers of which they were made.
 struct Elements {
   SampleType type = SampleType::kUint8;
   ValueMapping mapping;  // from elements to data values
 
-  bool shifted() const { return type == SampleType::kInt8 || type == SampleType::kInt16; }
   static Elements Of(const SourceInfo& info) {
     const auto& [geometry, type, mapping] = info.levels[0].description;
-    const auto as_signed = [&, scale = mapping.scale, offset = mapping.offset](SampleType its, double half) {
-      return Elements{its, {scale, offset + scale * half}};
-    };
-    const std::optional<SampleType> stored = SampleTypeNamed(info.file_type);
-    if (type == ScalarType::kUint8)
-      return stored == SampleType::kInt8 ? as_signed(SampleType::kInt8, 128) : Elements{SampleType::kUint8, mapping};
-    if (type == ScalarType::kFloat32) return {SampleType::kFloat32, mapping};
-    return stored == SampleType::kInt16 ? as_signed(SampleType::kInt16, 32768) : Elements{SampleType::kUint16, mapping};
+    const SampleType stored = SampleTypeNamed(info.file_type).value_or(SampleType::kUint8);
+    switch (type) {
+      case ScalarType::kUint8:
+        if (stored == SampleType::kInt8) return {SampleType::kInt8, {mapping.scale, mapping.FromStored(128)}};
+        return {SampleType::kUint8, mapping};
+      case ScalarType::kUint16:
+        if (stored == SampleType::kInt16) return {SampleType::kInt16, {mapping.scale, mapping.FromStored(32768)}};
+        return {SampleType::kUint16, mapping};
+      case ScalarType::kFloat32: break;
+    }
+    // Labels of many bits are kept as floats, which hold all that labels may be. In an OME-Zarr they must be integers.
+    const bool is_signed = stored == SampleType::kInt32 || stored == SampleType::kInt64;
+    const bool is_unsigned = stored == SampleType::kUint32 || stored == SampleType::kUint64;
+    if (info.labels && (is_signed || is_unsigned)) return {is_signed ? SampleType::kInt32 : SampleType::kUint32, mapping};
+    return {SampleType::kFloat32, mapping};
   }
-  // Turns samples into elements.
-  void Shift(std::span<std::byte> samples) const {
-    if (!shifted()) return;
-    const std::size_t bytes = BytesPerSample(type);
-    for (std::size_t i = bytes - 1; i < samples.size(); i += bytes) samples[i] ^= std::byte{0x80};  // the highest bit
+
+  // Turns samples into elements, which have as many bytes.
+  void Convert(std::span<std::byte> samples) const {
+    if (type == SampleType::kInt8 || type == SampleType::kInt16) {
+      const std::size_t bytes = BytesPerSample(type);
+      for (std::size_t i = bytes - 1; i < samples.size(); i += bytes) samples[i] ^= std::byte{0x80};  // the highest bit
+    } else if (type == SampleType::kInt32) {
+      Round<std::int32_t>(samples);
+    } else if (type == SampleType::kUint32) {
+      Round<std::uint32_t>(samples);
+    }
+  }
+
+ private:
+  template <class T>
+  static void Round(std::span<std::byte> samples) {
+    for (std::size_t i = 0; i < samples.size(); i += sizeof(T)) {
+      float sample;
+      std::memcpy(&sample, samples.data() + i, sizeof(T));
+      const double kept = std::isnan(sample) ? 0 : double(sample);
+      const T element = T(std::clamp(kept, double(std::numeric_limits<T>::lowest()), double(std::numeric_limits<T>::max())));
+      std::memcpy(samples.data() + i, &element, sizeof(T));
+    }
   }
 };
 
@@ -273,7 +300,7 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
     } else {
       if (region.level == 0) {
         if (Status status = reader.Read(s, buffer); !status.ok()) return status;
-        elements.Shift(buffer);
+        elements.Convert(buffer);
       }
       if (Status status = objects.Write(region, buffer.data()); !status.ok()) return status;
       progress.done_bytes += objects.BytesOf(region);

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "data/sources/memory_source.h"
@@ -48,7 +49,7 @@ Case RandomCase(Random& random, const Index3& size) {
     made.info.file_type = is_signed ? "int16" : "uint16";
     if (is_signed) description.mapping.offset = -32768;
   } else {
-    made.info.file_type = "float32";
+    made.info.file_type = !made.info.labels ? "float32" : is_signed ? "int32" : "uint32";  // labels of many bits are kept as floats
   }
   made.volume->block = MakeVoxelBlock(description.geometry.bounds(), description.type);
   const int most = made.info.labels ? 3 : 255;  // labels repeat
@@ -57,6 +58,7 @@ Case RandomCase(Random& random, const Index3& size) {
     for (std::int64_t i = 0; i < description.geometry.bounds().voxel_count(); ++i) {
       T& sample = made.volume->block.samples<T>()[i];
       sample = T(random.Integer(0, most));
+      if (std::is_same_v<T, float> && made.info.labels) sample *= 1 << 20;
       if (std::is_same_v<T, float> && !made.info.labels && random.Chance(0.2)) sample = T(NAN);
       const Index3 v = {int(i % size.x), int(i / size.x % size.y), int(i / size.x / size.y)};
       if (zeros.Contains(v)) sample = T(-description.mapping.offset);
@@ -174,6 +176,58 @@ TEST(OmeZarrWriterTest, EveryLevelIsItsDefinition) {
     ExpectLevels(made, folder);
     if (HasFatalFailure()) return;
   }
+}
+
+TEST(OmeZarrWriterTest, KeepsTheWorldAndTheMapping) {
+  const TemporaryDirectory directory;
+  for (const bool turned : {false, true}) {
+    for (const OmeZarrVersion version : {OmeZarrVersion::k04, OmeZarrVersion::k05}) {
+      Case made;
+      VolumeDescription& description = made.volume->description;
+      description = {
+          .geometry = {.size = {20, 9, 9}, .spacing = {0.1, 0.7, 1.25}}, .type = ScalarType::kUint16, .mapping = {0.5, -16384 + 3}};
+      description.geometry.orientation = {
+          .world = turned ? World::kPatient : World::kScene, .origin = {-120.3, 7, 1e-3}, .unit = LengthUnit::kMillimetre};
+      if (turned) description.geometry.orientation.axes = {Vec3{0.8, 0.6, 0}, Vec3{-0.6, 0.8, 0}, Vec3{0, 0, 1}};
+      made.volume->block = MakeVoxelBlock(description.geometry.bounds(), description.type);
+      made.info.file_type = "int16";
+      made.options = {.version = version, .chunk_side = 8, .shard_side = 16};
+      const std::string folder = directory / (std::string(ToString(version)) + (turned ? "turned" : "straight"));
+      ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
+      const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1}));
+      ASSERT_TRUE(read.ok()) << read.status().message();
+      const SourceInfo& info = (*read)->info();
+      EXPECT_EQ(info.levels[0].description, description);
+      EXPECT_EQ(info.levels[1].description.mapping, description.mapping);
+      const VolumeGeometry &fine = description.geometry, &coarse = info.levels[1].description.geometry;
+      const Vec3 centre = fine.ToWorld({0.5, 0, 0}), found = coarse.ToWorld({0, 0, 0});  // only x is halved
+      for (int axis = 0; axis < 3; ++axis) EXPECT_DOUBLE_EQ(found[axis], centre[axis]);
+    }
+  }
+}
+
+TEST(OmeZarrWriterTest, WrongAttributesAreNamed) {
+  const TemporaryDirectory directory;
+  const std::string folder = directory / "x.ome.zarr", file = folder + "/zarr.json";
+  Random random(4);
+  Case made = RandomCase(random, {9, 9, 9});
+  made.options.version = OmeZarrVersion::k05;
+  ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
+  nlohmann::json right;
+  std::ifstream(file) >> right;
+  const auto refusal = [&](const std::string& field, const nlohmann::json& value) {
+    nlohmann::json wrong = right;
+    wrong[nlohmann::json::json_pointer("/attributes/slabstream" + field)] = value;
+    std::ofstream(file) << wrong;
+    return Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
+  };
+  EXPECT_THAT(refusal("/orientation/world", "moon").message(),
+              HasSubstr("slabstream.orientation.world is \"moon\", must be voxels, scene or patient"));
+  EXPECT_THAT(refusal("/orientation/axes/0", {1, 0, 1}).message(), HasSubstr("must be 3 unit vectors at right angles, right-handed"));
+  EXPECT_THAT(refusal("/orientation/axes/0", {-1, 0, 0}).message(), HasSubstr("right-handed"));
+  EXPECT_THAT(refusal("/orientation/origin", {1, 2}).message(), HasSubstr("slabstream.orientation.origin"));
+  EXPECT_THAT(refusal("/values/scale", 0).message(), HasSubstr("slabstream.values.scale is 0, must be a number other than 0"));
+  EXPECT_EQ(refusal("/values/offset", "x").code(), StatusCode::kInvalidArgument);
 }
 
 TEST(OmeZarrWriterTest, TheBytesDoNotDependOnThreadsOrMemory) {
