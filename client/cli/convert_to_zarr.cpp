@@ -7,6 +7,10 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <stop_token>
+#include <utility>
+#include <vector>
 
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
