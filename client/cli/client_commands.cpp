@@ -152,7 +152,7 @@ void DeclareConvert(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("convert", "Write a volume in another format, or with samples of another type");
   auto options = std::make_shared<ConvertOptions>();
   sub->add_option("SOURCE", options->source, "A volume file, or a folder of slices")->required();
-  sub->add_option("OUTPUT", options->output, "The file to write: " + WritableEndings())->required();
+  sub->add_option("OUTPUT", options->output, "The file to write: " + WritableEndings() + "; or a folder, .ome.zarr")->required();
   AddParsed(
       *sub, "--type", options->type,
       [](const std::string& option, const std::string& text) -> Result<std::optional<SampleType>> {
@@ -164,6 +164,20 @@ void DeclareConvert(const CommandLine& line) {
           "; every value must fit. Raw samples in SOURCE have this type too, unless SOURCE says ?type=...")
       ->type_name("TYPE")
       ->default_str("the type of SOURCE, or the smallest that holds its values");
+  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
+      ->type_name("SIZE")
+      ->default_str("none; 1G for what is not read as a whole");
+  AddParsed(
+      *sub, "--zarr-version", options->zarr_version,
+      [](const std::string& option, const std::string& text) -> Result<OmeZarrVersion> {
+        for (const OmeZarrVersion version : {OmeZarrVersion::k04, OmeZarrVersion::k05}) {
+          if (text == ToString(version)) return version;
+        }
+        return Status::InvalidArgument(option + ": expected 0.4 or 0.5, not '" + text + "'");
+      },
+      "Version of an OME-Zarr: 0.4 (Zarr 2) or 0.5 (Zarr 3 with shards)")
+      ->type_name("VERSION")
+      ->default_str("0.5");
   sub->add_flag("--progress", options->progress, "Show progress on stderr");
   AddReadOptions(*sub, {"type"});
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/convert_to_zarr.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
 #include "common/base/files.h"
@@ -47,10 +48,15 @@ Status RunConvert(const ConvertOptions& options) {
   const VolumeFormat* const from = FindFormat(source->path, source->options);
   const bool needs_type = from != nullptr && std::ranges::count(from->required, "type") > 0;
   if (needs_type && !source->options.type) source->options.type = options.type;
+  if (options.memory > 0) LimitMemory(options.memory);
+  if (NamesZarr(options.output)) {
+    if (options.type && !needs_type) return Status::InvalidArgument("--type: an OME-Zarr keeps the type of SOURCE");
+    return ConvertToZarr(options, *source);
+  }
   if (Status status = CheckInputVolume(*source); !status.ok()) return status;
   const VolumeFormat* const to = FindWritableFormat(options.output);
   if (to == nullptr) {
-    return Status::InvalidArgument(fmt::format("OUTPUT '{}' must end in one of {}", options.output, WritableEndings()));
+    return Status::InvalidArgument(fmt::format("OUTPUT '{}' must end in one of {}, .zarr", options.output, WritableEndings()));
   }
   if (Status status = CheckKeepsInput(options, *to, {source->path}); !status.ok()) return status;
   if (Status status = CheckCanWrite("OUTPUT", options.output); !status.ok()) return status;

@@ -17,6 +17,7 @@
 #include "data/layers/layer_reader.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/sample_type.h"
+#include "data/zarr_writer/ome_metadata.h"
 
 namespace slabstream {
 
@@ -87,6 +88,8 @@ struct ConvertOptions {
   std::string source;  // a path, with options for reading it or without
   std::string output;
   std::optional<SampleType> type;  // of the samples in `output`
+  std::uint64_t memory = 0;        // bytes, limit of this process; 0: none
+  OmeZarrVersion zarr_version = OmeZarrVersion::k05;
   bool progress = false;
 };
 

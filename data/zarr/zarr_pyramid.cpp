@@ -10,6 +10,7 @@
 #include "common/base/printable.h"
 #include "data/zarr/axis_choice.h"
 #include "data/zarr/ome.h"
+#include "data/zarr/world_attributes.h"
 #include "data/zarr/zarr_array.h"
 #include "data/zarr/zarr_node.h"
 
@@ -212,6 +213,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
     pyramid.levels.push_back(LevelOf(*array, *chosen));
   }
   PlaceLevels(*image, choice, sizes, pyramid);
+  if (Status status = PlaceInWorld(node.attributes_field()["slabstream"], pyramid); !status.ok()) return status;
 
   SourceInfo& info = pyramid.info;
   info = {.format = "OME-Zarr " + image->version, .labels = image->labels, .times = choice.times};

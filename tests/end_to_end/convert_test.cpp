@@ -1,8 +1,10 @@
 // `convert`, and options for reading on the command line.
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/end_to_end/program.h"
 
@@ -18,6 +20,11 @@ class ConvertTest : public EndToEndTest {
     arguments.insert(arguments.begin(), "info");
     arguments.emplace_back("--json");
     return json::parse(MustRun(arguments).out);
+  }
+  std::string Read(const std::string& name) {
+    std::ostringstream bytes;
+    bytes << std::ifstream(Path(name), std::ios::binary).rdbuf();
+    return bytes.str();
   }
   void Write(const std::string& name, const std::string& bytes) { std::ofstream(Path(name), std::ios::binary) << bytes; }
   // Exit status 2 and one line that says why.
@@ -42,6 +49,23 @@ TEST_F(ConvertTest, WritesEveryFormatAndTellsSo) {
     for (const char* field : {"size", "type", "spacing", "range", "histogram"}) EXPECT_EQ(info[field], before[field]) << to;
     from = to;
   }
+}
+
+TEST_F(ConvertTest, WritesAnOmeZarrWithLevels) {
+  MakeSphere("s.nrrd", 1, 100);
+  const ProgramResult result = MustRun({"convert", "s.nrrd", "a.ome.zarr", "--memory", "256M", "--progress"});
+  EXPECT_EQ(result.out, "wrote a.ome.zarr: OME-Zarr 0.5, 100 x 100 x 100 voxels\n");
+  EXPECT_THAT(result.err, HasSubstr("writing a.ome.zarr: 100 % of 2 MiB"));
+  EXPECT_TRUE(std::filesystem::exists(Path("a.ome.zarr/1/c/0/0/0")));
+  // The source is read in parts; the voxels are the same.
+  MustRun({"convert", "a.ome.zarr", "b.ome.zarr/", "--zarr-version", "0.4"});
+  EXPECT_TRUE(std::filesystem::exists(Path("b.ome.zarr/0/1/1/1")));
+  MustRun({"convert", "b.ome.zarr", "c.ome.zarr"});
+  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("c.ome.zarr" + shard), Read("a.ome.zarr" + shard));
+  ExpectRefused({"convert", "s.nrrd", "a.ome.zarr"}, "OUTPUT 'a.ome.zarr' exists: remove it, or name another folder");
+  ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--type", "int8"}, "--type: an OME-Zarr keeps the type of SOURCE");
+  ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--zarr-version", "0.3"}, "--zarr-version: expected 0.4 or 0.5, not '0.3'");
+  EXPECT_FALSE(std::filesystem::exists(Path("x.ome.zarr")));
 }
 
 TEST_F(ConvertTest, RawSamplesAreDescribedByOptionsInEitherForm) {

@@ -1,0 +1,107 @@
+#include "client/cli/convert_to_zarr.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <utility>
+#include <vector>
+
+#include "client/cli/input_volume.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/progress_bar.h"
+#include "common/transport/socket.h"
+#include "common/volume/memory_budget.h"
+#include "data/open/open_source.h"
+#include "data/sources/memory_source.h"
+#include "data/zarr_writer/ome_zarr_writer.h"
+
+namespace slabstream {
+namespace {
+
+// Where the limit of the process goes.
+struct Shares {
+  ReadContext::Limits reading;
+  std::uint64_t writing = 0;  // bytes
+};
+
+Shares Share(std::uint64_t memory, std::uint64_t volume_bytes) {
+  constexpr std::uint64_t kProcess = std::uint64_t{48} << 20;  // its code, its threads
+  const std::uint64_t taken = kProcess + memory / 4 + volume_bytes;
+  return {{.under_way_bytes = memory / 8, .cache_bytes = memory / 8}, memory - std::min(memory, taken)};
+}
+
+// Read in parts if its format allows that, else as a whole.
+Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadContext::Limits& limits) {
+  if (FindSourceFormat(source.path, source.options) != nullptr) {
+    Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
+    if (!opened.ok()) return AsInput(opened.status());
+    return opened;
+  }
+  if (Status status = CheckInputVolume(source); !status.ok()) return status;
+  Result<std::vector<std::string>> files = CheckVolumeHeaders(source.path, source.options);
+  if (!files.ok()) return AsInput(files.status());
+  const Result<LoadedVolume> loaded = ReadInputVolume(source);
+  if (!loaded.ok()) return loaded.status();
+  const VolumeFileInfo& info = loaded->info;
+  return MakeMemorySource(loaded->volume,
+                          {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)});
+}
+
+}  // namespace
+
+bool NamesZarr(const std::string& output) {
+  std::string name = output;
+  while (name.ends_with('/')) name.pop_back();
+  return name.ends_with(".zarr");
+}
+
+Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
+  constexpr std::uint64_t kUsual = std::uint64_t{1} << 30;
+  const std::uint64_t memory = options.memory > 0 ? options.memory : kUsual;
+  ProgressBar bar(options.progress, 1);
+  bar.Show(0, "reading " + source.path);
+  const Result<std::shared_ptr<VolumeSource>> opened = Open(source, Share(memory, 0).reading);
+  if (!opened.ok()) return opened.status();
+  const VolumeDescription& volume = (*opened)->info().levels[0].description;
+  const bool whole = FindSourceFormat(source.path, source.options) == nullptr && options.memory > 0;
+
+  Wakeup wakeup;
+  const InterruptGuard guard(wakeup);
+  std::stop_source stop;
+  int percent = -1;
+  const auto begin = std::chrono::steady_clock::now();
+  std::optional<std::uint64_t> done_before;
+  const auto progress = [&](const OmeZarrProgress& now) {
+    if (guard.interrupted()) stop.request_stop();
+    if (!done_before) done_before = now.done_bytes;
+    const int its = int(100 * now.done_bytes / now.all_bytes);
+    if (std::exchange(percent, its) == its) return;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double rate = double(now.done_bytes - *done_before) / std::max(seconds, 1e-9);
+    bar.Show(0.01 * its, fmt::format("writing {}: {} % of {}, {} a second", options.output, its, MemoryText(now.all_bytes),
+                                     MemoryText(std::uint64_t(rate))));
+  };
+  const Status status = WriteOmeZarr(**opened, options.output,
+                                     {.version = options.zarr_version,
+                                      .memory = Share(memory, whole ? std::uint64_t(volume.voxel_bytes()) : 0).writing,
+                                      .source = options.source,
+                                      .stop = stop.get_token(),
+                                      .progress = progress});
+  if (status.code() == StatusCode::kCancelled) {
+    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.output, percent));
+  }
+  if (status.code() == StatusCode::kInvalidArgument) return Status::InvalidArgument("OUTPUT " + status.message());
+  if (!status.ok()) return AsInput(status);
+  const Index3& size = volume.geometry.size;
+  std::cout << fmt::format("wrote {}: OME-Zarr {}, {} x {} x {} voxels\n", options.output, ToString(options.zarr_version), size.x, size.y,
+                           size.z);
+  return Status::Ok();
+}
+
+}  // namespace slabstream
