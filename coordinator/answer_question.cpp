@@ -119,7 +119,7 @@ Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion
 }  // namespace
 
 Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
-  if (const auto* query = std::get_if<SummaryQuery>(&asked.question)) return AnswerSummary(*query, *asked.summary);
+  if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
