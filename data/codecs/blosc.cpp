@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -16,7 +16,7 @@ class Blosc : public ChunkCodec {
     std::size_t bytes = 0;
     if (in.size() < BLOSC_MIN_HEADER_LENGTH || blosc_cbuffer_validate(in.data(), in.size(), &bytes) < 0) return DamagedBytes("blosc");
     if (bytes > most) return TooManyBytes("blosc", bytes, most);
-    PooledVector<std::byte> out(bytes);
+    UnwrittenVector<std::byte> out(bytes);
     // Chunks are decoded on threads of their own already.
     const int decoded = blosc_decompress_ctx(in.data(), out.data(), out.size(), 1);
     if (decoded < 0 || std::size_t(decoded) != bytes) return DamagedBytes("blosc");

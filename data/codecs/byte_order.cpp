@@ -2,7 +2,7 @@
 #include <bit>
 #include <cstring>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -36,7 +36,7 @@ class SwapBytes : public ChunkCodec {
     if (packed.size() % element_bytes_ != 0) {
       return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", packed.size(), element_bytes_));
     }
-    PooledVector<std::byte> out(packed.size());
+    UnwrittenVector<std::byte> out(packed.size());
     switch (element_bytes_) {
       case 2: Swap<std::uint16_t>(packed.span(), out.data()); break;
       case 4: Swap<std::uint32_t>(packed.span(), out.data()); break;

@@ -6,7 +6,7 @@
 #include <new>
 #include <string_view>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -51,7 +51,7 @@ class Inflate : public ChunkCodec {
     // Deflate makes at most 258 bytes of 2 bits. One more than allowed tells that there are more.
     constexpr std::uint64_t kMostRatio = 1032;
     const std::uint64_t limit = packed.size() > most / kMostRatio ? most : packed.size() * kMostRatio;
-    PooledVector<std::byte> bytes(limit + 1);
+    UnwrittenVector<std::byte> bytes(limit + 1);
     std::span<const std::byte> in = packed.span();
     std::span<std::byte> out = bytes;
     Inflater inflater(window_bits_);

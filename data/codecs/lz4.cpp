@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -20,7 +20,7 @@ class Lz4 : public ChunkCodec {
     if (bytes > most) return TooManyBytes("lz4", bytes, most);
     constexpr std::uint64_t kMostRatio = 255;  // a byte of a length stands for so many at most
     if (bytes > LZ4_MAX_INPUT_SIZE || bytes > kMostRatio * in.size()) return DamagedBytes("lz4");
-    PooledVector<std::byte> out(bytes);
+    UnwrittenVector<std::byte> out(bytes);
     const std::span<const std::byte> block = in.subspan(kHeader);
     const int decoded = LZ4_decompress_safe(reinterpret_cast<const char*>(block.data()), reinterpret_cast<char*>(out.data()),
                                             int(block.size()), int(out.size()));

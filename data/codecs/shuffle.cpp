@@ -1,7 +1,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -19,7 +19,7 @@ class Shuffle : public ChunkCodec {
       return Status::DataLoss(fmt::format("has {} bytes, must have a multiple of {}", packed.size(), element_bytes_));
     }
     const std::size_t count = packed.size() / element_bytes_;
-    PooledVector<std::byte> out(packed.size());
+    UnwrittenVector<std::byte> out(packed.size());
     for (std::size_t byte = 0; byte < element_bytes_; ++byte) {
       const std::byte* const from = packed.span().data() + byte * count;
       for (std::size_t i = 0; i < count; ++i) out[i * element_bytes_ + byte] = from[i];

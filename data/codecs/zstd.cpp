@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <new>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 
@@ -28,7 +28,7 @@ class Zstd : public ChunkCodec {
     const std::span<const std::byte> in = packed.span();
     const Result<std::uint64_t> bytes = DecodedBytes(in, most);
     if (!bytes.ok()) return bytes.status();
-    PooledVector<std::byte> out(*bytes);
+    UnwrittenVector<std::byte> out(*bytes);
     const std::size_t decoded = ZSTD_decompressDCtx(&Context(), out.data(), out.size(), in.data(), in.size());
     if (ZSTD_isError(decoded) != 0) {
       // Nothing said how many bytes there are, or it lied.

@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 #include "data/codecs/decoded_bytes.h"
 #include "data/sources/decode_chunk.h"
@@ -66,7 +66,7 @@ Bytes Padded(const Bytes& elements, const std::vector<std::uint64_t>& cut, const
   std::uint64_t rows = 1, bytes = element_bytes;
   for (const std::uint64_t along : whole) bytes *= along;
   for (std::size_t axis = 0; axis + 1 < cut.size(); ++axis) rows *= cut[axis];
-  PooledVector<std::byte> out(bytes);
+  UnwrittenVector<std::byte> out(bytes);
   std::ranges::fill(out, std::byte{0});
   const std::uint64_t row_bytes = cut.back() * element_bytes;
   for (std::uint64_t row = 0; row < rows; ++row) {

@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 
 namespace slabstream {
 namespace {
@@ -87,7 +87,7 @@ Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
     return ReadRows(part, to.Place(part, type_), {size.x * sample_, size.x * sample_ * size.y});
   }
 
-  PooledVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
+  UnwrittenVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
   const Pitch pitch = PitchFor(part.size());
   if (Status status = ReadRows(part, stored.data(), pitch); !status.ok()) return status;
   if (big_endian_) SwapByteOrder(type_, stored);

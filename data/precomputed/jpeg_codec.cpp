@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <string>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 
 namespace slabstream::precomputed {
 namespace {
@@ -79,10 +79,10 @@ class Jpeg : public ChunkCodec {
     }
     const std::uint64_t bytes = voxels_ * std::uint64_t(channels_);
     if (bytes > most) return Status::ResourceExhausted(fmt::format("is a JPEG picture of {} bytes, at most {} are expected", bytes, most));
-    PooledVector<std::byte> pixels(bytes);
+    UnwrittenVector<std::byte> pixels(bytes);
     if (!picture.ReadRows(reinterpret_cast<JSAMPLE*>(pixels.data()))) return Status::DataLoss("truncated or damaged: a JPEG picture");
     if (channels_ == 1) return Bytes(std::move(pixels));
-    PooledVector<std::byte> planes(bytes);
+    UnwrittenVector<std::byte> planes(bytes);
     const auto channels = std::size_t(channels_);
     for (std::size_t channel = 0; channel < channels; ++channel) {
       for (std::size_t i = 0; i < voxels_; ++i) planes[channel * voxels_ + i] = pixels[i * channels + channel];

@@ -6,7 +6,7 @@
 #include <bit>
 #include <cstring>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/decoded_bytes.h"
 
 namespace slabstream::precomputed {
@@ -44,7 +44,7 @@ class Segmentation : public ChunkCodec {
     if (bytes > most) return TooManyBytes(kName, bytes, most);
     const Words words(packed.span());
     if (words.count() < channels_) return DamagedBytes(kName);
-    PooledVector<std::byte> out(bytes);
+    UnwrittenVector<std::byte> out(bytes);
     for (std::uint64_t channel = 0; channel < channels_; ++channel) {
       const std::uint64_t begin = words.at(channel);
       if (begin > words.count() || !DecodeChannel(words.From(begin), out.data() + channel * of_channel)) return DamagedBytes(kName);
@@ -108,7 +108,7 @@ class Segmentation : public ChunkCodec {
 }  // namespace
 
 SharedCodec SegmentationCodec(const std::array<std::uint64_t, 3>& size, const std::array<std::uint64_t, 3>& block, std::uint64_t channels,
-                        std::size_t label_bytes) {
+                              std::size_t label_bytes) {
   return std::make_shared<Segmentation>(size, block, channels, label_bytes);
 }
 

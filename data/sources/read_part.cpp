@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 
 namespace slabstream {
 
@@ -25,7 +25,7 @@ void ReadPart(const std::shared_ptr<VolumeSource>& source, int level, const Box&
     part.end.y = box.begin.y + last(row_bytes) % size.y + 1;
     skipped = begin % row_bytes;
   }
-  const auto buffer = std::make_shared<PooledVector<std::byte>>(std::size_t(part.voxel_count()) * BytesPerSample(type));
+  const auto buffer = std::make_shared<UnwrittenVector<std::byte>>(std::size_t(part.voxel_count()) * BytesPerSample(type));
   source->Read(level, part, *buffer, {}, [source, buffer, skipped, bytes, done = std::move(done)](const Status& status) {
     if (!status.ok()) return done(status);
     done(Bytes(buffer, std::span<const std::byte>(*buffer).subspan(skipped, bytes)));

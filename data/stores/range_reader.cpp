@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 
 namespace slabstream {
 
@@ -29,7 +29,7 @@ Result<Bytes> ReadRange(int file, const std::string& what, const ByteRange& rang
   if (!S_ISREG(about.st_mode)) return Status::Unavailable(what + ": is no regular file");
   const Result<ByteSpan> span = BytesOfRange(what, std::uint64_t(about.st_size), range, most);
   if (!span.ok()) return span.status();
-  PooledVector<std::byte> bytes(span->bytes);
+  UnwrittenVector<std::byte> bytes(span->bytes);
   std::size_t read = 0;
   while (read < bytes.size()) {
     const ssize_t count = ::pread(file, bytes.data() + read, bytes.size() - read, off_t(span->begin + read));

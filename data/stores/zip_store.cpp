@@ -12,7 +12,7 @@
 #include <set>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/stores/object_key.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/read_threads.h"
@@ -62,7 +62,7 @@ class Archive {
     const Member member(zip_fopen_index(archive_.get(), zip_uint64_t(number), 0));
     if (member == nullptr) return Damaged(what, zip_get_error(archive_.get()));
     if (!SkipTo(member.get(), span->begin, stored)) return Damaged(what, zip_file_get_error(member.get()));
-    PooledVector<std::byte> bytes(span->bytes);
+    UnwrittenVector<std::byte> bytes(span->bytes);
     if (Take(member.get(), bytes) != bytes.size()) return Damaged(what, zip_file_get_error(member.get()));
     // At its end a member's checksum is compared.
     std::array<std::byte, 1> more{};

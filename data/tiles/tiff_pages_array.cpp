@@ -6,8 +6,8 @@
 #include <exception>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
 #include "common/base/printable.h"
+#include "common/base/unwritten_vector.h"
 
 namespace slabstream {
 namespace {
@@ -100,7 +100,7 @@ Result<std::optional<StoredChunk>> TiffPagesArray::State::Read(std::size_t page,
     const std::int32_t rows = std::min(chunks.height, picture.size.y - chunk.row * chunks.height);
     bytes = bytes / std::uint64_t(chunks.height) * std::uint64_t(rows);
   }
-  PooledVector<std::byte> elements(bytes, std::byte{0});  // whatever a decoder of libtiff leaves out
+  UnwrittenVector<std::byte> elements(bytes, std::byte{0});  // whatever a decoder of libtiff leaves out
   const Result<std::uint64_t> stored = entry->file->ReadChunk(picture, chunks, chunk, elements);
   if (!stored.ok()) {
     return failed(stored.status(), fmt::format("slice {}, {} {}, {}", page, chunks.tiled() ? "tile" : "strips", chunk.column, chunk.row));

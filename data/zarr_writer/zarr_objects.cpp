@@ -24,7 +24,7 @@
 
 #include "common/base/file_descriptor.h"
 #include "common/base/files.h"
-#include "common/base/pooled_vector.h"
+#include "common/base/unwritten_vector.h"
 #include "data/codecs/codecs.h"
 
 namespace slabstream {
@@ -32,7 +32,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "elements are written as they are in memory");
 
-using Packed = PooledVector<std::byte>;
+using Packed = UnwrittenVector<std::byte>;
 
 constexpr std::uint64_t kNoChunk = std::numeric_limits<std::uint64_t>::max();  // in the index of a shard
 struct IndexEntry {
