@@ -4,9 +4,15 @@
 #include <array>
 #include <cmath>
 #include <iostream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
+#include <optional>
 #include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/dicom_listing.h"
@@ -15,13 +21,54 @@
 #include "client/cli/picture_info.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
+#include "common/base/printable.h"
 #include "common/planning/resolved_request.h"
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
+#include "coordinator/catalogue.h"
+#include "data/open/any_volume.h"
 #include "data/volume_io/mesh_reader.h"
 
 namespace slabstream {
 namespace {
+
+// A volume and its statistics, without its voxels.
+struct VolumeFacts {
+  VolumeFileInfo file;
+  std::shared_ptr<const VolumeSummary> summary;  // of the whole volume, or what a survey found
+  std::optional<OpenedSource> parts = {};        // none: it was read as a whole
+};
+
+// Of a volume with several levels, or a large one, what a survey of it tells; of any other one, what all voxels tell.
+Result<VolumeFacts> FactsOf(const std::string& source) {
+  Result<std::optional<OpenedSource>> opened = OpenInParts({source, ""}, std::uint64_t(kExactBytes));
+  if (!opened.ok()) return AsInput(opened.status());
+  if (*opened) return VolumeFacts{FileInfoOf((*opened)->source->info()), (*opened)->survey.summary, *std::move(opened)};
+  const Result<LoadedVolume> loaded = ReadInputVolume(source);
+  if (!loaded.ok()) return loaded.status();
+  return VolumeFacts{loaded->info, std::make_shared<const VolumeSummary>(Summarize(*loaded->volume))};
+}
+
+std::uint64_t CountedVoxels(const VolumeSummary& summary) {
+  return std::accumulate(summary.histogram.begin(), summary.histogram.end(), std::uint64_t(summary.non_finite));
+}
+
+std::uint64_t VoxelsOf(const VolumeSummary& summary) { return CountIn(summary.description.geometry.size); }
+
+// Of the voxels that were counted, which may be a sample.
+double OccupancyOf(const VolumeSummary& summary, const TransferFunction& transfer) {
+  return EstimateOccupancy(summary, transfer) * (double(VoxelsOf(summary)) / double(CountedVoxels(summary)));
+}
+
+bool IsSample(const VolumeSummary& summary) { return CountedVoxels(summary) < VoxelsOf(summary); }
+
+// Where the statistics come from; "": from all voxels.
+std::string OfWhichVoxels(const VolumeFacts& facts) {
+  if (!facts.parts) return "";
+  const int level = facts.parts->survey.level;
+  if (IsSample(*facts.summary)) return fmt::format(" of a sample of level {}", level);
+  return level > 0 ? fmt::format(" of level {}", level) : "";
+}
 
 std::string TransferName(const TransferChoice& transfer) {
   const auto* preset = std::get_if<std::string>(&transfer.choice);
@@ -73,7 +120,8 @@ std::string UnitText(const VolumeGeometry& geometry) {
 
 constexpr const char* kStoredAxes[] = {"stored_x", "stored_y", "stored_z"};
 
-std::string OrientationText(const VolumeFileInfo& info) {
+std::string OrientationText(const VolumeFacts& facts) {
+  const VolumeFileInfo& info = facts.file;
   const VolumeGeometry& geometry = info.description.geometry;
   const Orientation& orientation = geometry.orientation;
   const Vec3 extent = ToVec3(geometry.size) * geometry.spacing;
@@ -83,7 +131,7 @@ std::string OrientationText(const VolumeFileInfo& info) {
                                                                                 : "scene: the file's own axes");
   text += fmt::format("origin       {:.6g} {:.6g} {:.6g}{}\n", orientation.origin.x, orientation.origin.y, orientation.origin.z,
                       UnitText(geometry));
-  for (std::size_t i = 0; i < 3; ++i) {
+  for (std::size_t i = 0; i < 3 && !facts.parts; ++i) {
     text += fmt::format("  the file's voxel {} runs {}\n", Letter(kAxes[i]), DirectionName(orientation.world, info.steps[i]));
   }
   const double degrees = ObliqueDegrees(orientation);
@@ -96,18 +144,40 @@ std::string OrientationText(const VolumeFileInfo& info) {
   return text;
 }
 
-std::string InfoText(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy) {
+std::string SizeText(const Index3& size) { return fmt::format("{} x {} x {}", size.x, size.y, size.z); }
+
+std::string PartsText(const SourceInfo& info) {
+  std::string text = fmt::format("levels       {}: voxels, spacing, memory, block\n", info.levels.size());
+  for (std::size_t i = 0; i < info.levels.size(); ++i) {
+    const VolumeDescription& d = info.levels[i].description;
+    const Vec3& spacing = d.geometry.spacing;
+    text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
+                        spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
+  }
+  if (!info.channels.empty()) {
+    text += fmt::format("channels     {}:", info.channels.size());
+    for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
+    text += '\n';
+  }
+  if (info.times > 1) text += fmt::format("times        {}\n", info.times);
+  if (info.window) text += fmt::format("window       {:g} ... {:g}, which the file asks for\n", info.window->min, info.window->max);
+  return text;
+}
+
+std::string InfoText(const VolumeFacts& facts, const std::string& transfer, double occupancy) {
+  const VolumeFileInfo& info = facts.file;
+  const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.description;
   const Vec3& spacing = d.geometry.spacing;
   std::string text = fmt::format("format       {}\n", info.format);
-  text += fmt::format("size         {} x {} x {} voxels ({:.1f} MiB)\n", d.geometry.size.x, d.geometry.size.y, d.geometry.size.z,
-                      double(d.voxel_bytes()) / (1 << 20));
+  text += fmt::format("size         {} voxels ({:.1f} MiB)\n", SizeText(d.geometry.size), double(d.voxel_bytes()) / (1 << 20));
   text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
                       d.mapping.offset);
   if (info.labels) text += "labels       yes: values are numbers of structures, not measurements\n";
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
-  text += OrientationText(info);
-  text += fmt::format("values       {:g} ... {:g}\n", summary.range.min, summary.range.max);
+  text += OrientationText(facts);
+  if (facts.parts) text += PartsText(facts.parts->source->info());
+  text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
@@ -150,6 +220,10 @@ std::string LayersText(const Layers& layers) {
   return text;
 }
 
+nlohmann::ordered_json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
+
+nlohmann::ordered_json IndexJson(const Index3& index) { return {index.x, index.y, index.z}; }
+
 nlohmann::ordered_json LayersJson(const Layers& layers) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   if (layers.labels != nullptr) {
@@ -163,13 +237,32 @@ nlohmann::ordered_json LayersJson(const Layers& layers) {
   }
   if (layers.overlay != nullptr) {
     const VolumeSummary summary = Summarize(*layers.overlay);
-    json["overlay"] = {{"range", {{"min", summary.range.min}, {"max", summary.range.max}}}, {"no_value", summary.non_finite}};
+    json["overlay"] = {{"range", RangeJson(summary.range)}, {"no_value", summary.non_finite}};
   }
   return json;
 }
 
-std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, const std::string& transfer, double occupancy,
-                     const std::vector<DicomSeries>& series, const Layers& layers) {
+void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
+  const SourceInfo& info = facts.parts->source->info();
+  json["levels"] = nlohmann::ordered_json::array();
+  for (const SourceLevel& level : info.levels) {
+    const VolumeGeometry& geometry = level.description.geometry;
+    json["levels"].push_back({{"size", IndexJson(geometry.size)},
+                              {"spacing", VectorJson(geometry.spacing)},
+                              {"origin", VectorJson(geometry.orientation.origin)},
+                              {"voxel_bytes", level.description.voxel_bytes()},
+                              {"block", IndexJson(level.block)}});
+  }
+  json["channels"] = info.channels;
+  json["times"] = info.times;
+  if (info.window) json["window"] = RangeJson(*info.window);
+  json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", IsSample(*facts.summary)}};
+}
+
+std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, double occupancy, const std::vector<DicomSeries>& series,
+                     const Layers& layers) {
+  const VolumeFileInfo& info = facts.file;
+  const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.description;
   const Orientation& orientation = d.geometry.orientation;
   nlohmann::ordered_json world = {
@@ -177,12 +270,12 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
       {"origin", VectorJson(orientation.origin)},
       {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
       {"oblique_degrees", ObliqueDegrees(orientation)}};
-  if (orientation.world != World::kVoxels) {
+  if (orientation.world != World::kVoxels && !facts.parts) {
     for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
   }
   world["straightened"] = info.straightened;
   nlohmann::ordered_json json = {{"format", info.format},
-                                 {"size", {d.geometry.size.x, d.geometry.size.y, d.geometry.size.z}},
+                                 {"size", IndexJson(d.geometry.size)},
                                  {"type", NameOf(d.type)},
                                  {"file_type", info.file_type},
                                  {"labels", info.labels},
@@ -191,11 +284,12 @@ std::string InfoJson(const VolumeFileInfo& info, const VolumeSummary& summary, c
                                  {"spacing", VectorJson(d.geometry.spacing)},
                                  {"unit", NameOf(UnitOf(d.geometry))},
                                  {"orientation", world},
-                                 {"range", {{"min", summary.range.min}, {"max", summary.range.max}}},
+                                 {"range", RangeJson(summary.range)},
                                  {"non_finite", summary.non_finite},
                                  {"transfer", transfer},
                                  {"occupancy", occupancy},
                                  {"histogram", summary.histogram}};
+  if (facts.parts) AddPartsJson(facts, json);
   if (!series.empty()) json["series"] = SeriesJson(series);
   if (layers.types().any()) json["layers"] = LayersJson(layers);
   return JsonText(json);
@@ -215,20 +309,19 @@ Status RunInfo(const InfoOptions& options) {
     return Status::Ok();
   }
   if (!options.json) std::cout << SeriesText(*series);
-  const Result<LoadedVolume> loaded = ReadInputVolume(options.path);
-  if (!loaded.ok()) return loaded.status();
-  const VolumeSummary summary = Summarize(*loaded->volume);
+  const Result<VolumeFacts> facts = FactsOf(options.path);
+  if (!facts.ok()) return facts.status();
 
-  const Result<TransferFunction> transfer = ResolveTransfer(options.request.transfer, summary);
+  const Result<TransferFunction> transfer = ResolveTransfer(options.request.transfer, *facts->summary);
   if (!transfer.ok()) return transfer.status();
-  const double occupancy = EstimateOccupancy(summary, *transfer);
+  const double occupancy = OccupancyOf(*facts->summary, *transfer);
 
-  const Result<Layers> layers = ReadLayers(options.layers, loaded->info.description.geometry);
+  const Result<Layers> layers = ReadLayers(options.layers, facts->file.description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
 
   const std::string name = TransferName(options.request.transfer);
-  std::cout << (options.json ? InfoJson(loaded->info, summary, name, occupancy, *series, *layers)
-                             : InfoText(loaded->info, summary, name, occupancy) + LayersText(*layers));
+  std::cout << (options.json ? InfoJson(*facts, name, occupancy, *series, *layers)
+                             : InfoText(*facts, name, occupancy) + LayersText(*layers));
   return Status::Ok();
 }
 

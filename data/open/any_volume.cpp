@@ -57,6 +57,16 @@ Result<std::uint64_t> VersionOf(const std::vector<std::string>& files) {
   return XXH3_64bits(text.data(), text.size());
 }
 
+VolumeFileInfo FileInfoOf(const SourceInfo& source) {
+  const VolumeDescription& finest = source.levels.front().description;
+  return {.description = finest,
+          .file_type = source.file_type,
+          .format = source.format,
+          .stored_size = finest.geometry.size,
+          .steps = StepsOf(finest.geometry.spacing),
+          .labels = source.labels};
+}
+
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
   if (IsReadWhole(path, options)) return ReadVolume(path, options);
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
@@ -67,16 +77,7 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
     if (options.progress != nullptr) options.progress->Add(percent - std::exchange(told, percent));
   });
   if (!volume.ok()) return volume.status();
-  LoadedVolume loaded{.volume = *std::move(volume)};
-  const SourceInfo& info = (*source)->info();
-  const VolumeGeometry& geometry = loaded.volume->description.geometry;
-  loaded.info.description = loaded.volume->description;
-  loaded.info.file_type = info.file_type;
-  loaded.info.format = info.format;
-  loaded.info.stored_size = geometry.size;
-  loaded.info.steps = StepsOf(geometry.spacing);
-  loaded.info.labels = info.labels;
-  return loaded;
+  return LoadedVolume{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {

@@ -22,6 +22,9 @@ void SetReadMemory(std::uint64_t process_bytes);
 // Of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one cannot be looked at.
 Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
 
+// Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
+VolumeFileInfo FileInfoOf(const SourceInfo& source);
+
 // ReadVolume, or the finest level of a source.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
 // CheckVolumeHeaders, or the files of a source, which it opens.

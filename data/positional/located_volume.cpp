@@ -76,6 +76,7 @@ bool HasLocatedSamples(const std::string& path, const ReadOptions& options, Pack
     const VolumeFormat* const format = FindFormat(path, options);
     return format != nullptr && format->locate != nullptr && !format->required.empty() && packing == Packing::kNone;
   }
+  if (options.channel == kLuminance) return false;
   ReadOptions any_time = options;
   if (!any_time.time) any_time.time = TimeRange{};
   const Result<LocatedSamples> located = Locate(*FindFormat(path, options), path, any_time, packing);

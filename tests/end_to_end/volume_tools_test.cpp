@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -89,6 +92,70 @@ TEST_F(VolumeToolsTest, InfoIsReadable) {
   for (const char* part : {"20 x 20 x 20 voxels", "uint8", "spacing      1 1 1", "occupancy", "histogram", "#####"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
+}
+
+TEST_F(VolumeToolsTest, InfoTellsTheLevelsOfAVolume) {
+  MakeSphere("s.nrrd", 1, 100);
+  MustRun({"convert", "s.nrrd", "s.ome.zarr"});
+  const std::string text = MustRun({"info", "s.ome.zarr"}).out;
+  for (const char* part : {"format       OME-Zarr 0.5\n", "size         100 x 100 x 100 voxels (1.0 MiB)\n",
+                           "levels       2: voxels, spacing, memory, block\n", "   0  100 x 100 x 100  1 1 1  1.0 MiB  64 x 64 x 64\n",
+                           "   1  50 x 50 x 50  2 2 2  0.1 MiB  50 x 50 x 50\n", "values       0 ... 248\n", "#####"}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+  const json info = Info("s.ome.zarr"), whole = Info("s.nrrd");
+  for (const char* field : {"size", "type", "file_type", "spacing", "range", "histogram", "occupancy"})
+    EXPECT_EQ(info[field], whole[field]);
+  ASSERT_EQ(info["levels"].size(), 2U);
+  EXPECT_EQ(info["levels"][0]["block"], (json{64, 64, 64}));
+  EXPECT_EQ(info["levels"][1]["size"], (json{50, 50, 50}));
+  EXPECT_EQ(info["levels"][1]["spacing"], (json{2.0, 2.0, 2.0}));
+  EXPECT_EQ(info["levels"][1]["voxel_bytes"], 125000);
+  EXPECT_EQ(info["statistics"], (json{{"level", 0}, {"sample", false}}));
+  EXPECT_FALSE(whole.contains("levels"));
+}
+
+// Nobody has the time, or the memory, to read all of it.
+TEST_F(VolumeToolsTest, InfoOfALargeVolumeTellsOfACoarseLevelOrASample) {
+  const auto write = [&](const std::string& name, const json& text) { std::ofstream(Path(name)) << text; };
+  const auto array = [&](const std::string& name, const json& shape, int fill) {
+    std::filesystem::create_directories(Path(name));
+    write(name + "/.zarray", {{"zarr_format", 2},
+                              {"shape", shape},
+                              {"chunks", {64, 64, 64}},
+                              {"dtype", "|u1"},
+                              {"compressor", nullptr},
+                              {"fill_value", fill},
+                              {"order", "C"},
+                              {"filters", nullptr}});
+  };
+  const auto scale = [](double step) { return json::array({{{"type", "scale"}, {"scale", {step, step, step}}}}); };
+  array("large.zarr/0", {65535, 4096, 4096}, 0);  // a TiB of which no chunk is there
+  array("large.zarr/1", {512, 32, 32}, 7);
+  write("large.zarr/.zgroup", {{"zarr_format", 2}});
+  const json axes = {{{"name", "z"}, {"type", "space"}}, {{"name", "y"}, {"type", "space"}}, {{"name", "x"}, {"type", "space"}}};
+  const json datasets = {{{"path", "0"}, {"coordinateTransformations", scale(1)}},
+                         {{"path", "1"}, {"coordinateTransformations", scale(128)}}};
+  const json image = {{"version", "0.4"}, {"axes", axes}, {"datasets", datasets}};
+  write("large.zarr/.zattrs", {{"multiscales", json::array({image})}});
+  EXPECT_THAT(MustRun({"info", "large.zarr"}).out, HasSubstr("values       7 ... 7 of level 1\n"));
+  EXPECT_EQ(Info("large.zarr")["statistics"], (json{{"level", 1}, {"sample", false}}));
+
+  std::ofstream(Path("large.raw"));
+  std::filesystem::resize_file(Path("large.raw"), std::uintmax_t{1024} * 1024 * 1100);
+  const std::vector<std::string> raw = {"--dims", "1024,1024,1100", "--type", "uint8"};
+  std::vector<std::string> command = {"info", "large.raw"};
+  command.insert(command.end(), raw.begin(), raw.end());
+  EXPECT_THAT(MustRun(command).out, HasSubstr("values       0 ... 0 of a sample of level 0\n"));
+  EXPECT_EQ(Info("large.raw", raw)["statistics"], (json{{"level", 0}, {"sample", true}}));
+}
+
+// It cannot be read in parts.
+TEST_F(VolumeToolsTest, InfoTellsOfTheLuminanceOfAnUncompressedFile) {
+  std::ofstream(Path("rgb.nrrd")) << "NRRD0004\ntype: uint8\ndimension: 4\nsizes: 3 2 2 2\nencoding: raw\n\n" << std::string(24, 'x');
+  const json info = Info("rgb.nrrd", {"--channel", "luminance"});
+  EXPECT_EQ(info["size"], (json{2, 2, 2}));
+  EXPECT_EQ(info["range"]["max"], 120);
 }
 
 TEST_F(VolumeToolsTest, HelpNamesWhatCanBeChosen) {
