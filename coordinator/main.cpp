@@ -68,6 +68,7 @@ int Run(int argc, char** argv) {
       ->type_name("LINK")
       ->default_str(kDefaultLink);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
+    SetReadMemory(options.machine.memory_bytes);  // before anything is read
     FoundData found = FindData(data);
     CheckFiles(found);
     for (const std::string& line : found.complaints) LogWarning(line);
@@ -76,7 +77,6 @@ int Run(int argc, char** argv) {
     options.folders = {found.folders.begin(), found.folders.end()};
     options.machine.log_level = LeastLogLevel();
     LimitMemory(options.machine.memory_bytes);
-    SetReadMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options));
   });

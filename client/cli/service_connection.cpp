@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "client/cli/cores.h"
@@ -25,6 +24,25 @@ Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files
   Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
   return LayeredVolume{.volume = std::move(loaded->volume), .layers = *std::move(layers)};
+}
+
+// Of a process that does everything. What it takes before it does anything counts once.
+Result<MemoryShares> SharesOf(const ConnectionOptions& connection) {
+  const auto workers = std::uint64_t(connection.local_workers);
+  Result<MemoryShares> shares = ShareMemory(connection.local_memory, connection.local_workers);
+  if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
+  shares->worker = kIdleMemoryBytes + (shares->worker * workers - kIdleMemoryBytes) / workers;
+  return shares;
+}
+
+// Before anything is read.
+Status LimitLocalMemory(const ConnectionOptions& connection) {
+  if (connection.local_memory == 0) return Status::Ok();
+  const Result<MemoryShares> shares = SharesOf(connection);
+  if (!shares.ok()) return shares.status();
+  LimitMemory(connection.local_memory);
+  SetReadMemory(connection.local_memory - shares->coordinator);
+  return Status::Ok();
 }
 
 }  // namespace
@@ -54,6 +72,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     if (opened.ok()) opened->datasets_.assign(sources.begin(), sources.end());
     return opened;
   }
+  if (Status limited = LimitLocalMemory(connection); !limited.ok()) return limited;
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
@@ -86,15 +105,10 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
   }
   options.worker.threads = std::uint32_t(LocalThreads(connection));
   if (connection.local_memory > 0) {
-    const Result<MemoryShares> shares = ShareMemory(connection.local_memory, connection.local_workers);
-    if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
+    const Result<MemoryShares> shares = SharesOf(connection);
+    if (!shares.ok()) return shares.status();
     options.coordinator.machine.memory_bytes = shares->coordinator;
-    // What a process takes before it does anything counts once.
-    const std::uint64_t of_workers = shares->worker * std::uint64_t(connection.local_workers);
-    options.worker.memory_bytes =
-        kIdleMemoryBytes + (of_workers - std::min(of_workers, kIdleMemoryBytes)) / std::uint64_t(connection.local_workers);
-    LimitMemory(connection.local_memory);
-    SetReadMemory(of_workers);
+    options.worker.memory_bytes = shares->worker;
   }
   Result<std::unique_ptr<EmbeddedService>> service = EmbeddedService::Start(*opened.context_, std::move(options));
   if (!service.ok()) return service.status();
