@@ -158,7 +158,7 @@ struct FindDatasets {
 struct AnswerQuestion {
   QuestionId id = 0;
   Question question;
-  DatasetId dataset = 0;
+  DatasetId dataset = 0;  // 0: a SummaryQuery about a dataset with several levels, which needs no voxels
   std::shared_ptr<const VolumeSummary> summary;
 };
 // -> UploadBegun: room for the bytes of `order`.

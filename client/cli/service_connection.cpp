@@ -58,6 +58,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
     if (CanBeReadInParts(source) && !layers.any()) {
+      if (Status status = CheckInputHeaders(source); !status.ok()) return status;
       files.emplace_back(source, "");
     } else {
       files.emplace_back([source, layers] { return LoadInput(source, layers); });

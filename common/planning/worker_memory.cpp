@@ -102,11 +102,12 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary) {
 
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   if (limit == 0) return kBoxBytesTarget;
-  constexpr std::uint64_t kImages = 4;       // of a group, and the picture
-  constexpr std::uint64_t kLeast = 4 << 20;  // smaller boxes are mostly halo
-  const std::uint64_t taken = kIdleMemoryBytes + (setup.stored ? SourceBytes(limit) : 0) + kImages * std::uint64_t(FrameBytes(setup));
-  const std::uint64_t box = (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel);
-  return box < kLeast ? kBoxBytesTarget : std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
+  constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
+  // Images of small boxes are small beside the frame.
+  const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 8;
+  const std::uint64_t taken = kIdleMemoryBytes + (setup.stored ? SourceBytes(limit) : 0) + images;
+  const std::uint64_t box = std::max(kLeast, (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel));
+  return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
 
 Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, std::span<const WorkerLimit> workers) {

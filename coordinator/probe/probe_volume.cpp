@@ -13,12 +13,11 @@ double SampleOf(const VoxelBricks& voxels, const Index3& voxel) {
   });
 }
 
-// Of a point of the world.
+}  // namespace
+
 Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at) {
   return geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing;
 }
-
-}  // namespace
 
 double ProbeVolume::StoredAt(const Index3& voxel) const { return SampleOf(voxels, voxel); }
 

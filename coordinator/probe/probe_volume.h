@@ -23,6 +23,9 @@ struct ProbeVolume {
 // The voxel whose cell, [v - 0.5, v + 0.5), holds p (data space).
 Index3 VoxelAt(const Vec3& p);
 
+// Where a point of the world lies in data space.
+Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at);
+
 // `at` is a point of the world. `summary` is that of the dataset.
 VolumeSample SampleAt(const ProbeVolume& volume, const VolumeSummary& summary, const Vec3& at);
 // What the voxel, which may lie outside, holds, as the sample at this point.

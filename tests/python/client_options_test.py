@@ -137,6 +137,11 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
 ]
 
 
+# Of a dataset with two levels.
+LEVEL_CASES: list[tuple[dict, list[str]]] = [
+    ({"detail": 0.1}, ["--detail", "0.1"]),
+    ({"level": "0", "renderer": "raycast"}, ["--level", "0", "--renderer", "raycast"]),
+]
 # Of an unstructured grid.
 GRID_CASES: list[tuple[dict, list[str]]] = [
     ({"renderer": "slice", "sampling_rate": 2, "azimuth": 30}, ["--renderer", "slice", "--sampling-rate", "2", "--azimuth", "30"]),
@@ -166,6 +171,11 @@ class Pixels(WithAService):
         (cls.folder / "grid.vtk").write_text(GRID)
         added = cls.running.run("data", "add", f"grid={cls.folder}/grid.vtk", "--endpoint", cls.running.endpoint)
         assert added.returncode == 0, added.stderr
+        ball = cls.folder / "ball.nrrd"
+        for arguments in (["sphere", "--class", "1", "--size", "80", "-o", ball], ["convert", ball, cls.folder / "levels.ome.zarr"],
+                          ["data", "add", f"levels={cls.folder}/levels.ome.zarr", "--endpoint", cls.running.endpoint]):
+            done = cls.running.run(*map(str, arguments))
+            assert done.returncode == 0, done.stderr
         (cls.folder / "map.json").write_text(json.dumps(COLOR_MAP))
         (cls.folder / "camera.json").write_text(json.dumps(CAMERA))
         cls.service = ss.connect(endpoint=cls.running.endpoint)
@@ -188,6 +198,7 @@ class Pixels(WithAService):
     def test_render_makes_the_command_lines_pixels(self) -> None:
         self.compare("render", RENDER_CASES)
         self.compare("render", GRID_CASES, "grid")
+        self.compare("render", LEVEL_CASES, "levels")
 
     def test_every_field_changes_the_picture_or_says_that_it_does_not(self) -> None:
         def differ(one, other) -> bool:
@@ -200,7 +211,8 @@ class Pixels(WithAService):
             except ss.SlabstreamError:  # it cannot be had without this option
                 return None
 
-        cases = [("head", python) for python, _ in RENDER_CASES] + [("grid", python) for python, _ in GRID_CASES]
+        of = {"head": RENDER_CASES, "grid": GRID_CASES, "levels": LEVEL_CASES}
+        cases = [(dataset, python) for dataset, listed in of.items() for python, _ in listed]
         for name, option in COMMANDS["render"].items():
             if not option.path or name == "pixel_error":  # which says itself by how much
                 continue
@@ -216,7 +228,7 @@ class Pixels(WithAService):
         self.compare("slice", SLICE_CASES)
 
     def test_every_option_is_compared(self) -> None:
-        for command, cases in (("render", RENDER_CASES + GRID_CASES), ("slice", SLICE_CASES)):
+        for command, cases in (("render", RENDER_CASES + GRID_CASES + LEVEL_CASES), ("slice", SLICE_CASES)):
             compared = {name for python, _ in cases for name in python}
             self.assertEqual(set(COMMANDS[command]) - compared, set())
             for name in ("view", "renderer", "plane"):

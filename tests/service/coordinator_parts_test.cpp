@@ -38,7 +38,7 @@ using testing::HasSubstr;
 TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   VolumeSummary summary = Summarize(*sphere);
-  AnswerQuestion asked{.question = SummaryQuery{.nonce = 7, .dataset = "ball", .transfer = {}}};
+  AnswerQuestion asked{.question = SummaryQuery{.nonce = 7, .dataset = "ball", .transfer = {}}, .dataset = 5};
   const auto answer = [&](const VolumeSummary& of) {
     asked.summary = std::make_shared<const VolumeSummary>(of);
     return std::get<SummaryReply>(AnswerTo(asked, {.volume = sphere}).value());
@@ -49,6 +49,8 @@ TEST(AnswerTo, ASummaryHasTheLabelsOfTheDataset) {
   summary.label_table = std::make_shared<const LabelTable>(LabelTable{labels});
   EXPECT_EQ(answer(summary).labels, labels);
   EXPECT_EQ(AnswerTo(asked, {}).status().code(), StatusCode::kUnavailable) << "it was unloaded meanwhile";
+  asked.dataset = 0;
+  EXPECT_EQ(std::get<SummaryReply>(AnswerTo(asked, {}).value()).labels, labels) << "it has several levels, and no voxels itself";
 }
 
 TEST(PeerTable, TokensAreNeverReused) {

@@ -62,6 +62,8 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"specular", {"0.75", {}}},
     {"shininess", {"3", {}}},
     {"termination", {"0.25", {}}},
+    {"detail", {"2.5", {}}},
+    {"level", {"3", {}}},
     {"brightness", {"1.5", {}}},
     {"label-mode", {"surface", {{"renderer", "raycast"}}}},
     {"label-tint", {"0.25", {{"renderer", "raycast"}}}},

@@ -98,7 +98,7 @@ void CheckSegmentations(Random& random) {
       packed += one;
       expected += std::string(reinterpret_cast<const char*>(labels.data()), labels.size() * sizeof(Label));
     }
-    const Codec codec = precomputed::SegmentationCodec(size, block, 2, sizeof(Label));
+    const SharedCodec codec = precomputed::SegmentationCodec(size, block, 2, sizeof(Label));
     const Result<Bytes> decoded = codec->Decode(BytesOf(packed), expected.size());
     ASSERT_TRUE(decoded.ok()) << decoded.status().message();
     ASSERT_TRUE(std::ranges::equal(decoded->span(), std::as_bytes(std::span(expected))));
@@ -118,7 +118,7 @@ TEST(SegmentationCodec, DecodesLabelsOfAnyNumber) {
 }
 
 TEST(SegmentationCodec, TakesNoMemoryForWhatIsTooMuch) {
-  const Codec codec = precomputed::SegmentationCodec({1 << 20, 1 << 20, 1 << 20}, {8, 8, 8}, 1, 8);
+  const SharedCodec codec = precomputed::SegmentationCodec({1 << 20, 1 << 20, 1 << 20}, {8, 8, 8}, 1, 8);
   EXPECT_EQ(codec->Decode(BytesOf(std::string(64, '\1')), 1 << 20).status().code(), StatusCode::kResourceExhausted);
 }
 

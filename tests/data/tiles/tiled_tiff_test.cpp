@@ -277,9 +277,9 @@ TEST(TiledTiff, ReadsOnlyTheTilesOfABox) {
 TEST(TiledTiff, RecognisesFilesAlone) {
   const TemporaryDirectory directory;
   WritePyramid(directory / "v.tif", {});
-  EXPECT_TRUE(TiledTiff().recognises(directory / "v.tif"));
-  EXPECT_FALSE(TiledTiff().recognises(directory.path()));
-  EXPECT_FALSE(TiledTiff().recognises(directory / "v.nii"));
+  EXPECT_TRUE(TiledTiff().recognises(directory / "v.tif", {}));
+  EXPECT_FALSE(TiledTiff().recognises(directory.path(), {}));
+  EXPECT_FALSE(TiledTiff().recognises(directory / "v.nii", {}));
 }
 
 TEST(TiledTiff, NamesWhatIsWrong) {
