@@ -246,6 +246,30 @@ TEST_F(InPartsTest, LevelsThatFitAreHeld) {
   EXPECT_EQ(client_->QueryStatus(seconds(30))->datasets.at(0).memory_bytes, 50U * 50 * 50);
 }
 
+// ---------------------------------------------------------------- questions
+
+TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
+  const std::vector<Vec3> points = {{50, 50, 50}, {49.6, 30.2, 70.7}, {0, 0, 0}, {99.4, 99.4, 99.4}, {1000, 0, 0}, {-0.4, 20, 99}};
+  const ClipBox box{{10.5, 20, 3}, {70, 100, 75}, ClipUnit::kVoxels};
+  for (const std::string& path : {Nrrd(*ball_), Zarr(ball_)}) {
+    SCOPED_TRACE(path);
+    constexpr std::uint64_t kNoLimit = 0;
+    Start(path, 1, kNoLimit);
+    const std::vector<VolumeSample> held = client_->SampleAt("ball", points).value();
+    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value();
+    const SummaryReply summary = client_->Summarize("ball").value();
+    Start(path, 1);
+    EXPECT_EQ(client_->SampleAt("ball", points).value(), held);
+    EXPECT_EQ(client_->StatisticsIn("ball", box).value(), statistics);
+    const SummaryReply in_parts = client_->Summarize("ball").value();
+    EXPECT_EQ(in_parts.description, summary.description);
+    EXPECT_EQ(in_parts.range, summary.range);
+    EXPECT_EQ(in_parts.histogram, summary.histogram);
+    EXPECT_EQ(in_parts.transfer, summary.transfer);
+    ExpectNothingHeld();
+  }
+}
+
 // ---------------------------------------------------------------- files that change or are damaged
 
 TEST_F(InPartsTest, AReplacedFileGivesTheNewPictureAndARemovedOneAnError) {
