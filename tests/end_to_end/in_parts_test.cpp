@@ -120,15 +120,14 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
     const PictureFile in_parts = Render("large", view);
     view.push_back("--local=1");
     EXPECT_LE(LargestDifference(in_parts, Render("large.nrrd", view)), kSame);
-    EXPECT_GT(Opaque(in_parts), 0.1);
+    EXPECT_GT(Opaque(in_parts), 0.05);
   }
   const json status = json::parse(MustRun({"status", "--json"}).out);
   EXPECT_EQ(status["datasets"][0]["state"], "ready");
   EXPECT_EQ(status["datasets"][0]["memory_bytes"], 0);
-  const std::string down = MustRun({"down"}).out;
-  const std::size_t begin = down.find("logs are in ");
-  ASSERT_NE(begin, std::string::npos) << down << up;
-  const std::string logs = down.substr(begin + 12, down.find('\n', begin) - begin - 12);
+  const std::size_t begin = up.find("logs are in ");
+  ASSERT_NE(begin, std::string::npos) << up;
+  const std::string logs = up.substr(begin + 12, up.find('\n', begin) - begin - 12);
   int reading = 0;
   for (const auto& entry : std::filesystem::directory_iterator(logs)) {
     std::ifstream file(entry.path());
@@ -150,7 +149,7 @@ TEST_F(InPartsTest, AWorkerThatDoesNotSeeTheFilesGetsVoxelsFromTheCoordinator) {
   RunningProgram worker({programs + "/slabstream-worker", "--coordinator", workers, "--log-level", "info"}, "/");
   const PictureFile picture = Render("large", {"--endpoint", endpoint, "--zoom", "8"});
   EXPECT_LE(LargestDifference(picture, Render("large.nrrd", {"--local=1", "--zoom", "8"})), kSame);
-  EXPECT_GT(Opaque(picture), 0.1);
+  EXPECT_GT(Opaque(picture), 0.05);
   worker.Signal(SIGTERM);
   EXPECT_THAT(worker.Wait().err, AllOf(HasSubstr("asks the coordinator for voxels"), Not(HasSubstr(" itself"))));
   coordinator.Signal(SIGTERM);
