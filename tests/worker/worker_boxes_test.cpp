@@ -315,6 +315,13 @@ TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
   EXPECT_GT(requests.size(), 1U);
 }
 
+TEST_F(WorkerBoxesTest, AsksForSmallBlocksTogether) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.setup.stored = StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}};
+  assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};  // 4 MiB
+  EXPECT_LE(All<SendChunkRequest>(Tell(assignment)).size(), 6U) << "a request for every row would be slow";
+}
+
 TEST_F(WorkerBoxesTest, TwoBoxesThatWantTheSamePieceBothGetIt) {
   GroupAssignment assignment = Assignment(1, {kSelf, kSelf});
   assignment.setup.stored = StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}};
