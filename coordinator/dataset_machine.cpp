@@ -64,7 +64,10 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
   DatasetTable::Entry* const entry = datasets.Find(name);
   switch (entry->state) {
     case DatasetState::kUnloaded:
-    case DatasetState::kFailed: LoadData(name); break;
+    case DatasetState::kFailed:
+      LoadData(name);
+      if (!IsLevelName(name)) break;
+      [[fallthrough]];  // its source was opened before
     case DatasetState::kLoading: return entry->checks.Want();
     case DatasetState::kReady: {
       if (entry->stamp == nullptr) break;
@@ -221,11 +224,16 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
 // All levels of a dataset change together.
 void DatasetMachine::State::RenewData(const std::string& changed) {
   const std::string name = DatasetOfLevel(changed);
+  const auto go_back = [&](auto& waiting) {
+    if (DatasetOfLevel(waiting.entry) != name || waiting.entry == name) return;
+    waiting.entry = name;
+    waiting.check = 0;  // of the level; the dataset is opened anew
+  };
   for (auto& [id, use] : uses) {
-    if (DatasetOfLevel(use.entry) == name && !use.kept) use.entry = name;
+    if (!use.kept) go_back(use);
   }
   for (auto& [id, open] : questions) {
-    if (DatasetOfLevel(open.entry) == name && !open.asked) open.entry = name;
+    if (!open.asked) go_back(open);
   }
   datasets.Reset(name, now);
   if (IsWanted(name)) LoadData(name);

@@ -12,9 +12,10 @@ namespace {
 
 // Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings.
 std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types) {
-  Index3 block = stored.block.end;
+  Index3 block = stored.block.end, end;
+  for (const Box& box : boxes) end = Max(end, box.end);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
-    while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < kMaxVolumeSide / 2) block[axis] *= 2;
+    while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
   }
   std::vector<Box> pieces;
   for (const Box& box : boxes) {

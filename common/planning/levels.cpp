@@ -76,11 +76,13 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels) {
 
 Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels) {
   const int count = int(levels.levels.size());
+  const VolumeGeometry& finest = levels.levels.front().geometry;
+  // Coarser levels have other indices.
+  if (const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest); !clip.ok()) return clip.status();
   if (const std::optional<int> level = LevelNumber(request.level)) {
     if (*level < count) return *level;
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
-  const VolumeGeometry& finest = levels.levels.front().geometry;
   const VolumeGeometry& overview = levels.overview->description.geometry;
   const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview);
   if (!resolved.ok()) return resolved.status();

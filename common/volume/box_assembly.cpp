@@ -65,6 +65,7 @@ BoxAssembly Assemble(const Box& wanted, std::span<const Box> at_hand, std::size_
 
 std::vector<Box> CutAtBlocks(const Box& box, const Index3& block) {
   std::vector<Box> pieces;
+  if (box.empty()) return pieces;
   const auto first = [&](Axis axis) { return box.begin[axis] / block[axis] * block[axis]; };
   for (std::int32_t z = first(Axis::kZ); z < box.end.z; z += block.z) {
     for (std::int32_t y = first(Axis::kY); y < box.end.y; y += block.y) {

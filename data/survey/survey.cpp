@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <future>
 #include <utility>
@@ -47,8 +48,14 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   const std::vector<Box> all = CutAtBlocks(bounds, block);
   const double share = std::min(1.0, double(most) / double(level.description.voxel_bytes()));
   const auto count = std::clamp<std::size_t>(std::size_t(share * double(all.size())), 1, all.size());
+  // One of each stretch of them: each time at another place in it, or rows of blocks as long as a stretch would give the same column.
+  constexpr double kGoldenRatio = 0.6180339887498949;
   std::vector<Box> sample;
-  for (std::size_t i = 0; i < count; ++i) sample.push_back(all[std::size_t((double(i) + 0.5) * double(all.size()) / double(count))]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t first = i * all.size() / count, end = (i + 1) * all.size() / count;
+    const double turn = kGoldenRatio * (double(i) + 0.5);
+    sample.push_back(all[first + std::size_t((turn - std::floor(turn)) * double(end - first))]);
+  }
   return sample;
 }
 

@@ -37,8 +37,8 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
 }
 
 // The whole volume as one box, without planner's groups, combining or transport.
-inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume) {
-  const Result<FramePlan> plan = PlanFrame(request, 1, SummaryOf(volume), Roster{{1}});
+inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume, const VolumeSummary& summary) {
+  const Result<FramePlan> plan = PlanFrame(request, 1, summary, Roster{{1}});
   CHECK(plan.ok()) << plan.status().message();
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
@@ -50,6 +50,9 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   Result<LocalImage> image = MakeRenderer(*plan->setup.renderer)->Render(data, volume.block.box, plan->setup, {}, control, report);
   CHECK(image.ok()) << image.status().message();
   return FinishPicture(*std::move(image), plan->setup);
+}
+inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volume) {
+  return RenderDirectly(request, volume, SummaryOf(volume));
 }
 
 struct PixelValue {

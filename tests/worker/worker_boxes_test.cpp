@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "common/planning/worker_memory.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
@@ -286,6 +288,52 @@ TEST_F(WorkerBoxesTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
   again.key.frame = 2;
   ++again.setup.dataset;
   EXPECT_THAT(All<SendChunkRequest>(Tell(again)), testing::Not(IsEmpty())) << "another volume";
+}
+
+// ---------------------------------------------------------------- voxels that are read where they are stored
+
+TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
+  const StoredAt stored{.source = "/data/scan.ome.zarr", .version = 5, .block = {{0, 0, 0}, {128, 128, 24}}};
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.setup.stored = stored;
+  assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};
+  const auto requests = All<SendChunkRequest>(Tell(assignment));
+  const Box padded = {{0, 0, 92}, {128, 128, 348}};
+  std::int64_t voxels = 0;
+  std::int32_t z = padded.begin.z;
+  for (const SendChunkRequest& request : requests) {
+    ASSERT_NE(request.stored, nullptr);
+    EXPECT_EQ(*request.stored, stored);
+    const Box& box = request.request.box;
+    EXPECT_EQ(box.begin.z, z) << "in order, and none twice";
+    EXPECT_TRUE(box.end.z % 24 == 0 || box.end.z == padded.end.z) << box.end.z;
+    EXPECT_LE(box.voxel_count(), kChunkBytes);
+    z = box.end.z;
+    voxels += box.voxel_count();
+  }
+  EXPECT_EQ(voxels, padded.voxel_count());
+  EXPECT_GT(requests.size(), 1U);
+}
+
+TEST_F(WorkerBoxesTest, AsksForSmallBlocksTogether) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  assignment.setup.stored = StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}};
+  assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};  // 4 MiB
+  EXPECT_LE(All<SendChunkRequest>(Tell(assignment)).size(), 6U) << "a request for every row would be slow";
+}
+
+TEST_F(WorkerBoxesTest, TwoBoxesThatWantTheSamePieceBothGetIt) {
+  GroupAssignment assignment = Assignment(1, {kSelf, kSelf});
+  assignment.setup.stored = StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}};
+  assignment.group.placements[0].box = {{0, 0, 64}, {128, 120, 128}};
+  assignment.group.placements[1].box = {{0, 0, 64}, {128, 120, 129}};  // each with a halo: the pieces up to voxel 128 are the same
+  const Actions asked = Tell(assignment);
+  std::map<Box, int> wanted;
+  for (const SendChunkRequest& request : All<SendChunkRequest>(asked)) ++wanted[request.request.box];
+  EXPECT_THAT(wanted, testing::Contains(testing::Pair(testing::_, 2)));
+  const auto first = All<StartRender>(Feed(asked));
+  ASSERT_THAT(first, SizeIs(1)) << "one at a time";
+  EXPECT_THAT(All<StartRender>(Rendered(first[0])), SizeIs(1)) << "the other one needs no more voxels";
 }
 
 }  // namespace

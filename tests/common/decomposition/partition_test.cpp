@@ -261,5 +261,38 @@ TEST(PartitionDeathTest, RefusesTreesThatDoNotTile) {
   EXPECT_DEATH(Partition(bounds, {low, high}), "hangs");
 }
 
+// ---------------------------------------------------------------- volumes in blocks
+
+TEST(PartitionOfBlocks, TilesTheVolumeWithPlanesJustBeforeBlocks) {
+  Random random(78);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 500; ++round) {
+    Index3 block, size, blocks;
+    for (const Axis axis : kAxes) {
+      block[axis] = random.Integer(1, 64);
+      size[axis] = random.Integer(1, 5 * block[axis]);
+      blocks[axis] = (size[axis] - 1) / block[axis] + 1;
+    }
+    const Box bounds = {{0, 0, 0}, size};
+    const std::int32_t before = random.Integer(0, 12);
+    const Partition of_blocks = RandomPartition(random, {{0, 0, 0}, blocks}, random.Integer(1, 20));
+    const Partition partition = of_blocks.OfBlocks(block, bounds, before);
+    ExpectTiles(partition, bounds);
+    ASSERT_EQ(partition.boxes().size(), of_blocks.boxes().size());
+    for (std::size_t i = 0; i < partition.boxes().size(); ++i) {
+      const Box &box = partition.boxes()[i], &counted = of_blocks.boxes()[i];
+      for (const Axis axis : kAxes) {
+        const std::int32_t shift = block[axis] > 2 * before ? before : 0;
+        EXPECT_EQ(box.begin[axis], counted.begin[axis] == 0 ? 0 : counted.begin[axis] * block[axis] - shift);
+        if (counted.end[axis] == blocks[axis]) continue;
+        EXPECT_EQ(box.end[axis], counted.end[axis] * block[axis] - shift);
+        if (shift > 0) {
+          EXPECT_LE(box.end[axis] + before, counted.end[axis] * block[axis]) << "its halo ends with its blocks";
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -80,5 +80,29 @@ TEST(WorkerMemory, NamesTheSizeThatIsRendered) {
   EXPECT_THAT(refused.message(), testing::ContainsRegex("size 1024x1024 \\(rendered as [0-9]+x[0-9]+\\) needs "));
 }
 
+TEST(WorkerMemory, TwoBoxesOfAFrameFitAWorkerBesideItsImages) {
+  const VolumeSummary summary = FullSummary({64, 64, 64});
+  const FramePlan plan = PlanOf(512, 1, summary);
+  EXPECT_EQ(BoxBytesFor(plan.setup, 0), kBoxBytesTarget) << "without a limit";
+  std::int64_t before = 0;
+  for (std::uint64_t limit = 300 * kMebi; limit < 4096 * kMebi; limit += 17 * kMebi) {
+    for (const bool stored : {false, true}) {
+      FrameSetup setup = plan.setup;
+      if (stored) setup.stored = StoredAt{};
+      const std::int64_t bytes = BoxBytesFor(setup, limit);
+      ASSERT_GT(bytes, 0);
+      ASSERT_LE(bytes, kBoxBytesTarget);
+      if (bytes == kBoxBytesTarget) continue;
+      const std::uint64_t images = GroupImageBytes(setup, plan.groups[0].placements) + PictureBytes(setup);
+      EXPECT_LE(kIdleMemoryBytes + (stored ? SourceBytes(limit) : 0) + 2 * 2 * std::uint64_t(bytes) + images, limit);
+      if (!stored) {
+        EXPECT_GE(bytes, before) << "more memory, larger boxes";
+        before = bytes;
+      }
+    }
+  }
+  EXPECT_GT(before, 0);
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <tuple>
+#include <vector>
+
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -94,6 +97,32 @@ TEST(Assemble, TakesItAllFromWhoHasItAll) {
   const Box wanted{{2, 2, 2}, {6, 6, 6}};
   const std::vector<Box> at_hand = {{{0, 0, 0}, {4, 9, 9}}, {{1, 1, 1}, {8, 8, 8}}, {{4, 0, 0}, {9, 9, 9}}};
   EXPECT_EQ(Assemble(wanted, at_hand), (BoxAssembly{{{1, wanted}}, {}}));
+}
+
+TEST(CutAtBlocksTest, PiecesTileTheBoxAndEndAtBlocks) {
+  Random random(53);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 2000; ++round) {
+    const Box box = AnyBox(random);
+    const Index3 block = {random.Integer(1, 12), random.Integer(1, 12), random.Integer(1, 12)};
+    const std::vector<Box> pieces = CutAtBlocks(box, block);
+    std::int64_t voxels = 0;
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+      const Box& piece = pieces[i];
+      ASSERT_FALSE(piece.empty());
+      ASSERT_TRUE(box.Contains(piece));
+      voxels += piece.voxel_count();
+      for (const Axis axis : kAxes) {
+        ASSERT_EQ(piece.begin[axis] / block[axis], (piece.end[axis] - 1) / block[axis]) << "in one block";
+        ASSERT_TRUE(piece.begin[axis] == box.begin[axis] || piece.begin[axis] % block[axis] == 0);
+        ASSERT_TRUE(piece.end[axis] == box.end[axis] || piece.end[axis] % block[axis] == 0);
+      }
+      if (i == 0) continue;
+      const auto order = [](const Box& b) { return std::tuple(b.begin.z, b.begin.y, b.begin.x); };
+      ASSERT_LT(order(pieces[i - 1]), order(piece)) << "x fastest, and none twice";
+    }
+    ASSERT_EQ(voxels, box.empty() ? 0 : box.voxel_count());
+  }
 }
 
 }  // namespace

@@ -6,7 +6,12 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
 
+#include "common/volume/box_assembly.h"
+#include "tests/support/random_box.h"
 #include "tests/support/random_volume.h"
 
 namespace slabstream {
@@ -138,6 +143,81 @@ TEST(HistogramBin, TakesTheWidestRangeOfFloats) {
   EXPECT_EQ(HistogramBin({-kLargest, kLargest}, -kLargest), 0);
   EXPECT_EQ(HistogramBin({-kLargest, kLargest}, 0), kHistogramBins / 2);
   EXPECT_EQ(HistogramBin({-kLargest, kLargest}, kLargest), kHistogramBins - 1);
+}
+
+// ---------------------------------------------------------------- piece by piece
+
+// Boxes of whole bricks that tile the volume, in any order.
+std::vector<Box> RandomPieces(Random& random, const Box& bounds) {
+  Index3 side;
+  for (const Axis axis : kAxes) side[axis] = kBrick * random.Integer(1, 3);
+  std::vector<Box> pieces = CutAtBlocks(bounds, side);
+  for (std::size_t i = 0; i < pieces.size(); ++i) std::swap(pieces[i], pieces[random.Integer(i, pieces.size() - 1)]);
+  return pieces;
+}
+
+TEST(PiecewiseSummaryTest, OfAnyPiecesIsThatOfTheWhole) {
+  Random random(3);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 60; ++round) {
+    const ScalarType type = kTypes[random.Integer<std::size_t>(0, 2)];
+    Volume volume = RandomVolume(random, {random.Integer(1, 70), random.Integer(1, 70), random.Integer(1, 40)}, type);
+    volume.description.mapping = {random.Real(-3, 3), random.Real(-100, 100)};
+    if (type == ScalarType::kFloat32) {
+      const auto samples = std::span(volume.block.samples<float>(), std::size_t(volume.block.box.voxel_count()));
+      for (float& sample : samples) sample = random.Chance(0.01) ? kNan : sample;
+    }
+    const std::vector<Box> boxes = RandomPieces(random, volume.block.box);
+    PiecewiseSummary pieces(volume.description);
+    for (const Box& box : boxes) pieces.Add(CutBlock(volume.block, box));
+    if (pieces.EndOfPieces()) {
+      for (const Box& box : boxes) pieces.AddAgain(CutBlock(volume.block, box));
+    }
+    ExpectEqual(pieces.Take(), Summarize(volume));
+  }
+}
+
+TEST(PiecewiseSummaryTest, BricksOutsideAllPiecesHaveAnyValue) {
+  Random random(4);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : kTypes) {
+    const Volume volume = RandomVolume(random, {40, 20, 20}, type);
+    const Box piece = {{16, 0, 0}, {32, 16, 16}};  // brick 1 alone
+    PiecewiseSummary pieces(volume.description);
+    pieces.Add(CutBlock(volume.block, piece));
+    if (pieces.EndOfPieces()) pieces.AddAgain(CutBlock(volume.block, piece));
+    const VolumeSummary some = pieces.Take(), all = Summarize(volume);
+    const ValueRange any = AnyValue(volume.description);
+    for (std::size_t brick = 0; brick < some.bricks.size(); ++brick) {
+      EXPECT_EQ(some.bricks[brick], brick == 1 ? all.bricks[1] : any);
+      EXPECT_LE(any.min, all.bricks[brick].min);
+      EXPECT_GE(any.max, all.bricks[brick].max);
+    }
+    EXPECT_EQ(some.range, all.bricks[1]);
+    EXPECT_EQ(std::accumulate(some.histogram.begin(), some.histogram.end(), std::uint64_t{0}), std::uint64_t(piece.voxel_count()));
+  }
+}
+
+TEST(PiecewiseSummaryTest, SamplesCountForRangeAndHistogramAlone) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  for (const ScalarType type : kTypes) {
+    const Volume volume = RandomVolume(random, {40, 30, 20}, type);
+    const Box box = RandomBox(random, volume.block.box);
+    const VoxelBlock sample = CutBlock(volume.block, box);
+    PiecewiseSummary pieces(volume.description);
+    pieces.AddSample(sample);
+    if (pieces.EndOfPieces()) pieces.AddAgain(sample);
+    const VolumeSummary of_sample = pieces.Take();
+    Volume alone;
+    alone.description = {{box.size()}, type};
+    alone.block = sample;
+    alone.block.box = {{0, 0, 0}, box.size()};
+    const VolumeSummary expected = Summarize(alone);
+    EXPECT_EQ(of_sample.range, expected.range);
+    EXPECT_EQ(of_sample.histogram, expected.histogram);
+    EXPECT_THAT(of_sample.bricks, testing::Each(AnyValue(volume.description)));
+  }
 }
 
 }  // namespace

@@ -1,0 +1,317 @@
+// Which level a request draws, and that it shows the same part of the world at the same scale at every level.
+#include "common/planning/levels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "tests/common/view/random_view.h"
+
+namespace slabstream {
+namespace {
+
+using testing::HasSubstr;
+
+FrameRequest SomeRequest() {
+  FrameRequest request;
+  request.dataset = "head";
+  request.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  return request;
+}
+
+// Of voxels that are all visible.
+VolumeSummary SummaryOf(const VolumeGeometry& geometry) {
+  VolumeSummary summary{.description = {.geometry = geometry}, .range = {0, 255}};
+  summary.histogram.fill(1);
+  summary.brick_counts = CubesOver(geometry.size, kBrick);
+  summary.bricks.assign(CountIn(summary.brick_counts), {0, 255});
+  return summary;
+}
+
+// The same part of the world with `step` voxels of `finest` in one along each axis; the last ones may reach beyond its border.
+VolumeGeometry Coarser(const VolumeGeometry& finest, const Index3& step) {
+  VolumeGeometry level = finest;
+  Vec3 first;
+  for (const Axis axis : kAxes) {
+    level.size[axis] = (finest.size[axis] + step[axis] - 1) / step[axis];
+    level.spacing[axis] = finest.spacing[axis] * step[axis];
+    first[axis] = 0.5 * (step[axis] - 1) * finest.spacing[axis];
+  }
+  level.orientation.origin = finest.orientation.origin + finest.orientation.ToWorld(first);
+  return level;
+}
+
+VolumeGeometry RandomCoarser(Random& random, const VolumeGeometry& finest) {
+  const auto step = [&] { return 1 << random.Integer(0, 3); };
+  return Coarser(finest, {step(), step(), step()});
+}
+
+Vec3 ToVoxels(const Vec3& world, const VolumeGeometry& geometry) {
+  return geometry.orientation.FromWorld(world - geometry.orientation.origin) / geometry.spacing;
+}
+
+Vec3 RandomPointIn(Random& random, const VolumeGeometry& geometry) {
+  Vec3 p;
+  for (const Axis axis : kAxes) p[axis] = random.Real(-0.5, geometry.size[axis] - 0.5);
+  return geometry.ToWorld(p);
+}
+
+// A view of `finest` that `level` can be shown in, too, in every way in which one can say it.
+FrameRequest RandomRequestOf(Random& random, const VolumeGeometry& finest, const VolumeGeometry& level) {
+  for (;;) {
+    FrameRequest request = SomeRequest();
+    request.size = {random.Integer(1, 400), random.Integer(1, 400)};
+    request.view = RandomViewOf(finest, random);
+    const Vec3 direction = RandomAxes(random)[0];
+    const double distance = random.Real(3, 9) * BoundingRadius(finest);
+    if (random.Chance(0.2)) request.view.eye = finest.ToWorld(finest.centre()) + distance * direction;
+    if (!request.view.eye && random.Chance(0.2)) request.view.distance = distance;
+    if (!CheckView(request.view, finest).ok()) continue;
+    if (CheckView(AtLevel(request, finest, level).view, level).ok()) return request;
+  }
+}
+
+TEST(AtLevelTest, PointsOfTheWorldFallOnTheSamePixels) {
+  Random random(321);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 500; ++round) {
+    const VolumeGeometry finest = RandomGeometry(random, random.Chance(0.5) ? World::kPatient : World::kScene);
+    const VolumeGeometry level = RandomCoarser(random, finest);
+    const FrameRequest request = RandomRequestOf(random, finest, level);
+    const Camera camera = MakeCamera(request.view, request.size, finest);
+    const Camera coarse = MakeCamera(AtLevel(request, finest, level).view, request.size, level);
+    for (int i = 0; i < 10; ++i) {
+      const Vec3 world = RandomPointIn(random, finest);
+      const Camera::ImagePoint at = camera.Project(ToVoxels(world, finest)), same = coarse.Project(ToVoxels(world, level));
+      const double near = 1e-7 * (1 + std::abs(at.x) + std::abs(at.y));
+      ASSERT_NEAR(at.x, same.x, near) << "round " << round << ", " << NameOf(request.view.projection);
+      ASSERT_NEAR(at.y, same.y, near) << "round " << round << ", " << NameOf(request.view.projection);
+    }
+  }
+}
+
+Clipping RandomClipping(Random& random, const VolumeGeometry& finest) {
+  Clipping clipping;
+  if (random.Chance(0.7)) {
+    constexpr std::array<ClipUnit, 3> kUnits = {ClipUnit::kWorld, ClipUnit::kVoxels, ClipUnit::kPercent};
+    ClipBox box{.unit = kUnits.at(random.Integer<std::size_t>(0, 2))};
+    const Vec3 a = RandomPointIn(random, finest), b = RandomPointIn(random, finest);
+    for (const Axis axis : kAxes) {
+      const double side = box.unit == ClipUnit::kVoxels ? finest.size[axis] : 100;
+      const double one = box.unit == ClipUnit::kWorld ? a[axis] : random.Real(0, side);
+      const double other = box.unit == ClipUnit::kWorld ? b[axis] : random.Real(0, side);
+      box.low[axis] = random.Chance(0.2) ? -kMaxWorldCoordinate : std::min(one, other);
+      box.high[axis] = random.Chance(0.2) ? kMaxWorldCoordinate : std::max(one, other);
+    }
+    clipping.box = box;
+  }
+  if (random.Chance(0.5)) {
+    ClipSlab slab{.normal = RandomAxes(random)[0], .thickness = random.Real(0.2, 1) * BoundingRadius(finest)};
+    if (random.Chance(0.4)) slab.through = RandomPointIn(random, finest);
+    if (!slab.through && random.Chance(0.6)) slab.index = random.Integer(0, finest.size[AxisAcross(slab, finest)] - 1);
+    clipping.slab = slab;
+  }
+  if (random.Chance(0.3)) {
+    const Vec3 normal = RandomAxes(random)[0];
+    clipping.planes.push_back({normal, -Dot(normal, RandomPointIn(random, finest))});
+  }
+  if (random.Chance(0.3)) clipping.mode = ClipMode::kCutAway;
+  return clipping;
+}
+
+// The least distance of a side; the point is in the region if it is not negative.
+double DistanceIn(const ClipRegion& region, const Vec3& p) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const HalfSpace& side : region.sides) least = std::min(least, side.Distance(p));
+  return least;
+}
+
+TEST(AtLevelTest, AClipRegionKeepsTheSamePointsOfTheWorld) {
+  Random random(322);
+  SCOPED_TRACE(random.trace());
+  int inside = 0, outside = 0;
+  for (int round = 0; round < 1000; ++round) {
+    const VolumeGeometry finest = RandomGeometry(random, random.Chance(0.5) ? World::kPatient : World::kScene);
+    const VolumeGeometry level = RandomCoarser(random, finest);
+    FrameRequest request = SomeRequest();
+    request.clipping = RandomClipping(random, finest);
+    const Result<ClipRegion> region = MakeClipRegion(request.clipping, finest);
+    const Result<ClipRegion> coarse = MakeClipRegion(AtLevel(request, finest, level).clipping, level);
+    ASSERT_TRUE(region.ok()) << region.status().message();
+    ASSERT_TRUE(coarse.ok()) << coarse.status().message();
+    EXPECT_EQ(region->mode, coarse->mode);
+    for (int i = 0; i < 20; ++i) {
+      const Vec3 world = RandomPointIn(random, finest);
+      const double distance = DistanceIn(*region, ToVoxels(world, finest));
+      if (std::abs(distance) < 1e-6) continue;
+      ASSERT_EQ(distance >= 0, DistanceIn(*coarse, ToVoxels(world, level)) >= 0) << "round " << round << ", distance " << distance;
+      ++(distance >= 0 ? inside : outside);
+    }
+  }
+  EXPECT_GT(inside, 1000);
+  EXPECT_GT(outside, 1000);
+}
+
+TEST(AtLevelTest, MaterialOfALengthKeepsItsOpacity) {
+  Random random(323);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 100; ++round) {
+    const VolumeGeometry finest = RandomGeometry(random), level = RandomCoarser(random, finest);
+    FrameRequest request = SomeRequest();
+    request.transfer.opacity_distance = random.Real(0.1, 10);
+    const double length = request.transfer.opacity_distance * Least(finest.spacing);
+    EXPECT_NEAR(AtLevel(request, finest, level).transfer.opacity_distance * Least(level.spacing), length, 1e-9 * length);
+  }
+}
+
+TEST(AtLevelTest, TheFinestLevelChangesNothing) {
+  Random random(324);
+  SCOPED_TRACE(random.trace());
+  const VolumeGeometry finest = RandomGeometry(random);
+  FrameRequest request = SomeRequest();
+  request.clipping = RandomClipping(random, finest);
+  EXPECT_EQ(AtLevel(request, finest, finest), request);
+}
+
+// Each level has half as many voxels along each axis as the one before. The overview is the coarsest one.
+VolumeLevels HalvedLevels(const VolumeGeometry& finest, int count) {
+  VolumeLevels levels;
+  for (int level = 0; level < count; ++level) {
+    const std::int32_t step = 1 << level;
+    levels.levels.push_back({.geometry = Coarser(finest, {step, step, step})});
+  }
+  levels.overview = std::make_shared<const VolumeSummary>(SummaryOf(levels.levels.back().geometry));
+  levels.overview_level = count - 1;
+  return levels;
+}
+
+VolumeGeometry RandomDivisible(Random& random, std::int32_t by) {
+  VolumeGeometry finest = RandomGeometry(random);
+  for (const Axis axis : kAxes) finest.size[axis] = by * random.Integer(1, 8);
+  finest.spacing = random.Real(0.1, 4) * Vec3{1, 1, 1};
+  return finest;
+}
+
+// Width of a pixel where the picture shows the nearest corner of the volume, from the picture's scale alone.
+double NearestPixel(const FrameRequest& request, const VolumeGeometry& geometry) {
+  const ViewParameters& view = request.view;
+  const double half_side = 0.5 * std::min(request.size.width, request.size.height), radius = BoundingRadius(geometry);
+  if (view.projection == Projection::kOrthographic) return radius / (view.zoom * half_side);
+  const Camera camera = MakeCamera(view, request.size, geometry);
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int corner = 0; corner < 8; ++corner) {
+    Vec3 p;
+    for (const Axis axis : kAxes) p[axis] = (corner >> int(axis) & 1) != 0 ? geometry.size[axis] - 0.5 : -0.5;
+    nearest = std::min(nearest, camera.Project(p).depth);
+  }
+  return nearest * std::tan(view.fov_degrees * std::numbers::pi / 360) / (view.zoom * half_side);
+}
+
+TEST(LevelOfTest, IsTheCoarsestWhoseVoxelsAreNotWiderThanDetail) {
+  Random random(325);
+  SCOPED_TRACE(random.trace());
+  constexpr int kLevels = 4;
+  std::array<int, kLevels> seen{};
+  for (int round = 0; round < 500; ++round) {
+    const VolumeGeometry finest = RandomDivisible(random, 8);
+    const VolumeLevels levels = HalvedLevels(finest, kLevels);
+    FrameRequest request = RandomRequestOf(random, finest, levels.levels.back().geometry);
+    request.detail = std::exp(random.Real(-3, 3));
+    const double most = request.detail * NearestPixel(request, finest);
+    int expected = 0;
+    bool on_the_border = false;
+    for (int level = 1; level < kLevels; ++level) {
+      const double width = finest.spacing.x * (1 << level);
+      on_the_border |= std::abs(width / most - 1) < 1e-6;
+      if (width <= most) expected = level;
+    }
+    if (on_the_border) continue;
+    const Result<int> level = LevelOf(request, levels);
+    ASSERT_TRUE(level.ok()) << level.status().message();
+    ASSERT_EQ(*level, expected) << "round " << round << ", " << NameOf(request.view.projection);
+    ++seen.at(std::size_t(*level));
+  }
+  for (const int count : seen) EXPECT_GT(count, 0);
+}
+
+TEST(LevelOfTest, IsNeverFinerWithMoreDetailPixelsNorCoarserWithMoreZoom) {
+  Random random(326);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 100; ++round) {
+    const VolumeGeometry finest = RandomDivisible(random, 8);
+    const VolumeLevels levels = HalvedLevels(finest, 4);
+    FrameRequest request = RandomRequestOf(random, finest, levels.levels.back().geometry);
+    const FrameRequest asked = request;
+    int before = 0;
+    for (request.detail = 0.01; request.detail <= 1000; request.detail *= 1.7) {
+      const int level = LevelOf(request, levels).value();
+      ASSERT_GE(level, before);
+      before = level;
+    }
+    request = asked;
+    before = 3;
+    for (request.view.zoom = 1e-2; request.view.zoom <= 100; request.view.zoom *= 1.7) {
+      const int level = LevelOf(request, levels).value();
+      ASSERT_LE(level, before);
+      before = level;
+    }
+  }
+}
+
+TEST(LevelOfTest, AxesThatKeepTheirSpacingDoNotCount) {
+  VolumeLevels levels = HalvedLevels({{64, 64, 8}, {1, 1, 20}}, 1);
+  levels.levels.push_back(levels.levels[0]);
+  levels.levels[1].geometry = Coarser(levels.levels[0].geometry, {2, 2, 1});
+  FrameRequest request = SomeRequest();
+  const double pixel = NearestPixel(request, levels.levels[0].geometry);
+  request.detail = 2.1 / pixel;
+  EXPECT_EQ(LevelOf(request, levels).value(), 1) << "slices are 20 apart in the finest level, too";
+  request.detail = 1.9 / pixel;
+  EXPECT_EQ(LevelOf(request, levels).value(), 0);
+}
+
+TEST(LevelOfTest, ANamedLevelIsTakenOrRefused) {
+  const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);
+  FrameRequest request = SomeRequest();
+  for (int level = 0; level < 3; ++level) {
+    request.level = std::to_string(level);
+    EXPECT_EQ(LevelOf(request, levels).value(), level);
+  }
+  request.level = "3";
+  const Status refused = LevelOf(request, levels).status();
+  EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
+  EXPECT_EQ(refused.message(), "level is 3, but dataset \"head\" has levels 0 to 2");
+}
+
+TEST(LevelOfTest, ASliceThatTheFinestLevelDoesNotHaveIsRefusedAtEveryLevel) {
+  const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);
+  FrameRequest request = SomeRequest();
+  for (const char* const level : {"auto", "0", "2"}) {
+    request.level = level;
+    request.clipping.slab = ClipSlab{.index = 63, .thickness = 4};
+    EXPECT_TRUE(LevelOf(request, levels).ok()) << level;
+    request.clipping.slab->index = 64;
+    const Status refused = LevelOf(request, levels).status();
+    EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument) << level;
+    EXPECT_THAT(refused.message(), HasSubstr("clip.slab.index is 64, but the volume has slices 0 to 63 along z")) << level;
+  }
+}
+
+TEST(StatisticsOfTest, AreThoseOfTheOverviewWithTheFinestGeometry) {
+  const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);
+  const VolumeSummary statistics = StatisticsOf(levels);
+  EXPECT_EQ(statistics.description, levels.levels[0]);
+  EXPECT_EQ(statistics.range, levels.overview->range);
+  EXPECT_EQ(statistics.histogram, levels.overview->histogram);
+  EXPECT_TRUE(statistics.bricks.empty());
+}
+
+}  // namespace
+}  // namespace slabstream

@@ -1,0 +1,160 @@
+// Volumes with levels, and volumes that no process holds, as a user meets them.
+#include <gmock/gmock.h>
+#include <signal.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "tests/end_to_end/picture_file.h"
+#include "tests/end_to_end/program.h"
+
+namespace slabstream {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr double kSame = 2e-5 + 1.0 / 1024;  // of pictures that were composed of other boxes
+
+class InPartsTest : public EndToEndTest {
+ protected:
+  // 130 voxels a side, levels 0 to 2.
+  std::string MakeLevels() const {
+    MakeSphere("ball.nrrd", 2, 130);
+    MustRun({"convert", "ball.nrrd", "ball.ome.zarr"});
+    return "ball.ome.zarr";
+  }
+  // 274 MiB, in a file that takes little room: a small block of voxels amid zeros.
+  void MakeLarge(const std::string& name, int value = 200) const {
+    constexpr int kSide = 660, kBegin = 300, kEnd = 360;
+    std::ofstream file(Path(name), std::ios::binary);
+    file << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: " << kSide << ' ' << kSide << ' ' << kSide << "\nencoding: raw\n\n";
+    const std::streamoff header = file.tellp();
+    const std::string row(kEnd - kBegin, char(value));
+    for (int z = kBegin; z < kEnd; ++z) {
+      for (int y = kBegin; y < kEnd; ++y) {
+        file.seekp(header + (std::streamoff(z) * kSide + y) * kSide + kBegin);
+        file << row;
+      }
+    }
+    file.close();
+    std::filesystem::resize_file(Path(name), std::uintmax_t(header) + std::uintmax_t(kSide) * kSide * kSide);
+  }
+  PictureFile Render(const std::string& data, std::vector<std::string> more) const {
+    std::vector<std::string> arguments = {"render", data, "-o", "picture.exr", "--size", "128"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    MustRun(arguments);
+    return ReadPicture(Path("picture.exr"));
+  }
+  static double Opaque(const PictureFile& picture) {  // share of pixels
+    int count = 0;
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) count += picture.At(x, y, 3) > 0.05 ? 1 : 0;
+    }
+    return double(count) / (picture.width * picture.height);
+  }
+};
+
+TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {
+  const std::string levels = MakeLevels();
+  std::vector<double> shown;
+  std::vector<PictureFile> pictures;
+  for (const std::string level : {"0", "1", "2"}) {
+    pictures.push_back(Render(levels, {"--local=1", "--zoom", "3", "--level", level}));
+    shown.push_back(Opaque(pictures.back()));
+    EXPECT_NEAR(shown.back(), shown.front(), 0.05) << level;
+  }
+  EXPECT_EQ(LargestDifference(pictures[0], Render("ball.nrrd", {"--local=1", "--zoom", "3"})), 0) << "the same voxels";
+  EXPECT_GT(LargestDifference(pictures[0], pictures[1]), kSame);
+  EXPECT_GT(LargestDifference(pictures[1], pictures[2]), kSame);
+  // A voxel is about 1.7 pixels wide at zoom 3.
+  EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--zoom", "3"}), pictures[0]), 0);
+  EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--zoom", "3", "--detail", "5"}), pictures[1]), 0);
+  EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--zoom", "3", "--detail", "100"}), pictures[2]), 0);
+
+  const std::vector<std::string> render = {"render", "--local=1", "-o", "no.png"};
+  ExpectEachRefused(render, {
+                                {{levels, "--level", "9"}, "has levels 0 to 2"},
+                                {{"ball.nrrd", "--level", "1"}, "has level 0 alone"},
+                                {{levels, "--level", "fine"}, "level"},
+                                {{levels, "--detail", "0"}, "detail"},
+                            });
+}
+
+TEST_F(InPartsTest, ADamagedChunkEndsInOneLineThatNamesIt) {
+  const std::string levels = MakeLevels();
+  int damaged = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(Path(levels) + "/0")) {
+    if (!entry.is_regular_file() || entry.path().extension() == ".json" || entry.file_size() < 2000) continue;
+    std::fstream file(entry.path(), std::ios::binary | std::ios::in | std::ios::out);
+    for (std::uintmax_t at = 0; at < entry.file_size(); at += 7) file.seekp(std::streamoff(at)).put('x');
+    ++damaged;
+  }
+  ASSERT_GT(damaged, 0);
+  const ProgramResult result = Slabstream({"render", levels, "--local=1", "--level", "0", "-o", "no.png"});
+  EXPECT_NE(result.exit_status, 0);
+  ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("ball.ome.zarr/0/"));
+  EXPECT_FALSE(std::filesystem::exists(Path("no.png")));
+}
+
+// Its coordinator holds 256 MiB of voxels.
+TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
+  MakeLarge("large.nrrd");
+  const std::string endpoint = "ipc://" + Path("s");
+  const std::string up =
+      MustRun({"up", "--detach", "--workers", "2", "--memory", "1G", "--listen", endpoint, "--data", "large=large.nrrd"}).out;
+  const std::vector<std::vector<std::string>> views = {
+      {"--renderer", "splat"},
+      {"--renderer", "raycast", "--projection", "perspective"},
+      {"--renderer", "mip", "--clip-box", "50%:,:,:"},
+      {"--renderer", "zbuffer", "--azimuth", "40"},
+  };
+  for (std::vector<std::string> view : views) {
+    SCOPED_TRACE(view[1]);
+    view.insert(view.end(), {"--zoom", "8"});
+    const PictureFile in_parts = Render("large", view);
+    view.push_back("--local=1");
+    EXPECT_LE(LargestDifference(in_parts, Render("large.nrrd", view)), kSame);
+    EXPECT_GT(Opaque(in_parts), 0.05);
+  }
+  const json status = json::parse(MustRun({"status", "--json"}).out);
+  EXPECT_EQ(status["datasets"][0]["state"], "ready");
+  EXPECT_EQ(status["datasets"][0]["memory_bytes"], 0);
+  const std::size_t begin = up.find("logs are in ");
+  ASSERT_NE(begin, std::string::npos) << up;
+  const std::string logs = up.substr(begin + 12, up.find('\n', begin) - begin - 12);
+  int reading = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(logs)) {
+    std::ifstream file(entry.path());
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (text.find("reads " + Path("large.nrrd") + " itself") != std::string::npos) ++reading;
+  }
+  EXPECT_GT(reading, 0) << logs;
+}
+
+TEST_F(InPartsTest, AWorkerThatDoesNotSeeTheFilesGetsVoxelsFromTheCoordinator) {
+  MakeLarge("large.nrrd");
+  const std::string programs = Command({}).front().substr(0, Command({}).front().rfind('/'));
+  const std::string endpoint = "ipc://" + Path("s"), workers = "ipc://" + Path("w");
+  // A path that means something else in every process.
+  RunningProgram coordinator({programs + "/slabstream-coordinator", "--listen", endpoint, "--worker-listen", workers, "--memory", "256M",
+                              "--data", "large=/proc/self/cwd/large.nrrd"},
+                             directory_);
+  ASSERT_TRUE(coordinator.WaitForOutput("ready"));
+  RunningProgram worker({programs + "/slabstream-worker", "--coordinator", workers, "--log-level", "info"}, "/");
+  const PictureFile picture = Render("large", {"--endpoint", endpoint, "--zoom", "8"});
+  EXPECT_LE(LargestDifference(picture, Render("large.nrrd", {"--local=1", "--zoom", "8"})), kSame);
+  EXPECT_GT(Opaque(picture), 0.05);
+  worker.Signal(SIGTERM);
+  EXPECT_THAT(worker.Wait().err, AllOf(HasSubstr("asks the coordinator for voxels"), Not(HasSubstr(" itself"))));
+  coordinator.Signal(SIGTERM);
+  coordinator.Wait();
+}
+
+}  // namespace
+}  // namespace slabstream

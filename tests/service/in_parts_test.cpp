@@ -1,0 +1,333 @@
+// Volumes that nobody holds: pictures of voxels that are read in parts, and of levels, are those of the same voxels in memory.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+
+#include "client/embedded/embedded_service.h"
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+#include "data/sources/memory_source.h"
+#include "data/survey/survey.h"
+#include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/service/pictures.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+class InPartsTest : public testing::Test {
+ protected:
+  // One that holds no level of the ball but perhaps the coarsest ones.
+  void Start(const std::string& path, int workers = 2, std::uint64_t memory_bytes = std::uint64_t{512} << 10) {
+    EmbeddedOptions options;
+    options.workers = workers;
+    options.coordinator.catalogue["ball"] = DataSource(path, "");
+    options.coordinator.machine.memory_bytes = memory_bytes;
+    auto started = EmbeddedService::Start(context_, std::move(options));
+    ASSERT_TRUE(started.ok()) << started.status().message();
+    service_ = std::move(*started);
+    client_.emplace(service_->Connect().value());
+  }
+  // As it is in memory.
+  std::string Nrrd(const Volume& volume) const {
+    const std::string path = (directory_ / "ball.nrrd").string();
+    const Index3& size = volume.description.geometry.size;
+    std::ofstream file(path, std::ios::binary);
+    file << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: " << size.x << ' ' << size.y << ' ' << size.z << "\nencoding: raw\n\n";
+    file.write(reinterpret_cast<const char*>(volume.block.bytes.data()), std::streamsize(volume.block.bytes.size()));
+    return path;
+  }
+  // In chunks of 16 voxels a side.
+  std::string Zarr(const std::shared_ptr<const Volume>& volume) const {
+    const std::string path = (directory_ / "ball.ome.zarr").string();
+    fs::remove_all(path);
+    OmeZarrOptions options;
+    options.chunk_side = 16;
+    options.shard_side = 32;
+    const Status written = WriteOmeZarr(*MakeMemorySource(volume, {.format = "NRRD", .file_type = "uint8"}), path, options);
+    CHECK(written.ok()) << written.message();
+    return path;
+  }
+  static std::shared_ptr<const Volume> Level(const std::string& path, int level) {
+    const std::shared_ptr<VolumeSource> source = OpenSource(path, {}, ProcessReadContext()).value();
+    return ReadLevel(*source, level).value();
+  }
+  Result<Picture> Render(const FrameRequest& request) { return client_->Render(request, seconds(60)); }
+  void ExpectPictureOf(const FrameRequest& request, const Volume& volume) { Expect(request, RenderDirectly(request, volume), 0); }
+  // `same`: what asks for the same picture of this level. Statistics of a level are those of the finest one.
+  void ExpectPictureOfLevel(const FrameRequest& request, const Volume& level, const FrameRequest& same, const Volume& finest) {
+    VolumeSummary summary = Summarize(level);
+    const VolumeSummary of_finest = Summarize(finest);
+    summary.range = of_finest.range;
+    summary.histogram = of_finest.histogram;
+    constexpr float kRounding = 1e-6F;
+    Expect(request, RenderDirectly(same, level, summary), kRounding);
+  }
+  void Expect(const FrameRequest& request, const LocalImage& expected, float rounding) {
+    const Result<Picture> picture = Render(request);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_GT(HighestAlpha(picture->image), 0.1);
+    EXPECT_LE(LargestDifference(picture->image, expected, request.size), AllowedDifference(request) + rounding);
+  }
+  void ExpectNothingHeld() {
+    const Result<StatusReply> status = client_->QueryStatus(seconds(30));
+    ASSERT_TRUE(status.ok()) << status.status().message();
+    EXPECT_EQ(status->datasets.at(0).state, DatasetState::kReady);
+    EXPECT_EQ(status->datasets.at(0).memory_bytes, 0U);
+  }
+
+  // Views that reach for other voxels each.
+  static std::vector<FrameRequest> RequestsFor(const RendererKind* renderer) {
+    std::vector<FrameRequest> requests(4, TestRequest(renderer, 30, 3));
+    if (renderer->Can(Ability::kPerspective)) requests[1].view.projection = Projection::kPerspective;
+    requests[1].policy.decomposition = "subcube";
+    requests[2].clipping.box = ClipBox{{10, 20, 30}, {70, 100, 75}, ClipUnit::kVoxels};
+    requests[3].view.azimuth_degrees = 200;
+    requests[3].view.zoom = 3;
+    requests[3].policy.groups = 0;
+    return requests;
+  }
+  static std::vector<const RendererKind*> VoxelRenderers() {
+    std::vector<const RendererKind*> renderers;
+    for (const RendererKind* renderer : Renderers()) {
+      if (!renderer->Can(Ability::kCells)) renderers.push_back(renderer);
+    }
+    return renderers;
+  }
+
+  TemporaryDirectory temporary_;
+  const fs::path directory_ = temporary_.path();
+  const std::shared_ptr<const Volume> ball_ = TestSphere(100);
+  Context context_;
+  std::unique_ptr<EmbeddedService> service_;
+  std::optional<Client> client_;
+};
+
+// ---------------------------------------------------------------- one level
+
+TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
+  for (const std::string& path : {Nrrd(*ball_), Zarr(ball_)}) {
+    Start(path);
+    for (const RendererKind* renderer : VoxelRenderers()) {
+      for (FrameRequest& request : RequestsFor(renderer)) {
+        SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name() << ", azimuth " << request.view.azimuth_degrees);
+        request.level = "0";
+        ExpectPictureOf(request, *ball_);
+      }
+    }
+    ExpectNothingHeld();
+  }
+}
+
+TEST_F(InPartsTest, WorkersComeAndGo) {
+  Start(Zarr(ball_), 3);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "0";
+  ExpectPictureOf(request, *ball_);
+  service_->worker(1).RequestStop();
+  request.view.azimuth_degrees = 50;
+  ExpectPictureOf(request, *ball_);
+  ASSERT_TRUE(service_->AddWorker().ok());
+  request.view.azimuth_degrees = 70;
+  ExpectPictureOf(request, *ball_);
+}
+
+// ---------------------------------------------------------------- levels
+
+TEST_F(InPartsTest, ALevelIsDrawnAsItsVoxelsInAFileOfTheirOwn) {
+  const std::string path = Zarr(ball_);
+  const VolumeGeometry& finest = ball_->description.geometry;
+  Start(path);
+  for (int level = 0; level < 3; ++level) {
+    const std::shared_ptr<const Volume> voxels = Level(path, level);
+    const VolumeGeometry& geometry = voxels->description.geometry;
+    ASSERT_EQ(geometry.spacing.x, finest.spacing.x * (1 << level));
+    for (const RendererKind* renderer : VoxelRenderers()) {
+      for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+        for (const bool clipped : {false, true}) {
+          if (projection == Projection::kPerspective && !renderer->Can(Ability::kPerspective)) continue;
+          SCOPED_TRACE(testing::Message() << "level " << level << ", renderer " << renderer->name() << ", " << NameOf(projection)
+                                          << (clipped ? ", clipped" : ""));
+          FrameRequest request = TestRequest(renderer, 30);
+          request.view.projection = projection;
+          request.view.look_at = Vec3{45, 52, 60};
+          request.view.zoom = 1.5;
+          if (clipped) request.clipping.box = ClipBox{{20, 20, 20}, {80.25, 90.5, 70}, ClipUnit::kWorld};
+          if (projection == Projection::kPerspective) request.view.eye = Vec3{60, -300, 120};
+          // In a file of its own the level has another bounding sphere and other voxel lengths.
+          FrameRequest same = request;
+          if (projection == Projection::kOrthographic) same.view.zoom *= BoundingRadius(geometry) / BoundingRadius(finest);
+          same.transfer.opacity_distance /= 1 << level;
+          request.level = std::to_string(level);
+          ExpectPictureOfLevel(request, *voxels, same, *ball_);
+          if (!clipped) continue;
+          // The same box in other units.
+          request.clipping.box = ClipBox{{20.5, 20.5, 20.5}, {80.75, 91, 70.5}, ClipUnit::kVoxels};
+          ExpectPictureOfLevel(request, *voxels, same, *ball_);
+          request.clipping.box->unit = ClipUnit::kPercent;  // of 100 voxels
+          ExpectPictureOfLevel(request, *voxels, same, *ball_);
+        }
+      }
+    }
+  }
+}
+
+TEST_F(InPartsTest, ASlabByItsIndexIsTheSameSlabAtEveryLevel) {
+  const std::string path = Zarr(ball_);
+  Start(path);
+  const std::shared_ptr<const Volume> voxels = Level(path, 1);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30), same = request;
+  request.clipping.slab = ClipSlab{.normal = {0, 0, 1}, .index = 41, .thickness = 20};
+  request.level = "1";
+  same.clipping.slab = ClipSlab{.normal = {0, 0, 1}, .through = Vec3{0, 0, 41}, .thickness = 20};
+  same.transfer.opacity_distance /= 2;
+  ExpectPictureOfLevel(request, *voxels, same, *ball_);
+  request.clipping.slab->index = 100;
+  const Result<Picture> refused = Render(request);
+  EXPECT_EQ(refused.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(refused.status().message(), HasSubstr("the volume has slices 0 to 99"));
+}
+
+// Where pixels are not empty.
+PixelBounds Silhouette(const LocalImage& image, ImageSize size) {
+  PixelBounds bounds{size.width, size.height, 0, 0};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (PixelAt(image, x, y).rgba[3] < 0.05) continue;
+      bounds = {std::min(bounds.x_begin, x), std::min(bounds.y_begin, y), std::max(bounds.x_end, x + 1), std::max(bounds.y_end, y + 1)};
+    }
+  }
+  return bounds;
+}
+
+TEST_F(InPartsTest, LevelsChangeNeitherPlaceNorScale) {
+  Start(Zarr(ball_));
+  for (const RendererKind* renderer : VoxelRenderers()) {
+    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+      if (projection == Projection::kPerspective && !renderer->Can(Ability::kPerspective)) continue;
+      FrameRequest request = TestRequest(renderer, 30);
+      request.size = {300, 260};
+      request.view.projection = projection;
+      request.level = "0";
+      const Result<Picture> finest = Render(request);
+      ASSERT_TRUE(finest.ok()) << finest.status().message();
+      const PixelBounds expected = Silhouette(finest->image, request.size);
+      ASSERT_GT(expected.width(), 50);
+      const double pixels_a_voxel = 260 / (2 * BoundingRadius(ball_->description.geometry));
+      for (int level = 1; level < 3; ++level) {
+        SCOPED_TRACE(testing::Message() << "level " << level << ", renderer " << renderer->name() << ", " << NameOf(projection));
+        request.level = std::to_string(level);
+        const Result<Picture> coarse = Render(request);
+        ASSERT_TRUE(coarse.ok()) << coarse.status().message();
+        const PixelBounds found = Silhouette(coarse->image, request.size);
+        const double most = 1 + 1.5 * (1 << level) * pixels_a_voxel;  // a coarse voxel, and half of one under perspective
+        EXPECT_NEAR(found.x_begin, expected.x_begin, most);
+        EXPECT_NEAR(found.x_end, expected.x_end, most);
+        EXPECT_NEAR(found.y_begin, expected.y_begin, most);
+        EXPECT_NEAR(found.y_end, expected.y_end, most);
+      }
+    }
+  }
+}
+
+TEST_F(InPartsTest, LevelsThatFitAreHeld) {
+  Start(Zarr(ball_), 1, std::uint64_t{1} << 20);  // 768 KiB for datasets
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "1";
+  ASSERT_TRUE(Render(request).ok());
+  EXPECT_EQ(client_->QueryStatus(seconds(30))->datasets.at(0).memory_bytes, 50U * 50 * 50);
+}
+
+// ---------------------------------------------------------------- questions
+
+TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
+  const std::vector<Vec3> points = {{50, 50, 50}, {49.6, 30.2, 70.7}, {0, 0, 0}, {99.4, 99.4, 99.4}, {1000, 0, 0}, {-0.4, 20, 99}};
+  const ClipBox box{{10.5, 20, 3}, {70, 100, 75}, ClipUnit::kVoxels};
+  for (const std::string& path : {Nrrd(*ball_), Zarr(ball_)}) {
+    SCOPED_TRACE(path);
+    constexpr std::uint64_t kNoLimit = 0;
+    Start(path, 1, kNoLimit);
+    const std::vector<VolumeSample> held = client_->SampleAt("ball", points).value();
+    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value();
+    const SummaryReply summary = client_->Summarize("ball").value();
+    Start(path, 1);
+    EXPECT_EQ(client_->SampleAt("ball", points).value(), held);
+    EXPECT_EQ(client_->StatisticsIn("ball", box).value(), statistics);
+    const SummaryReply in_parts = client_->Summarize("ball").value();
+    EXPECT_EQ(in_parts.description, summary.description);
+    EXPECT_EQ(in_parts.range, summary.range);
+    EXPECT_EQ(in_parts.histogram, summary.histogram);
+    EXPECT_EQ(in_parts.transfer, summary.transfer);
+    ExpectNothingHeld();
+  }
+}
+
+// ---------------------------------------------------------------- files that change or are damaged
+
+TEST_F(InPartsTest, AReplacedFileGivesTheNewPictureAndARemovedOneAnError) {
+  const std::shared_ptr<const Volume> smaller = TestSphere(90);
+  for (const bool zarr : {false, true}) {
+    SCOPED_TRACE(zarr ? "OME-Zarr" : "NRRD");
+    const auto write = [&](const std::shared_ptr<const Volume>& volume) { return zarr ? Zarr(volume) : Nrrd(*volume); };
+    const std::string path = write(ball_);
+    Start(path);
+    FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+    request.level = "0";
+    ExpectPictureOf(request, *ball_);
+    write(smaller);
+    ExpectPictureOf(request, *smaller);
+    fs::remove_all(path);
+    const Result<Picture> gone = Render(request);
+    EXPECT_FALSE(gone.ok());
+    EXPECT_THAT(gone.status().message(), HasSubstr("ball."));
+    EXPECT_EQ(std::ranges::count(gone.status().message(), '\n'), 0);
+    write(ball_);
+    ExpectPictureOf(request, *ball_);
+  }
+}
+
+TEST_F(InPartsTest, ALevelThatIsDrawnFirstAfterTheFilesHaveChangedIsOfTheNewOnes) {
+  const std::string path = Zarr(ball_);
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "0";
+  ExpectPictureOf(request, *ball_);
+  const std::shared_ptr<const Volume> smaller = TestSphere(90);
+  Zarr(smaller);
+  const std::shared_ptr<const Volume> voxels = Level(path, 1);
+  ASSERT_EQ(voxels->description.geometry.size.x, 45);
+  request.level = "1";
+  FrameRequest same = request;
+  same.transfer.opacity_distance /= 2;
+  ExpectPictureOfLevel(request, *voxels, same, *smaller);
+}
+
+TEST_F(InPartsTest, ADamagedObjectEndsTheFrameAndIsNamed) {
+  const std::string path = Zarr(ball_);
+  int damaged = 0;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path + "/0")) {
+    if (!entry.is_regular_file() || entry.path().extension() == ".json" || entry.file_size() < 500) continue;
+    std::fstream file(entry.path(), std::ios::binary | std::ios::in | std::ios::out);
+    for (std::uintmax_t at = 0; at < entry.file_size(); at += 7) file.seekp(std::streamoff(at)).put('x');
+    ++damaged;
+  }
+  ASSERT_GT(damaged, 0);
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "0";
+  const Result<Picture> picture = Render(request);
+  EXPECT_EQ(picture.status().code(), StatusCode::kDataLoss) << picture.status().message();
+  EXPECT_THAT(picture.status().message(), HasSubstr("/0/"));
+  EXPECT_EQ(std::ranges::count(picture.status().message(), '\n'), 0);
+}
+
+}  // namespace
+}  // namespace slabstream
