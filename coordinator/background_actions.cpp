@@ -155,7 +155,7 @@ BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, Opene
                      .surveyed = opened.survey.summary,
                      .stored = {opened.text, int(level), opened.version, {{0, 0, 0}, levels[level].block}},
                      .stamp = opened.stamp};
-    if (int(level) == opened.survey.level) at.surveyed_level = int(level);
+    if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
   }
   if (sources.size() == 1) return *LoadLevel(action, *sources.front().at_level, [](int) {});  // it stays where it is, so this cannot fail

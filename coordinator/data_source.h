@@ -25,7 +25,7 @@ namespace slabstream {
 struct SourceAtLevel {
   std::shared_ptr<VolumeSource> source;           // never null
   std::shared_ptr<const VolumeSummary> surveyed;  // Survey::summary
-  std::optional<int> surveyed_level = {};         // its level, if that is the survey's
+  std::optional<int> surveyed_level = {};         // the survey's level, if that is it and all of it was read
   StoredAt stored;                                // where workers find it
   std::shared_ptr<const FileStamp> stamp;         // of its files
 };

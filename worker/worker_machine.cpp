@@ -275,7 +275,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   for (const Rank rank : run.ranks()) {
     if (!run.failure().ok()) break;
     const Placement& placement = run.placement(rank);
-    if (HidesBox(*hidden, placement.box, *setup)) {
+    if (ReachOf(placement.box, *setup).empty() || HidesBox(*hidden, placement.box, *setup)) {  // outside the picture, or hidden
       run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
       ++rendered_ranks;
     } else {

@@ -11,7 +11,7 @@
 //
 // A group on this worker:
 //   GroupAssignment   fetch the voxels of its boxes that no cached padded box holds (chunk requests within the byte credit); a box that is
-//                     entirely hidden needs none: its rank holds an empty image at once
+//                     entirely hidden or outside the picture needs none: its rank holds an empty image at once
 //   box complete      ranks are rendered: those of a client one after the other, groups in order of frame and group. The clients take
 //                     turns, also in the midst of a rank (RenderQueue)
 //   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before

@@ -11,7 +11,7 @@
 //   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
 // Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
 // worker's boxes, with their halo, and about as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
-// nothing. Voxels that are read in parts (FrameSetup::stored) take SourceBytes more, for what is being read and decoded.
+// nothing. Voxels that are read in parts (FrameSetup::stored) take SourceBytes (memory_budget.h) more, for what is being read and decoded.
 // If the dataset is an unstructured grid, VoxelBytes has the cells in all bricks that the boxes touch, too. A worker caches more
 // voxels than a group needs as long as images leave room.
 #pragma once
@@ -28,9 +28,6 @@ namespace slabstream {
 std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
 std::uint64_t PictureBytes(const FrameSetup& setup);
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary);
-
-// Of a limit: for chunks that a process reads and decodes.
-inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit / 4; }
 
 // Most bytes of the voxels of a padded box with which a worker of this limit (0: none) can hold two boxes of a frame at a time, so that it
 // reads one while it renders the other: kBoxBytesTarget or less, in few different sizes.

@@ -34,6 +34,8 @@ std::int64_t ControlGroupLimit(const std::string& memberships, const std::filesy
 
 // What a process of the service takes before it does anything, with its threads and the blocks that it keeps for reuse.
 inline constexpr std::uint64_t kIdleMemoryBytes = std::uint64_t{192} << 20;
+// Of a limit: for chunks that a process reads and decodes, if it does.
+inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit > kIdleMemoryBytes ? (limit - kIdleMemoryBytes) / 4 : 0; }
 // Limits of a process that may be stated.
 inline constexpr std::uint64_t kLeastMemoryBytes = std::uint64_t{256} << 20, kMostMemoryBytes = std::uint64_t{1} << 50;
 

@@ -23,10 +23,11 @@ bool IsReadWhole(const std::string& path, const ReadOptions& options) {
   return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
 }
 
-// A quarter of the process' memory: at most 128 MiB for chunks under way, the rest for those that may be needed again.
+// A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
-  const std::uint64_t all = process_bytes / 4, under_way = std::clamp<std::uint64_t>(all / 4, 16U << 20, 128U << 20);
-  return {.under_way_bytes = under_way, .cache_bytes = std::max<std::uint64_t>(all - std::min(all, under_way), 16U << 20)};
+  constexpr std::uint64_t kLeast = 8U << 20, kMostUnderWay = 128U << 20;
+  const std::uint64_t all = std::max(SourceBytes(process_bytes), 2 * kLeast), under_way = std::clamp(all / 4, kLeast, kMostUnderWay);
+  return {.under_way_bytes = under_way, .cache_bytes = all - under_way};
 }
 
 std::atomic<std::uint64_t> process_memory = 0;  // 0: not said

@@ -14,8 +14,8 @@
 
 namespace slabstream {
 
-// The context of this process, made at its first use. It takes about SourceBytes of the memory that was said before, or else of what the
-// machine has for the process (common/planning/worker_memory.h).
+// The context of this process, made at its first use. It takes SourceBytes of the memory that was said before, or else of what the
+// machine has for the process (common/volume/memory_budget.h).
 const SourceContext& ProcessReadContext();
 void SetReadMemory(std::uint64_t process_bytes);
 

@@ -110,7 +110,7 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
     read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) { pieces.AddAgain(block); });
   }
   if (!read.ok()) return read;
-  return Survey{int(level), std::make_shared<const VolumeSummary>(pieces.Take())};
+  return Survey{int(level), !whole, std::make_shared<const VolumeSummary>(pieces.Take())};
 }
 
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {

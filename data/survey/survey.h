@@ -24,7 +24,8 @@ namespace slabstream {
 inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes = std::int64_t{128} << 20;
 
 struct Survey {
-  int level = 0;  // of `summary`
+  int level = 0;        // of `summary`
+  bool sample = false;  // of that level was read, not all of it
   // Of that level. Ranges of bricks are those of any value if only a sample was read.
   std::shared_ptr<const VolumeSummary> summary;
 };
