@@ -275,7 +275,9 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   for (const Rank rank : run.ranks()) {
     if (!run.failure().ok()) break;
     const Placement& placement = run.placement(rank);
-    if (ReachOf(placement.box, *setup).empty() || HidesBox(*hidden, placement.box, *setup)) {  // outside the picture, or hidden
+    // Voxels that are read in parts are not read for a box outside the picture.
+    const bool outside = setup->stored && ReachOf(placement.box, *setup).empty();
+    if (outside || HidesBox(*hidden, placement.box, *setup)) {
       run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
       ++rendered_ranks;
     } else {

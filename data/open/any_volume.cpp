@@ -82,7 +82,11 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {
-  if (IsReadWhole(path, options)) return CheckVolumeHeaders(path, options);
+  if (IsReadWhole(path, options)) {
+    Result<std::vector<std::string>> files = CheckVolumeHeaders(path, options);
+    const bool too_large = files.status().code() == StatusCode::kResourceExhausted;
+    if (!too_large || FindSourceFormat(path, options) == nullptr) return files;
+  }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();
   return (*source)->info().files;
