@@ -292,10 +292,17 @@ TEST_F(WorkerBoxesTest, VoxelsStayWhenTheCoordinatorStartsAnew) {
 
 // ---------------------------------------------------------------- voxels that are read where they are stored
 
+// The camera shows the whole volume: what lies outside a picture is not read.
+void StoreAt(const StoredAt& stored, GroupAssignment& assignment) {
+  assignment.setup.stored = stored;
+  assignment.setup.sheets = {};
+  assignment.setup.camera = MakeCamera({}, {16, 16}, assignment.setup.description.geometry);
+}
+
 TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
   const StoredAt stored{.source = "/data/scan.ome.zarr", .version = 5, .block = {{0, 0, 0}, {128, 128, 24}}};
   GroupAssignment assignment = Assignment(1, {kSelf});
-  assignment.setup.stored = stored;
+  StoreAt(stored, assignment);
   assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};
   const auto requests = All<SendChunkRequest>(Tell(assignment));
   const Box padded = {{0, 0, 92}, {128, 128, 348}};
@@ -317,14 +324,14 @@ TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
 
 TEST_F(WorkerBoxesTest, AsksForSmallBlocksTogether) {
   GroupAssignment assignment = Assignment(1, {kSelf});
-  assignment.setup.stored = StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}};
+  StoreAt(StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}}, assignment);
   assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};  // 4 MiB
   EXPECT_LE(All<SendChunkRequest>(Tell(assignment)).size(), 6U) << "a request for every row would be slow";
 }
 
 TEST_F(WorkerBoxesTest, TwoBoxesThatWantTheSamePieceBothGetIt) {
   GroupAssignment assignment = Assignment(1, {kSelf, kSelf});
-  assignment.setup.stored = StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}};
+  StoreAt(StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}}, assignment);
   assignment.group.placements[0].box = {{0, 0, 64}, {128, 120, 128}};
   assignment.group.placements[1].box = {{0, 0, 64}, {128, 120, 129}};  // each with a halo: the pieces up to voxel 128 are the same
   const Actions asked = Tell(assignment);
@@ -334,6 +341,14 @@ TEST_F(WorkerBoxesTest, TwoBoxesThatWantTheSamePieceBothGetIt) {
   const auto first = All<StartRender>(Feed(asked));
   ASSERT_THAT(first, SizeIs(1)) << "one at a time";
   EXPECT_THAT(All<StartRender>(Rendered(first[0])), SizeIs(1)) << "the other one needs no more voxels";
+}
+
+TEST_F(WorkerBoxesTest, AsksForNoStoredVoxelsOutsideThePicture) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  StoreAt(StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}}, assignment);
+  assignment.setup.camera = MakeCamera({.zoom = 100}, {16, 16}, assignment.setup.description.geometry);
+  assignment.group.placements[0].box = {{0, 0, 0}, {8, 8, 8}};
+  EXPECT_THAT(All<SendChunkRequest>(Tell(assignment)), IsEmpty());
 }
 
 }  // namespace
