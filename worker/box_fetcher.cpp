@@ -155,7 +155,7 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         const ChunkPlace chunk = padded.missing.back();
         const std::uint32_t bytes = padded.BytesOf(chunk);
         if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
-        if (in_flight_.size() >= kMostRequests) return;
+        if (padded.stored_at != nullptr && in_flight_.size() >= kMostRequests) return;
         has_credit = in_flight_bytes == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
         if (!has_credit) break;
         padded.missing.pop_back();

@@ -103,8 +103,8 @@ std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary) {
 std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   if (limit == 0) return kBoxBytesTarget;
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
-  // Images of small boxes are small beside the frame.
-  const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 8;
+  // Images of the boxes of a group are small beside the frame.
+  const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
   const std::uint64_t taken = kIdleMemoryBytes + (setup.stored ? SourceBytes(limit) : 0) + images;
   const std::uint64_t box = std::max(kLeast, (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel));
   return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
