@@ -85,7 +85,8 @@ class BoxFetcher {
   std::size_t chunk_requests() const { return in_flight_.size(); }
 
  private:
-  static constexpr std::size_t kMostRequests = 48;  // at a time, of blocks, which may be small: a coordinator queues few more (kMaxQueuedChunks)
+  static constexpr std::size_t kMostRequests =
+      48;  // at a time, of blocks, which may be small: a coordinator queues few more (kMaxQueuedChunks)
 
   struct ChunkPlace {  // a chunk of a box inside the padded box
     Box box;

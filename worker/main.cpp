@@ -11,11 +11,11 @@
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
-#include "data/open/any_volume.h"
 #include "common/kernels/simd_target.h"
 #include "common/service/service_file.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
 #include "worker/service.h"
 
 namespace slabstream {

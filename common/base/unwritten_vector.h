@@ -1,5 +1,5 @@
-// UnwrittenVector<T>: std::vector for bytes that are written right after memory is taken for them, such as a chunk that is read and decoded.
-// New elements are uninitialised unless a value is given. Its storage begins at a 64-byte boundary and comes from the heap.
+// UnwrittenVector<T>: std::vector for bytes that are written right after memory is taken for them, such as a chunk that is read and
+// decoded. New elements are uninitialised unless a value is given. Its storage begins at a 64-byte boundary and comes from the heap.
 #pragma once
 
 #include <cstddef>
