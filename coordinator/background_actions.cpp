@@ -148,7 +148,7 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, OpenedSource opened) {
   const std::vector<SourceLevel>& levels = opened.source->info().levels;
   std::vector<DataSource> sources;
-  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary, .overview_level = opened.survey.level});
+  auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
     described->levels.push_back(levels[level].description);
     SourceAtLevel at{.source = opened.source,

@@ -60,13 +60,11 @@ double OccupancyOf(const VolumeSummary& summary, const TransferFunction& transfe
   return EstimateOccupancy(summary, transfer) * (double(VoxelsOf(summary)) / double(CountedVoxels(summary)));
 }
 
-bool IsSample(const VolumeSummary& summary) { return CountedVoxels(summary) < VoxelsOf(summary); }
-
 // Where the statistics come from; "": from all voxels.
 std::string OfWhichVoxels(const VolumeFacts& facts) {
   if (!facts.parts) return "";
-  const int level = facts.parts->survey.level;
-  if (IsSample(*facts.summary)) return fmt::format(" of a sample of level {}", level);
+  const auto& [level, sample, summary] = facts.parts->survey;
+  if (sample) return fmt::format(" of a sample of level {}", level);
   return level > 0 ? fmt::format(" of level {}", level) : "";
 }
 
@@ -256,7 +254,7 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
   json["channels"] = info.channels;
   json["times"] = info.times;
   if (info.window) json["window"] = RangeJson(*info.window);
-  json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", IsSample(*facts.summary)}};
+  json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
 }
 
 std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, double occupancy, const std::vector<DicomSeries>& series,

@@ -19,7 +19,6 @@ struct VolumeLevels {
   std::vector<VolumeDescription> levels;  // finest first; more than one
   // Of the level that statistics are taken from: its range and histogram are those of the dataset, at every level.
   std::shared_ptr<const VolumeSummary> overview;
-  int overview_level = 0;
 };
 
 // Of the dataset, without bricks.

@@ -29,22 +29,14 @@ constexpr Remainders MakeRemainders() {
 }
 constexpr Remainders kRemainders = MakeRemainders();
 
-std::uint32_t Little32(std::span<const std::byte> bytes) {
-  std::uint32_t number = 0;
-  for (std::size_t i = 0; i < 4; ++i) number |= std::to_integer<std::uint32_t>(bytes[i]) << (8 * i);
-  return number;
-}
-
 class CheckedSum : public ChunkCodec {
  public:
   Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    constexpr std::size_t kSumBytes = 4;
-    if (packed.size() < kSumBytes) return DamagedBytes("crc32c");
-    const std::size_t bytes = packed.size() - kSumBytes;
-    if (bytes > most) return TooManyBytes("crc32c", bytes, most);
-    const std::uint32_t stated = Little32(packed.span().subspan(bytes)), sum = Crc32c(packed.span().first(bytes));
-    if (stated != sum) return Status::DataLoss(fmt::format("damaged: its CRC-32C is {:08x}, stated is {:08x}", sum, stated));
-    return FirstBytes(std::move(packed), bytes);
+    Result<SummedBytes> summed = TakeSum("crc32c", std::move(packed), most);
+    if (!summed.ok()) return summed.status();
+    const std::uint32_t sum = Crc32c(summed->bytes.span());
+    if (summed->sum == sum) return std::move(summed->bytes);
+    return Status::DataLoss(fmt::format("damaged: its CRC-32C is {:08x}, stated is {:08x}", sum, summed->sum));
   }
 };
 

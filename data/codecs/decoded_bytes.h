@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -25,6 +26,28 @@ inline Status DamagedBytes(std::string_view codec) { return Status::DataLoss(fmt
 
 inline Status TooManyBytes(std::string_view codec, std::uint64_t bytes, std::uint64_t most) {
   return Status::ResourceExhausted(fmt::format("{} says that it holds {} bytes, at most {} are expected", codec, bytes, most));
+}
+
+// The number in the first four bytes, the lowest one first.
+inline std::uint32_t Little32(std::span<const std::byte> bytes) {
+  std::uint32_t number = 0;
+  for (std::size_t i = 0; i < 4; ++i) number |= std::to_integer<std::uint32_t>(bytes[i]) << (8 * i);
+  return number;
+}
+
+// Bytes with a checksum of 32 bits behind them, the lowest byte first.
+struct SummedBytes {
+  Bytes bytes;
+  std::uint32_t sum = 0;  // as it stands there
+};
+// `codec`: for messages. DataLoss: there is no room for a checksum; ResourceExhausted: more than `most` bytes stand before it.
+inline Result<SummedBytes> TakeSum(std::string_view codec, Bytes packed, std::uint64_t most) {
+  constexpr std::size_t kSumBytes = 4;
+  if (packed.size() < kSumBytes) return DamagedBytes(codec);
+  const std::size_t count = packed.size() - kSumBytes;
+  if (count > most) return TooManyBytes(codec, count, most);
+  const std::uint32_t sum = Little32(packed.span().subspan(count));
+  return SummedBytes{FirstBytes(std::move(packed), count), sum};
 }
 
 }  // namespace slabstream

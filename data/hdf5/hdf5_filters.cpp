@@ -20,19 +20,13 @@ constexpr int kLzf = 32000, kBlosc = 32001, kLz4 = 32004, kBitShuffle = 32008, k
 class Fletcher32 : public ChunkCodec {
  public:
   Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    constexpr std::size_t kSumBytes = 4;
-    if (packed.size() < kSumBytes) return DamagedBytes("fletcher32");
-    const std::size_t count = packed.size() - kSumBytes;
-    if (count > most) return TooManyBytes("fletcher32", count, most);
-    std::uint32_t stored = 0;
-    for (std::size_t i = 0; i < kSumBytes; ++i) stored |= std::to_integer<std::uint32_t>(packed.span()[count + i]) << (8 * i);
-    const std::uint32_t sum = SumOf(packed.span().first(count));
+    Result<SummedBytes> summed = TakeSum("fletcher32", std::move(packed), most);
+    if (!summed.ok()) return summed.status();
+    const std::uint32_t sum = SumOf(summed->bytes.span());
     // HDF5 before 1.6.3 wrote the bytes of each half in the other order.
     const std::uint32_t reversed = ((sum & 0x00ff00ff) << 8) | ((sum & 0xff00ff00) >> 8);
-    if (stored != sum && stored != reversed) {
-      return Status::DataLoss(fmt::format("damaged: its checksum is {:08x}, stored is {:08x}", sum, stored));
-    }
-    return FirstBytes(std::move(packed), count);
+    if (summed->sum == sum || summed->sum == reversed) return std::move(summed->bytes);
+    return Status::DataLoss(fmt::format("damaged: its checksum is {:08x}, stored is {:08x}", sum, summed->sum));
   }
 
  private:

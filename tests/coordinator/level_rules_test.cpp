@@ -32,8 +32,7 @@ std::shared_ptr<const VolumeSummary> SummaryOfLevel(int level) {
 std::shared_ptr<const VolumeLevels> Levels() {
   auto levels = std::make_shared<VolumeLevels>();
   for (int level = 0; level < kLevels; ++level) levels->levels.push_back({.geometry = GeometryOfLevel(level)});
-  levels->overview_level = kLevels - 1;
-  levels->overview = SummaryOfLevel(levels->overview_level);
+  levels->overview = SummaryOfLevel(kLevels - 1);
   return levels;
 }
 

@@ -5,29 +5,19 @@
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/fuzz/read_source.h"
-#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
-namespace {
-
-std::string PathOf(const std::string& name) {
-  static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
-  return directory / name;
-}
-
-}  // namespace
-
 bool DecodeHdf5File(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const ReadOptions options{.dataset = input.Take<std::uint8_t>() % 2 == 1 ? "/data" : ""};
-  const std::string path = PathOf("volume.h5");
+  const std::string path = PathOfSource("volume.h5");
   WriteFile(path, FileBytes(input.Text()));
   return ReadSource(path, options);
 }
 
 std::vector<FuzzBytes> Hdf5FileSeeds() {
   std::vector<FuzzBytes> seeds;
-  const std::string path = PathOf("seed.h5");
+  const std::string path = PathOfSource("seed.h5");
   std::vector<std::uint16_t> samples(6 * 7 * 8);
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = std::uint16_t(i);
   const auto keep = [&](std::uint8_t kind) { seeds.push_back(FuzzSeed().Put(kind).Put(ReadFile(path)).bytes()); };

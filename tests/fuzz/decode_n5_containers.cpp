@@ -6,14 +6,12 @@
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/fuzz/read_source.h"
-#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
 
 bool DecodeN5Container(std::span<const std::byte> bytes) {
-  static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
   FuzzInput input(bytes);
-  const std::string path = directory / "scan.n5";
+  const std::string path = PathOfSource("scan.n5");
   std::filesystem::create_directories(path + "/0/0");
   WriteFile(path + "/attributes.json", FileBytes(input.TakeLine()));
   WriteFile(path + "/0/0/0", FileBytes(input.Text()));

@@ -7,21 +7,11 @@
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/fuzz/decoders.h"
 #include "tests/fuzz/read_source.h"
-#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
-namespace {
-
-std::string PathOf(const std::string& name) {
-  static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
-  return directory / name;
-}
-
-}  // namespace
-
 bool DecodePrecomputed(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
-  const std::string path = PathOf("em");
+  const std::string path = PathOfSource("em");
   std::filesystem::create_directories(path + "/s");
   WriteFile(path + "/info", FileBytes(input.TakeLine()));
   WriteFile(path + "/s/0-4_0-4_0-4", FileBytes(input.Text()));
@@ -39,8 +29,8 @@ std::vector<FuzzBytes> PrecomputedSeeds() {
   };
   add("uint16", R"("encoding": "raw")", FileBytes(128, 'x'));
   add("uint16", R"("encoding": "raw")", Gzip(FileBytes(128, 'x')));
-  WriteJpeg(PathOf("seed.jpg"), {8, 8, 1}, 1, FileBytes(64, 'x'));
-  add("uint8", R"("encoding": "jpeg")", ReadFile(PathOf("seed.jpg")));
+  WriteJpeg(PathOfSource("seed.jpg"), {8, 8, 1}, 1, FileBytes(64, 'x'));
+  add("uint8", R"("encoding": "jpeg")", ReadFile(PathOfSource("seed.jpg")));
   FileBytes labels(4 * (1 + 2 + 2 + 2), '\0');  // a channel with a block, of 1 bit for each voxel and a table of two labels
   const std::uint8_t header[] = {1, 0, 0, 0, 4, 0, 0, 1, 2, 0, 0, 0};
   std::copy(std::begin(header), std::end(header), labels.begin());

@@ -6,8 +6,15 @@
 #include "common/volume/volume.h"
 #include "data/open/open_source.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/support/temporary_directory.h"
 
 namespace slabstream {
+
+// Of a file or folder that a target writes for each input.
+inline std::string PathOfSource(const std::string& name) {
+  static const TemporaryDirectory directory{PlaceOfFuzzFiles()};
+  return directory / name;
+}
 
 // Opens the source and reads a small box of each level. Whether all of that went well.
 inline bool ReadSource(const std::string& path, const ReadOptions& options) {

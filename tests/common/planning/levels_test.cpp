@@ -188,7 +188,6 @@ VolumeLevels HalvedLevels(const VolumeGeometry& finest, int count) {
     levels.levels.push_back({.geometry = Coarser(finest, {step, step, step})});
   }
   levels.overview = std::make_shared<const VolumeSummary>(SummaryOf(levels.levels.back().geometry));
-  levels.overview_level = count - 1;
   return levels;
 }
 

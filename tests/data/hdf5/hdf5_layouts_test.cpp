@@ -9,6 +9,7 @@
 #include "data/hdf5/hdf5_format.h"
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -37,24 +38,12 @@ class Hdf5LayoutsTest : public testing::Test {
     return OpenSource(path, options, context_);
   }
   void ExpectRefused(const std::string& path, const ReadOptions& options, const std::string& why) {
-    const Result<std::shared_ptr<VolumeSource>> source = Open(path, options);
-    ASSERT_FALSE(source.ok()) << why;
-    EXPECT_THAT(source.status().message(), HasSubstr(why));
-    EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
+    ExpectRefusal(Open(path, options), why);
   }
 
   TemporaryDirectory directory_;
-  SourceContext context_ = std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2});
+  SourceContext context_ = TestReadContext();
 };
-
-template <class T>
-std::vector<T> Samples(VolumeSource& source, int level = 0) {
-  const Box box = source.info().levels[std::size_t(level)].description.geometry.bounds();
-  std::vector<T> samples(std::size_t(box.voxel_count()));
-  const Status status = source.ReadNow(level, box, std::as_writable_bytes(std::span(samples)));
-  EXPECT_TRUE(status.ok()) << status.message();
-  return samples;
-}
 
 std::vector<std::uint16_t> Counted(std::size_t count, int step = 1) {
   std::vector<std::uint16_t> samples(count);
@@ -124,7 +113,8 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesHaveLevelsWithoutTheirPadding) {
   EXPECT_EQ(fine.orientation.unit, LengthUnit::kMicrometre);
   EXPECT_EQ(fine.orientation.origin, (Vec3{-4.75, 0.25, 11}));
   EXPECT_EQ(coarse.orientation.origin, (Vec3{-4.5, 0.5, 11}));
-  const std::vector<std::uint16_t> samples = Samples<std::uint16_t>(**source), of_coarse = Samples<std::uint16_t>(**source, 1);
+  const std::vector<std::uint16_t> samples = SamplesOf<std::uint16_t>(**source).value(),
+                                   of_coarse = SamplesOf<std::uint16_t>(**source, 1).value();
   EXPECT_EQ(samples[0], 6000);
   EXPECT_EQ(samples[9 + 10 * (5 + 6 * 3)], 6000 + 300 + 50 + 9);
   EXPECT_EQ(of_coarse[4 + 5 * (2 + 3 * 3)], 16000 + 300 + 20 + 4);
@@ -178,7 +168,7 @@ TEST_F(Hdf5LayoutsTest, BigDataViewerFilesHaveSetupsAndUnsignedSamples) {
   EXPECT_EQ(info.levels[1].description.geometry.orientation.origin, (Vec3{0.125, 0.125, 0}));
   EXPECT_EQ(info.levels[0].description.geometry.orientation.unit, LengthUnit::kMicrometre);
   EXPECT_EQ(info.files.size(), 2U) << "the XML file belongs to it";
-  const std::vector<std::uint16_t> samples = Samples<std::uint16_t>(**source);
+  const std::vector<std::uint16_t> samples = SamplesOf<std::uint16_t>(**source).value();
   EXPECT_EQ(samples[1], 20000 + 208);
   EXPECT_EQ(samples.back(), 20000 + 191 * 208) << "above 32767";
 
@@ -207,7 +197,7 @@ TEST_F(Hdf5LayoutsTest, TheOnlyVolumeOfAFileIsTaken) {
     EXPECT_EQ((*source)->info().format, "HDF5");
     EXPECT_EQ((*source)->info().levels[0].description.geometry.spacing, (Vec3{0.25, 0.5, 3}));
     EXPECT_EQ((*source)->info().levels[0].description.geometry.orientation.unit, LengthUnit::kMicrometre);
-    EXPECT_EQ(Samples<std::uint16_t>(**source), samples);
+    EXPECT_EQ(SamplesOf<std::uint16_t>(**source).value(), samples);
   }
   ExpectRefused(path, {.dataset = "/nothing"}, "scan.h5: dataset '/nothing' cannot be opened");
   ExpectRefused(path, {.dataset = "/exchange"}, "dataset '/exchange' cannot be opened");
@@ -243,7 +233,7 @@ TEST_F(Hdf5LayoutsTest, AnAxisBeforeTheLastThreeIsTime) {
   const auto source = Open(path, {.time = TimeRange{1, 1}});
   ASSERT_TRUE(source.ok()) << source.status().message();
   EXPECT_EQ((*source)->info().times, 2);
-  EXPECT_EQ(Samples<std::uint16_t>(**source)[0], 60);
+  EXPECT_EQ(SamplesOf<std::uint16_t>(**source).value()[0], 60);
   Hdf5Writer(path).Write("/data", {.size = {2, 2, 3, 5, 2}}, samples.data());
   ExpectRefused(path, {}, "is of 2 x 2 x 3 x 5 x 2: only one axis before the last three");
 }

@@ -14,6 +14,7 @@
 #include "common/base/files.h"
 #include "data/n5/n5_array.h"
 #include "data/open/open_source.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/data/sources/read_array.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
@@ -140,23 +141,11 @@ class N5Test : public testing::Test {
     return n5::OpenArray(store, "", zarr::Field("attributes.json", **json), context_);
   }
   Result<std::shared_ptr<VolumeSource>> Open(const ReadOptions& options = {}) { return OpenSource(root_, options, context_); }
-  void ExpectRefused(const ReadOptions& options, const std::string& why) {
-    const Result<std::shared_ptr<VolumeSource>> source = Open(options);
-    ASSERT_FALSE(source.ok()) << why;
-    EXPECT_THAT(source.status().message(), HasSubstr(why));
-    EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
-  }
-  Result<std::vector<std::byte>> Samples(VolumeSource& source, int level = 0) {
-    const VolumeDescription& description = source.info().levels[std::size_t(level)].description;
-    std::vector<std::byte> samples(std::size_t(description.voxel_bytes()));
-    const Status status = source.ReadNow(level, description.geometry.bounds(), samples);
-    if (!status.ok()) return status;
-    return samples;
-  }
+  void ExpectRefused(const ReadOptions& options, const std::string& why) { ExpectRefusal(Open(options), why); }
 
   TemporaryDirectory directory_;
   const std::string root_ = directory_ / "scan.n5";
-  SourceContext context_ = std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2});
+  SourceContext context_ = TestReadContext();
 };
 
 TEST_F(N5Test, BlocksOfEveryShapeTypeAndCompression) {
@@ -265,8 +254,8 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   EXPECT_EQ(geometry.spacing, (Vec3{1, 1, 2}));
   EXPECT_EQ(geometry.orientation.origin, (Vec3{0.25, 0.25, 0}));
   EXPECT_EQ(geometry.orientation.unit, LengthUnit::kMicrometre);
-  EXPECT_EQ(Samples(**source).value(), fine);
-  EXPECT_EQ(Samples(**source, 1).value(), coarse);
+  EXPECT_EQ(SamplesOf<std::byte>(**source).value(), fine);
+  EXPECT_EQ(SamplesOf<std::byte>(**source, 1).value(), coarse);
 }
 
 TEST_F(N5Test, GroupsOfLevels) {

@@ -11,6 +11,7 @@
 
 #include "data/positional/positional_source.h"
 #include "data/volume_io/volume_reader.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/stored_object.h"
 #include "tests/data/volume_io/volume_files.h"
@@ -24,31 +25,11 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-SourceContext MakeContext() { return std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}); }
-
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
-  return UncompressedFile().open(path, options, MakeContext());
+  return UncompressedFile().open(path, options, TestReadContext());
 }
 
-std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) {
-  const auto source = Open(path, options);
-  CHECK(source.ok()) << source.status().message();
-  return *source;
-}
-
-// Filled with a value before, so that samples that were not read are found.
-AlignedVector<std::byte> ReadBox(VolumeSource& source, const Box& box) {
-  const ScalarType type = source.info().levels.front().description.type;
-  AlignedVector<std::byte> bytes(std::size_t(box.voxel_count()) * BytesPerSample(type), std::byte{0xa5});
-  const Status status = source.ReadNow(0, box, bytes);
-  EXPECT_TRUE(status.ok()) << status.message();
-  return bytes;
-}
-
-std::vector<double> Values(const VolumeDescription& description, const VoxelBlock& block) {
-  return DataValues(Volume{.description = {.geometry = {block.box.size()}, .type = block.type, .mapping = description.mapping},
-                           .block = {{{0, 0, 0}, block.box.size()}, block.type, block.bytes}});
-}
+std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) { return Opened(Open(path, options)); }
 
 // Kept as their type alone says.
 bool IsExact(const std::string& file_type) {
@@ -74,11 +55,11 @@ void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random
   for (int i = 0; i < boxes; ++i) {
     const Box box = i == 0 ? wanted.geometry.bounds() : RandomBox(random, wanted.geometry.bounds());
     const VoxelBlock cut = CutBlock(whole->volume->block, box);
-    const VoxelBlock read = {box, description.type, ReadBox(**source, box)};
+    const VoxelBlock read = {box, description.type, ReadBox(**source, 0, box)};
     if (exact) {
       ASSERT_TRUE(read.bytes == cut.bytes) << "box " << i;
     } else {
-      ASSERT_EQ(Values(description, read), Values(wanted, cut)) << "box " << i;
+      ASSERT_EQ(DataValues(description, read), DataValues(wanted, cut)) << "box " << i;
     }
   }
 }
@@ -230,9 +211,9 @@ TEST(Positional, ReadsOnlyWhatABoxNeeds) {
   const TemporaryDirectory directory;
   WriteFile(directory / "v.raw", std::string(std::size_t{100} * 100 * 100, 'x'));
   const auto source = Opened(directory / "v.raw", {.dims = Index3{100, 100, 100}, .type = SampleType::kUint8});
-  ReadBox(*source, {{0, 0, 7}, {100, 100, 9}});
+  ReadBox(*source, 0, {{0, 0, 7}, {100, 100, 9}});
   EXPECT_EQ(source->counts().stored_bytes, 20000U);
-  ReadBox(*source, {{99, 99, 99}, {100, 100, 100}});
+  ReadBox(*source, 0, {{99, 99, 99}, {100, 100, 100}});
   EXPECT_EQ(source->counts().stored_bytes, 20001U);
   EXPECT_EQ(source->info().levels[0].block, (Index3{100, 1, 1})) << "a row lies together";
 }

@@ -14,6 +14,7 @@
 #include "data/precomputed/jpeg_codec.h"
 #include "data/precomputed/segmentation_codec.h"
 #include "data/precomputed/sharding.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
@@ -125,24 +126,11 @@ TEST(SegmentationCodec, TakesNoMemoryForWhatIsTooMuch) {
 class PrecomputedTest : public testing::Test {
  protected:
   Result<std::shared_ptr<VolumeSource>> Open(const ReadOptions& options = {}) { return OpenSource(root_, options, context_); }
-  void ExpectRefused(const ReadOptions& options, const std::string& why) {
-    const Result<std::shared_ptr<VolumeSource>> source = Open(options);
-    ASSERT_FALSE(source.ok()) << why;
-    EXPECT_THAT(source.status().message(), HasSubstr(why));
-    EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
-  }
-  template <class T>
-  Result<std::vector<T>> Samples(VolumeSource& source, int level = 0) {
-    const VolumeDescription& description = source.info().levels[std::size_t(level)].description;
-    std::vector<T> samples(std::size_t(description.voxel_bytes()) / sizeof(T));
-    const Status status = source.ReadNow(level, description.geometry.bounds(), std::as_writable_bytes(std::span(samples)));
-    if (!status.ok()) return status;
-    return samples;
-  }
+  void ExpectRefused(const ReadOptions& options, const std::string& why) { ExpectRefusal(Open(options), why); }
 
   TemporaryDirectory directory_;
   const std::string root_ = directory_ / "em";
-  SourceContext context_ = std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2});
+  SourceContext context_ = TestReadContext();
 };
 
 std::string Info(const std::string& type, const std::string& data_type, int channels, const std::string& scales) {
@@ -196,7 +184,7 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   EXPECT_EQ(fine.orientation.unit, LengthUnit::kNanometre);
   EXPECT_EQ(fine.orientation.origin, (Vec3{804, -20, 20}));
   EXPECT_EQ(info.levels[1].description.geometry.orientation.origin, (Vec3{808, -24, 20}));
-  const auto samples = Samples<std::uint16_t>(**source);
+  const auto samples = SamplesOf<std::uint16_t>(**source);
   ASSERT_TRUE(samples.ok()) << samples.status().message();
   int missing = 0;
   for (int z = 0, i = 0; z < size[2]; ++z) {
@@ -209,10 +197,10 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
     }
   }
   EXPECT_GT(missing, 0);
-  EXPECT_THAT(Samples<std::uint16_t>(**source, 1).value(), testing::Each(0)) << "no chunk of this level is there";
+  EXPECT_THAT(SamplesOf<std::uint16_t>(**source, 1).value(), testing::Each(0)) << "no chunk of this level is there";
 
   WriteText(root_ + "/8_8_40/100-104_-3-1_0-3", "short");
-  const Status damaged = Samples<std::uint16_t>(**Open({.channel = 0})).status();
+  const Status damaged = SamplesOf<std::uint16_t>(**Open({.channel = 0})).status();
   EXPECT_EQ(damaged.code(), StatusCode::kDataLoss);
   EXPECT_THAT(damaged.message(), HasSubstr("em/8_8_40/100-104_-3-1_0-3: has 5 bytes, expected 192"));
 }
@@ -232,7 +220,7 @@ TEST_F(PrecomputedTest, JpegChunks) {
     }
     const auto source = Open({.channel = channels - 1});
     ASSERT_TRUE(source.ok()) << source.status().message();
-    const auto samples = Samples<std::uint8_t>(**source);
+    const auto samples = SamplesOf<std::uint8_t>(**source);
     ASSERT_TRUE(samples.ok()) << samples.status().message();
     for (std::size_t i = 0; i < samples->size(); ++i) EXPECT_NEAR((*samples)[i], 100 + 20 * (channels - 1) + (i < 128 ? 0 : 4), 3) << i;
   }
@@ -244,7 +232,7 @@ TEST_F(PrecomputedTest, JpegChunks) {
         {"no picture", "not a JPEG picture"},
         {good.substr(0, good.size() - 2), "truncated or damaged"}}) {
     WriteText(chunk, bytes);
-    const Status status = Samples<std::uint8_t>(**Open({.channel = 0})).status();
+    const Status status = SamplesOf<std::uint8_t>(**Open({.channel = 0})).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
     EXPECT_THAT(status.message(), testing::AllOf(HasSubstr("em/0/0-8_0-4_0-4: "), HasSubstr(why)));
   }
@@ -259,7 +247,7 @@ TEST_F(PrecomputedTest, SegmentationsAreLabels) {
   const auto source = Open();
   ASSERT_TRUE(source.ok()) << source.status().message();
   EXPECT_TRUE((*source)->info().labels);
-  const auto samples = Samples<float>(**source);
+  const auto samples = SamplesOf<float>(**source);
   ASSERT_TRUE(samples.ok()) << samples.status().message();
   EXPECT_TRUE(std::ranges::equal(*samples, labels));
 }
@@ -338,7 +326,7 @@ TEST_F(PrecomputedTest, ChunksInShards) {
       WriteShards(root_ + "/s", sharding, chunks);
       const auto source = Open();
       ASSERT_TRUE(source.ok()) << source.status().message();
-      const auto samples = Samples<std::uint8_t>(**source);
+      const auto samples = SamplesOf<std::uint8_t>(**source);
       ASSERT_TRUE(samples.ok()) << samples.status().message();
       for (int z = 0, i = 0; z < 8; ++z) {
         for (int y = 0; y < 7; ++y) {
@@ -359,7 +347,7 @@ TEST_F(PrecomputedTest, ChunksInShards) {
                                    {good.substr(0, 70), "the shard ends within an index"},
                                    {far, "the index of the shard is damaged: a minishard lies from 1 to 18446744073709551615"}}) {
     WriteText(path, bytes);
-    const Status status = Samples<std::uint8_t>(**Open()).status();
+    const Status status = SamplesOf<std::uint8_t>(**Open()).status();
     EXPECT_EQ(status.code(), StatusCode::kDataLoss) << why;
     EXPECT_THAT(status.message(), testing::AllOf(HasSubstr(".shard: chunk "), HasSubstr(why)));
   }
@@ -404,7 +392,7 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   WriteText(root_ + "/info", with("\"key\": \"0\"", "\"key\": \"../elsewhere\""));
   const auto outside = Open();
   ASSERT_TRUE(outside.ok()) << outside.status().message();
-  EXPECT_FALSE(Samples<std::uint8_t>(**outside).ok()) << "chunks lie in the folder";
+  EXPECT_FALSE(SamplesOf<std::uint8_t>(**outside).ok()) << "chunks lie in the folder";
   WriteText(root_ + "/info", good);
   ExpectRefused({.time = TimeRange{0, 0}}, "takes no option time");
 }

@@ -11,6 +11,7 @@
 
 #include "data/tiles/tiled_tiff.h"
 #include "data/volume_io/volume_reader.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/support/random.h"
 #include "tests/support/random_box.h"
@@ -22,30 +23,11 @@ using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-SourceContext MakeContext() { return std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}); }
-
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
-  return TiledTiff().open(path, options, MakeContext());
+  return TiledTiff().open(path, options, TestReadContext());
 }
 
-std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) {
-  const auto source = Open(path, options);
-  CHECK(source.ok()) << source.status().message();
-  return *source;
-}
-
-AlignedVector<std::byte> ReadBox(VolumeSource& source, int level, const Box& box) {
-  const ScalarType type = source.info().levels[std::size_t(level)].description.type;
-  AlignedVector<std::byte> bytes(std::size_t(box.voxel_count()) * BytesPerSample(type), std::byte{0xa5});
-  const Status status = source.ReadNow(level, box, bytes);
-  EXPECT_TRUE(status.ok()) << status.message();
-  return bytes;
-}
-
-std::vector<double> Values(const VolumeDescription& description, const VoxelBlock& block) {
-  return DataValues(Volume{.description = {.geometry = {block.box.size()}, .type = block.type, .mapping = description.mapping},
-                           .block = {{{0, 0, 0}, block.box.size()}, block.type, block.bytes}});
-}
+std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions& options = {}) { return Opened(Open(path, options)); }
 
 void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random& random, int boxes = 10) {
   SCOPED_TRACE(path);
@@ -66,7 +48,7 @@ void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random
     if (description == wanted) {
       ASSERT_TRUE(read.bytes == cut.bytes) << "box " << i;
     } else {
-      ASSERT_EQ(Values(description, read), Values(wanted, cut)) << "box " << i;
+      ASSERT_EQ(DataValues(description, read), DataValues(wanted, cut)) << "box " << i;
     }
   }
 }

@@ -195,4 +195,9 @@ std::vector<double> DataValues(const Volume& volume) {
   return values;
 }
 
+std::vector<double> DataValues(const VolumeDescription& description, const VoxelBlock& block) {
+  return DataValues(Volume{.description = {.geometry = {block.box.size()}, .type = block.type, .mapping = description.mapping},
+                           .block = {{{0, 0, 0}, block.box.size()}, block.type, block.bytes}});
+}
+
 }  // namespace slabstream

@@ -61,5 +61,7 @@ void Damage(char& byte, Random& random);
 
 // The values of all voxels.
 std::vector<double> DataValues(const Volume& volume);
+// Of a box of such a volume.
+std::vector<double> DataValues(const VolumeDescription& description, const VoxelBlock& block);
 
 }  // namespace slabstream

@@ -1,0 +1,50 @@
+// Sources as tests open and read them.
+#pragma once
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/base/check.h"
+#include "data/sources/source_format.h"
+
+namespace slabstream {
+
+inline SourceContext TestReadContext() { return std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}); }
+
+inline std::shared_ptr<VolumeSource> Opened(const Result<std::shared_ptr<VolumeSource>>& source) {
+  CHECK(source.ok()) << source.status().message();
+  return *source;
+}
+
+// Refused in one line that says why.
+inline void ExpectRefusal(const Result<std::shared_ptr<VolumeSource>>& source, const std::string& why) {
+  ASSERT_FALSE(source.ok()) << why;
+  EXPECT_THAT(source.status().message(), testing::HasSubstr(why));
+  EXPECT_EQ(source.status().message().find('\n'), std::string::npos);
+}
+
+// Filled with a value before, so that samples that were not read are found.
+inline AlignedVector<std::byte> ReadBox(VolumeSource& source, int level, const Box& box) {
+  const ScalarType type = source.info().levels[std::size_t(level)].description.type;
+  AlignedVector<std::byte> bytes(std::size_t(box.voxel_count()) * BytesPerSample(type), std::byte{0xa5});
+  const Status status = source.ReadNow(level, box, bytes);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return bytes;
+}
+
+// Of a whole level.
+template <class T>
+Result<std::vector<T>> SamplesOf(VolumeSource& source, int level = 0) {
+  const VolumeDescription& description = source.info().levels[std::size_t(level)].description;
+  std::vector<T> samples(std::size_t(description.voxel_bytes()) / sizeof(T));
+  const Status status = source.ReadNow(level, description.geometry.bounds(), std::as_writable_bytes(std::span(samples)));
+  if (!status.ok()) return status;
+  return samples;
+}
+
+}  // namespace slabstream
