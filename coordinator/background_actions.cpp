@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
@@ -167,9 +168,14 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
                                                              const std::function<void(int percent)>& tell) {
   const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
   const auto bytes = std::uint64_t(description.voxel_bytes());
+  // A picture may be drawn from several levels, which must be held together.
+  std::uint64_t with_coarser = 0;
+  for (const SourceLevel& level : std::span(at.source->info().levels).subspan(std::size_t(at.stored.level))) {
+    with_coarser += std::uint64_t(level.description.voxel_bytes());
+  }
   VoxelServer::Samples samples;
   VolumeSummary summary;
-  if (bytes <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+  if (with_coarser <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, tell);
     if (!volume.ok()) return volume.status();
     samples.volume = *volume;

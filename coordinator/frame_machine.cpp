@@ -284,7 +284,7 @@ bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
-  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->volume().dataset()});
+  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->datasets()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;

@@ -38,7 +38,7 @@ void FrameMachine::State::On(const DatasetNews& event) {
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
-               request.dataset() != nullptr && request.dataset()->volume().dataset() == ready.dataset) {
+               request.dataset() != nullptr && request.dataset()->DrawsFrom(ready)) {
       request.dataset()->seen = ready.seen;
     } else if (const Status suits = Resolve(request, ready); suits.ok()) {
       SendQueued(request, nullptr);
@@ -60,7 +60,10 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   Result<ResolvedRequest> resolved = ResolveRequest(
       ready.finest ? AtLevel(asked, *ready.finest, ready.summary->description.geometry) : asked, ready.dataset, ready.summary);
   if (!resolved.ok()) return resolved.status();
-  if (resolved->summary->stored) request.uses_occupancy = request.needs_occupancy = false;  // nobody counts what nobody holds
+  resolved->map = ready.map;
+  resolved->coarser = ready.coarser;
+  // Nobody counts what nobody holds, nor what is drawn from several levels.
+  if (resolved->summary->stored || resolved->map != nullptr) request.uses_occupancy = request.needs_occupancy = false;
   request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
   return Status::Ok();
 }

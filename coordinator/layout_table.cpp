@@ -41,6 +41,7 @@ std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volu
 
 LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
   Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target, !counted && NeedsOccupancy(AskFor(*request.policy))};
+  if (request.map != nullptr) key.map = *request.map;
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
@@ -93,6 +94,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                            .policy = &policy,
                            .slots = request.slots,
                            .box_bytes_target = request.box_bytes_target,
+                           .map = request.map.get(),
+                           .coarser = request.coarser,
                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                            .stop = request.stop};
   const bool rebalance = present != nullptr && policy.dynamic_balance;

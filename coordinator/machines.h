@@ -24,6 +24,7 @@
 #include "common/base/bytes.h"
 #include "common/base/log.h"
 #include "common/base/status.h"
+#include "common/planning/resolved_request.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/peer_token.h"
 
@@ -51,7 +52,7 @@ struct SeekDataset {
 };
 struct KeepDataset {
   UseId use = 0;
-  DatasetId dataset = 0;
+  std::vector<DatasetId> datasets;  // not empty
 };
 struct LeaveDataset {
   UseId use = 0;
@@ -77,6 +78,9 @@ struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
   std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
+  // If the picture is drawn from several of them: which parts, and those beside this one (ResolvedRequest).
+  std::shared_ptr<const LevelMap> map = {};
+  std::vector<CoarserVolume> coarser = {};
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

@@ -35,7 +35,8 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   std::shared_ptr<const Layout> layout = layouts_.FindMade({.policy = &*resolved.policy,
                                                             .volume = &resolved.volume,
                                                             .slots = std::uint32_t(slots),
-                                                            .box_bytes_target = BoxTarget(*setup, request.workers)});
+                                                            .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                            .map = resolved.map});
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
   return WithLayout({.asked = request, .policy = *resolved.policy}, *std::move(setup), std::move(layout));
 } catch (const std::exception&) {
@@ -49,8 +50,9 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   PlannedFrame planned{.asked = request};
   const MachineModel machine = ServiceMachine(request.workers, surroundings_);
   const std::size_t slots = request.roster.slots.size();
-  if (setup->stored && LeavesChoice(resolved.frame.policy, machine, slots)) {
-    // Nothing is known of the work in voxels that nobody has read.
+  const bool unknown = setup->stored || resolved.map != nullptr;
+  if (unknown && LeavesChoice(resolved.frame.policy, machine, slots)) {
+    // Nothing is known of the work in voxels that nobody has read, or that are drawn from several levels.
     planned.policy = ResolvePolicy(FirstPolicy(resolved.frame.policy, slots), setup->description.geometry);
   } else if (LeavesChoice(resolved.frame.policy, machine, slots)) {
     ChosenPolicy chosen = policies_.Find(request, machine, layouts_);
@@ -67,6 +69,8 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .occupied = planned.asked.occupied,
                                                         .slots = std::uint32_t(slots),
                                                         .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                        .map = resolved.map,
+                                                        .coarser = resolved.coarser,
                                                         .stop = request.stop});
   if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
   return WithLayout(std::move(planned), *std::move(setup), std::move(layout));

@@ -5,6 +5,7 @@
 // What a frame costs is known only when it ends (Settle). Until then it counts as much as the client's frame before it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -48,6 +49,16 @@ struct OpenRequest {
     bool seen = false;                                // DatasetReady::seen: its frame may begin
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
+    // The voxels that its frame is drawn from: the volume first.
+    std::vector<DatasetId> datasets() const {
+      std::vector<DatasetId> all = {volume().dataset()};
+      for (const CoarserVolume& level : resolved->coarser) all.push_back(level.dataset);
+      return all;
+    }
+    bool DrawsFrom(const DatasetReady& ready) const {
+      return volume().dataset() == ready.dataset &&
+             std::ranges::equal(resolved->coarser, ready.coarser, {}, &CoarserVolume::dataset, &CoarserVolume::dataset);
+    }
   };
   std::variant<Submitted, AwaitsDataset, HasDataset> state = {};
 

@@ -198,7 +198,7 @@ RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const 
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.box, *action.setup, hidden, control, report);
+    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.at(), *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;

@@ -19,8 +19,10 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     }
     turns_.Join(client);
   }
-  const Box voxels = PaddedBox(placement.box, *setup);
-  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), setup->stored, actions);
+  const Box voxels = PaddedBox(placement.at(), *setup);
+  const std::uint8_t level = placement.level;
+  const BoxFetcher::Generation padded =
+      boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), actions);
   waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
 }
 

@@ -26,8 +26,11 @@ using WorkerId = std::uint32_t;  // unique within one coordinator's life, never 
 // One rank of a group: which box, and who renders it. After the loss of a worker, another one may hold several ranks of a group.
 struct Placement {
   BoxId id = 0;
-  Box box;
+  Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
+  std::uint8_t level = 0;  // that it is drawn from: LevelBox
+
+  LevelBox at() const { return {box, level}; }
   friend bool operator==(const Placement&, const Placement&) = default;
 };
 

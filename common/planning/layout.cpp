@@ -10,6 +10,7 @@
 #include "common/planning/clipped_cells.h"
 #include "common/planning/cost_estimator.h"
 #include "common/planning/layer_bricks.h"
+#include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
@@ -156,6 +157,52 @@ struct LayoutMaker::State {
     return best ? *std::move(best) : MakePartition(policy, MostGroups(request, policy), fields.Of(BalanceBy::kVoxels));
   }
 
+  // The geometry of a level of the map, and where blocks of its source end.
+  const VolumeSummary& SummaryOf(std::uint8_t level) const {
+    return level == 0 ? *request.summary : *request.coarser[level - std::size_t{1}].summary;
+  }
+  GridMap MapToLevel(std::uint8_t level) const {
+    return MapBetween(request.summary->description.geometry, SummaryOf(level).description.geometry);
+  }
+  Box PaddedBoxOf(const LevelBox& at) const {
+    const VolumeGeometry& geometry = SummaryOf(at.level).description.geometry;
+    return Grown(CoveringVoxels(at.box, MapToLevel(at.level), geometry.size), request.volume->renderer()->reach(), geometry.bounds());
+  }
+
+  Layout MakeByLevels(const ResolvedPolicy& policy) {
+    const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
+    LevelPartition made = DivideByLevels(
+        {.map = request.map,
+         .size = request.summary->description.geometry.size,
+         .least_boxes = int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes)),
+         .most_bytes = request.box_bytes_target,
+         .bytes_of = [&](const LevelBox& at) { return PaddedBoxOf(at).voxel_count() * sample_bytes; },
+         .blocks_of =
+             [&](std::uint8_t level) {
+               Index3 voxels;
+               const std::optional<StoredAt>& stored = SummaryOf(level).stored;
+               const GridMap map = MapToLevel(level);
+               for (const Axis axis : kAxes) voxels[axis] = stored ? std::int32_t(stored->block.end[axis] / map.scale[axis] + 0.5) : 0;
+               return voxels;
+             }});
+    std::vector<BrickVisibility> visible;
+    for (std::size_t level = 0; level <= request.coarser.size(); ++level) {
+      const VolumeSummary& summary = SummaryOf(std::uint8_t(level));
+      visible.emplace_back(summary, request.volume->renderer()->DrawnTable(request.volume->transfer(), summary));
+    }
+    const auto shows = [&](const Box& box, BoxId id) {
+      const LevelBox at(box, made.levels[id]);
+      return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(at.box) && visible[at.level].AnyVisible(PaddedBoxOf(at));
+    };
+    Layout layout = Share(std::move(made.partition), policy, shows,
+                          [&](const Box& box, BoxId id) { return double(PaddedBoxOf({box, made.levels[id]}).voxel_count()); });
+    layout.levels = std::move(made.levels);
+    for (std::size_t box = 0; box < layout.levels.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) layout.levels[box] = 0;
+    }
+    return layout;
+  }
+
   bool stopped() const { return request.stop.stop_requested(); }
 
   bool BoxesFit(const Partition& partition) {
@@ -183,13 +230,22 @@ struct LayoutMaker::State {
   double MeanSeconds(const Box& box) { return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2; }
 
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
+    const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
+    return Share(
+        std::move(partition), policy, [&](const Box& box, BoxId) { return fields.Shows(box); },
+        [&](const Box& box, BoxId) { return by_cost ? MeanSeconds(box) : 1; });
+  }
+
+  // Gives boxes that show something to slots.
+  template <class Shows, class CostOf>
+  Layout Share(Partition partition, const ResolvedPolicy& policy, Shows&& shows, CostOf&& cost_of) {
     std::vector<BoxId> filled;
     std::vector<double> box_costs;
-    const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
-    for (BoxId box = 0; box < partition.boxes().size(); ++box) {
-      if (!fields.Shows(partition.boxes()[box])) continue;
-      filled.push_back(box);
-      box_costs.push_back(by_cost ? MeanSeconds(partition.boxes()[box]) : 1);
+    for (BoxId id = 0; id < partition.boxes().size(); ++id) {
+      const Box& box = partition.boxes()[id];
+      if (!shows(box, id)) continue;
+      filled.push_back(id);
+      box_costs.push_back(cost_of(box, id));
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
@@ -279,6 +335,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
+  if (state_->request.map != nullptr) return state_->MakeByLevels(policy);
   if (state_->request.summary->stored) return state_->Assign(state_->MakeStoredPartition(policy), policy);
   const BalanceBy metric = policy.balance_by;
   const int groups = FewestGroups(policy);

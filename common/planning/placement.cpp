@@ -106,7 +106,8 @@ void PlaceBoxes(FramePlan& plan) {
   for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera)) {
     if (plan.layout->owners[id] == kNoSlot) continue;
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
-    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0});
+    const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];
+    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0, level});
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }

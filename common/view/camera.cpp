@@ -151,7 +151,7 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
                   view.eye ? "eye" : "distance: the eye", look.distance, least));
 }
 
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, double farthest_voxel) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const double radius = BoundingRadius(geometry);
@@ -165,9 +165,10 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
 
   // Supersampling by the farthest point that the bounding sphere can have, so that it does not change while the view turns.
   const double pixel_width = (perspective ? distance + Length(target) + radius : 1.0) / scale;
-  const double voxel_width = Least(spacing);
   int supersample = 1;
-  while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
+  if (farthest_voxel > 0) {
+    while (supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * farthest_voxel * supersample) supersample *= 2;
+  }
   scale *= supersample;
 
   Camera camera;

@@ -140,6 +140,52 @@ TEST_F(LevelRules, DetailChoosesTheLevel) {
   }
 }
 
+// One looks down on the volume from close by: its upper third is drawn from level 0, the rest from level 1.
+SubmitFrame FromAbove(RequestId request) {
+  SubmitFrame submit = Frame(request);
+  submit.frame.renderer = "raycast";
+  submit.frame.view = {.projection = Projection::kPerspective, .elevation_degrees = 90, .fov_degrees = 60, .distance = 31};
+  submit.frame.detail = 5.5;
+  return submit;
+}
+
+TEST_F(LevelRules, AFrameWaitsForAllLevelsThatItIsDrawnFrom) {
+  script.Client(kClient, FromAbove(1));
+  EXPECT_THAT(HandedOut(Opened()), IsEmpty());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  const LoadDataset fine = script.loads[1], coarse = script.loads[2];
+  EXPECT_THAT(HandedOut(NothingChanged(Loaded(coarse))), IsEmpty());
+  const Actions begun = NothingChanged(Loaded(fine));
+  const std::vector<GroupAssignment> groups = HandedOut(begun);
+  ASSERT_THAT(groups, testing::Not(IsEmpty()));
+  const FrameSetup& setup = groups[0].setup;
+  EXPECT_EQ(setup.dataset, fine.load);
+  EXPECT_EQ(setup.description.geometry, GeometryOfLevel(0));
+  ASSERT_THAT(setup.coarser, SizeIs(1));
+  EXPECT_EQ(setup.coarser[0].dataset, coarse.load);
+  EXPECT_EQ(setup.coarser[0].description.geometry, GeometryOfLevel(1));
+  for (const Placement& placement : groups[0].group.placements) EXPECT_EQ(placement.level, placement.box.begin.z < 32 ? 1 : 0);
+  EXPECT_EQ(Of<UnloadDataset>(script.Client(kOther, DataOrder{.action = DataAction::kRemove, .items = {"block"}})).size(), 0U)
+      << "a frame that has begun keeps all of its voxels";
+  std::vector<DatasetId> unloaded;
+  for (const UnloadDataset& unload : Of<UnloadDataset>(script.AnswerAll(begun))) unloaded.push_back(unload.dataset);
+  EXPECT_THAT(unloaded, testing::UnorderedElementsAre(fine.load, coarse.load));
+}
+
+TEST_F(LevelRules, FilesOfAnyLevelOfAFrameThatChangeRenewThemAll) {
+  Visit(FromAbove(1));
+  const std::size_t before = script.loads.size();
+  const Actions actions = script.Client(kClient, FromAbove(2));
+  EXPECT_THAT(HandedOut(Seen(LookAt(actions, LevelName("block", 0)), false)), IsEmpty()) << "the other level is looked at, too";
+  Seen(LookAt(actions, LevelName("block", 1)), true);
+  EXPECT_THAT(LoadedNames(before), ElementsAre("block"));
+  Opened();
+  ASSERT_THAT(LoadedNames(before), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  Actions loaded = Loaded(script.loads[before + 1]);
+  CoordinatorScript::Append(loaded, Loaded(script.loads[before + 2]));
+  EXPECT_THAT(HandedOut(NothingChanged(loaded)), testing::Not(IsEmpty()));
+}
+
 TEST_F(LevelRules, AFrameShowsTheSameViewAtEveryLevel) {
   SubmitFrame submit = Frame(1);
   submit.frame.clipping.slab = ClipSlab{.index = 20, .thickness = 8};

@@ -252,7 +252,7 @@ class StepwiseRenderer : public Renderer {
   };
   explicit StepwiseRenderer(Steps& steps) : steps_(steps) {}
 
-  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
+  Result<LocalImage> Render(BoxData&, const LevelBox&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
                             RankReport&) override {
     if (FrameBounds(setup).pixel_count() >= 64 * 64) {
       ForEachPiece(3, control, [this](std::int32_t) {

@@ -238,6 +238,50 @@ TEST_F(InPartsTest, LevelsChangeNeitherPlaceNorScale) {
   }
 }
 
+// Of one picture in perspective: the near side of the ball is drawn from the finest level, the far side from coarser ones.
+TEST_F(InPartsTest, LevelsOfOnePictureAreTheSameHoweverMuchIsHeldByHoweverManyWorkers) {
+  const std::string path = Zarr(ball_);
+  std::vector<FrameRequest> requests;
+  for (const char* const renderer : {"raycast", "mip", "xray"}) {
+    FrameRequest request = TestRequest(FindRenderer(renderer), 0);
+    request.view.projection = Projection::kPerspective;
+    request.view.fov_degrees = 50;
+    request.view.distance = 75;
+    request.detail = 3;
+    requests.push_back(request);
+    request.view.azimuth_degrees = 3;
+    request.clipping.box = ClipBox{{0, 0, 0}, {60, 100, 75}, ClipUnit::kVoxels};
+    requests.push_back(request);
+  }
+  std::vector<LocalImage> held;
+  constexpr std::uint64_t kNoLimit = 0;
+  Start(path, 1, kNoLimit);
+  for (const FrameRequest& request : requests) {
+    SCOPED_TRACE(request.renderer);
+    FrameRequest finest = request;
+    finest.level = "0";
+    const Result<Picture> mixed = Render(request), of_finest = Render(finest);
+    ASSERT_TRUE(mixed.ok() && of_finest.ok()) << mixed.status().message() << of_finest.status().message();
+    EXPECT_GT(HighestAlpha(mixed->image), 0.1);
+    const float difference = LargestDifference(mixed->image, of_finest->image, request.size);
+    EXPECT_GT(difference, AllowedDifference(request)) << "drawn from the finest level alone";
+    EXPECT_LT(difference, 0.35) << "a shift, or a hole";
+    held.push_back(mixed->image);
+  }
+  EXPECT_GT(client_->QueryStatus(seconds(30))->datasets.at(0).memory_bytes, 100U * 100 * 100) << "more than one level";
+  for (const int workers : {1, 3}) {
+    Start(path, workers);
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      for (const char* const decomposition : {"slab", "kd-tree"}) {
+        SCOPED_TRACE(testing::Message() << requests[i].renderer << ", " << workers << " workers, " << decomposition);
+        FrameRequest request = requests[i];
+        request.policy.decomposition = decomposition;
+        Expect(request, held[i], 0);
+      }
+    }
+  }
+}
+
 TEST_F(InPartsTest, LevelsThatFitAreHeld) {
   Start(Zarr(ball_), 1, std::uint64_t{1} << 20);  // 768 KiB for datasets
   FrameRequest request = TestRequest(VoxelRenderers().front(), 30);

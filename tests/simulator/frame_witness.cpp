@@ -86,7 +86,7 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
       tally_.Add(Count::kHiddenBoxes);
       continue;
     }
-    const std::pair<WorkerId, Box> padded{placement.worker, PaddedBox(placement.box, assignment.setup)};
+    const std::pair<WorkerId, Box> padded{placement.worker, PaddedBox(placement.at(), assignment.setup)};
     frame.padded_boxes.insert(padded);
     if (fetched_.count(padded) == 0) frame.all_cached = false;
   }

@@ -37,7 +37,7 @@ std::size_t RayVolume::bytes() const {
   return total;
 }
 
-std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera) {
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map) {
   std::vector<std::size_t> order(pieces.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (camera.projection == Projection::kOrthographic) {
@@ -45,12 +45,20 @@ std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Ca
     return order;
   }
   // A ray meets only pieces on one side of the eye, so the order between pieces on different sides does not matter.
+  const double eye = map.To(camera.eye.z, Axis::kZ);
   const auto distance = [&](std::size_t piece) {
     const Box& box = pieces[piece].voxels.box;
-    return std::abs(std::clamp(camera.eye.z, box.begin.z - 0.5, box.end.z - 0.5) - camera.eye.z);
+    return std::abs(std::clamp(eye, box.begin.z - 0.5, box.end.z - 0.5) - eye);
   };
   std::ranges::stable_sort(order, {}, distance);
   return order;
+}
+
+SampledRegion PartIn(const RayPiece& piece, std::span<const RayPiece> pieces, const Box& box, const GridMap& map) {
+  SampledRegion part = WholeBox(box);
+  if (&piece != &pieces.front()) part.low.z = std::max(part.low.z, map.From(piece.voxels.box.begin.z - 0.5, Axis::kZ));
+  if (&piece != &pieces.back()) part.high.z = std::min(part.high.z, map.From(piece.voxels.box.end.z - 0.5, Axis::kZ));
+  return part;
 }
 
 }  // namespace slabstream

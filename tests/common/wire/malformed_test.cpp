@@ -155,7 +155,7 @@ TEST(Malformed, ARefusalIsOneLineWhateverItQuotes) {
 }
 
 TEST(Malformed, EveryTextIsBounded) {
-  constexpr std::size_t kTooLong = std::max(kMaxTextBytes, kMaxDataItemBytes) + 1;
+  constexpr std::size_t kTooLong = std::max({kMaxTextBytes, kMaxDataItemBytes, kMaxSourceBytes}) + 1;
   AlterEachField(
       [&](const Place& place) {
         if (place.field->cpp_type() != FieldDescriptor::CPPTYPE_STRING || !IsItem(place)) return false;
@@ -183,6 +183,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"opacities", kMaxTransferPoints},
       {"lights", kMaxLights},
       {"placements", kMaxRanks},
+      {"coarser", kMaxLevels - 1},
       {"peers", kMaxPeers},
       {"reports", kMaxReports},
       {"spans", kMaxSpans},

@@ -105,6 +105,23 @@ GroupAssignment WithLayers() {
   return message;
 }
 
+GroupAssignment OfLevels() {
+  GroupAssignment message = Assignment(3, {}, FindRenderer("raycast"));
+  FrameSetup& setup = message.setup;
+  setup.stored = StoredAt{"/data/scan.ome.zarr?t=3", 1, kMax64, {{0, 0, 0}, {64, 64, 1}}};
+  VolumeDescription coarser = setup.description;
+  for (const Axis axis : kAxes) {
+    coarser.geometry.size[axis] = (coarser.geometry.size[axis] + 1) / 2;
+    coarser.geometry.orientation.origin =
+        coarser.geometry.orientation.origin +
+        0.5 * coarser.geometry.spacing[axis] * coarser.geometry.orientation.axes[std::size_t(Number(axis))];
+    coarser.geometry.spacing[axis] *= 2;
+  }
+  setup.coarser = {{kMax64 - 1, coarser, setup.stored}, {1, coarser}};
+  for (std::size_t rank = 0; rank < 3; ++rank) message.group.placements[rank].level = std::uint8_t(rank);
+  return message;
+}
+
 GroupAssignment WithSurfaces() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
   message.setup.transfer.isosurfaces = ManySurfaces();
@@ -166,7 +183,8 @@ std::vector<GroupAssignment> SamplesOf() {
           BehindOthers(),
           Clipped(),
           WithSurfaces(),
-          WithLayers()};
+          WithLayers(),
+          OfLevels()};
 }
 
 template <>
