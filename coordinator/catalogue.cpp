@@ -316,6 +316,7 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     const Result<bool> changed = HaveChanged(*stamp);
     if (!changed.ok() || *changed || !version.ok()) continue;
     if (!survey.ok()) return survey.status();
+    WarnOfChannel(parsed->path, parsed->options, FileInfoOf(info));
     // Other processes may run in other folders.
     const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
     return std::optional(OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});

@@ -17,6 +17,7 @@
 #include "client/cli/progress_bar.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 #include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
@@ -41,6 +42,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadC
   if (FindSourceFormat(source.path, source.options) != nullptr) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
+    WarnOfChannel(source.path, source.options, FileInfoOf((*opened)->info()));
     return opened;
   }
   if (Status status = CheckInputVolume(source); !status.ok()) return status;

@@ -152,14 +152,16 @@ std::string PartsText(const SourceInfo& info) {
     text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
                         spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
   }
-  if (!info.channels.empty()) {
-    text += fmt::format("channels     {}:", info.channels.size());
-    for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
-    text += '\n';
-  }
   if (info.times > 1) text += fmt::format("times        {}\n", info.times);
   if (info.window) text += fmt::format("window       {:g} ... {:g}, which the file asks for\n", info.window->min, info.window->max);
   return text;
+}
+
+std::string ChannelsText(const VolumeFileInfo& info) {
+  if (info.channels.empty()) return "";
+  std::string text = fmt::format("channels     {}:", info.channels.size());
+  for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
+  return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
 }
 
 std::string InfoText(const VolumeFacts& facts, const std::string& transfer, double occupancy) {
@@ -175,6 +177,7 @@ std::string InfoText(const VolumeFacts& facts, const std::string& transfer, doub
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
   text += OrientationText(facts);
   if (facts.parts) text += PartsText(facts.parts->source->info());
+  text += ChannelsText(info);
   text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
@@ -251,7 +254,6 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
                               {"voxel_bytes", level.description.voxel_bytes()},
                               {"block", IndexJson(level.block)}});
   }
-  json["channels"] = info.channels;
   json["times"] = info.times;
   if (info.window) json["window"] = RangeJson(*info.window);
   json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
@@ -277,6 +279,8 @@ std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, doub
                                  {"type", NameOf(d.type)},
                                  {"file_type", info.file_type},
                                  {"labels", info.labels},
+                                 {"channels", info.channels},
+                                 {"channel", info.channel},
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                  {"spacing", VectorJson(d.geometry.spacing)},

@@ -11,9 +11,11 @@
 #include <system_error>
 #include <utility>
 
+#include "common/base/log.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -65,11 +67,21 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .format = source.format,
           .stored_size = finest.geometry.size,
           .steps = StepsOf(finest.geometry.spacing),
-          .labels = source.labels};
+          .labels = source.labels,
+          .channels = source.channels,
+          .channel = source.channel};
+}
+
+void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info) {
+  if (const auto text = ShownChannelText(path, info.channels, info.channel, options)) LogWarning(*text);
 }
 
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
-  if (IsReadWhole(path, options)) return ReadVolume(path, options);
+  if (IsReadWhole(path, options)) {
+    Result<LoadedVolume> loaded = ReadVolume(path, options);
+    if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
+    return loaded;
+  }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();
   if (options.progress != nullptr) options.progress->Begin(100);
@@ -78,7 +90,9 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
     if (options.progress != nullptr) options.progress->Add(percent - std::exchange(told, percent));
   });
   if (!volume.ok()) return volume.status();
-  return LoadedVolume{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  LoadedVolume loaded{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  WarnOfChannel(path, options, loaded.info);
+  return loaded;
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {

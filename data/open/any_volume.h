@@ -25,7 +25,10 @@ Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
 // Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
 VolumeFileInfo FileInfoOf(const SourceInfo& source);
 
-// ReadVolume, or the finest level of a source.
+// Logs a line if this is one of several channels, and the options do not say which.
+void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info);
+
+// ReadVolume, or the finest level of a source; and WarnOfChannel.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
 // CheckVolumeHeaders, or the files of a source, which it opens.
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});

@@ -37,6 +37,7 @@ struct SourceInfo {
   std::string file_type;                   // of samples as they are stored: "int16"
   bool labels = false;                     // samples are numbers of structures, not measurements
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
+  int channel = 0;                         // which of them it shows
   int times = 1;                           // that the source holds, of which it shows one
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
