@@ -96,7 +96,10 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const DatasetTable::Entry& entry = *datasets.Find(use.entry);
   if (entry.state == DatasetState::kReady && entry.levels == nullptr) {
     DatasetReady ready{.dataset = entry.id, .summary = entry.summary, .seen = entry.checks.IsOver(use.check)};
-    if (IsLevelName(use.entry)) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+    if (IsLevelName(use.entry)) {
+      ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+      ready.level = NumberOfLevel(use.entry);
+    }
     news.uses[id] = std::move(ready);
   } else {
     news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};

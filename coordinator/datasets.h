@@ -34,6 +34,7 @@ using LoadId = std::uint32_t;
 inline std::string LevelName(const std::string& name, int level) { return name + '\n' + std::to_string(level); }
 inline bool IsLevelName(const std::string& name) { return name.find('\n') != std::string::npos; }
 inline std::string DatasetOfLevel(const std::string& name) { return name.substr(0, name.find('\n')); }
+inline int NumberOfLevel(const std::string& name) { return std::stoi(name.substr(name.find('\n') + 1)); }
 
 class DatasetTable {
  public:

@@ -61,7 +61,7 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
       ready.finest ? AtLevel(asked, *ready.finest, ready.summary->description.geometry) : asked, ready.dataset, ready.summary);
   if (!resolved.ok()) return resolved.status();
   if (resolved->summary->stored) request.uses_occupancy = request.needs_occupancy = false;  // nobody counts what nobody holds
-  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
+  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen, ready.level};
   return Status::Ok();
 }
 

@@ -77,6 +77,7 @@ struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
   std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
+  int level = 0;                              // which one
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

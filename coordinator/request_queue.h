@@ -46,6 +46,7 @@ struct OpenRequest {
   struct HasDataset {
     std::shared_ptr<const ResolvedRequest> resolved;  // never null
     bool seen = false;                                // DatasetReady::seen: its frame may begin
+    int level = 0;                                    // DatasetReady::level
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
   };

@@ -354,7 +354,14 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = planned_->prediction};
+                             .predicted = planned_->prediction,
+                             .levels = {LevelUse{.level = std::uint32_t(request_.dataset()->level)}}};
+  for (const GroupPlan& group : plan_.groups) {
+    for (const Placement& placement : group.placements) {
+      ++statistics.levels.front().boxes;
+      statistics.levels.front().voxels += std::uint64_t(placement.box.voxel_count());
+    }
+  }
   const auto append = [&](const std::vector<RankReport>& reports) {
     std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };
