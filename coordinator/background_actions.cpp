@@ -148,6 +148,7 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 // The levels of a source, or its only one.
 BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, OpenedSource opened) {
   const std::vector<SourceLevel>& levels = opened.source->info().levels;
+  (void)opened.source->TakeStoredBytes();  // the survey's, which belong to no frame
   std::vector<DataSource> sources;
   auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
@@ -179,6 +180,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, tell);
     if (!volume.ok()) return volume.status();
     samples.volume = *volume;
+    samples.read_from = at.source;
     summary = at.surveyed_level ? *at.surveyed : Summarize(**volume);
     summary.range = at.surveyed->range;
     summary.histogram = at.surveyed->histogram;

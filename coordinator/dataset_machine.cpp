@@ -113,7 +113,10 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
       ready.coarser.push_back({entry.id, entry.summary});
     }
   }
-  if (use.map != nullptr) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+  if (use.map != nullptr) {
+    ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+    ready.levels = use.map->levels;
+  }
   if (use.map != nullptr && !use.map->one_level()) ready.map = use.map;
   news.uses[id] = std::move(ready);
 }

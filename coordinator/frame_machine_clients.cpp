@@ -64,7 +64,7 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   resolved->coarser = ready.coarser;
   // Nobody counts what nobody holds, nor what is drawn from several levels.
   if (resolved->summary->stored || resolved->map != nullptr) request.uses_occupancy = request.needs_occupancy = false;
-  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
+  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen, ready.levels};
   return Status::Ok();
 }
 

@@ -81,6 +81,7 @@ struct DatasetReady {
   // If the picture is drawn from several of them: which parts, and those beside this one (ResolvedRequest).
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
+  std::vector<int> levels = {0};  // their numbers, finest first
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

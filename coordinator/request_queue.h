@@ -47,6 +47,7 @@ struct OpenRequest {
   struct HasDataset {
     std::shared_ptr<const ResolvedRequest> resolved;  // never null
     bool seen = false;                                // DatasetReady::seen: its frame may begin
+    std::vector<int> levels = {0};                    // DatasetReady::levels
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
     // The voxels that its frame is drawn from: the volume first.

@@ -354,7 +354,16 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = planned_->prediction};
+                             .predicted = planned_->prediction,
+                             .levels = {}};
+  for (const int level : request_.dataset()->levels) statistics.levels.push_back({.level = std::uint32_t(level)});
+  for (const GroupPlan& group : plan_.groups) {
+    for (const Placement& placement : group.placements) {
+      LevelUse& use = statistics.levels[placement.level];
+      ++use.boxes;
+      use.voxels += std::uint64_t(VoxelsOf(placement.at(), plan_.setup).voxel_count());
+    }
+  }
   const auto append = [&](const std::vector<RankReport>& reports) {
     std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };

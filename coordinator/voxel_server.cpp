@@ -158,6 +158,7 @@ void VoxelServer::Answer(const Incoming& incoming) {
   }
   Reply(incoming.identity, request, Guarded("chunk request", [&]() -> Result<std::pair<Chunk, Bytes>> {
           Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+          if (samples.read_from != nullptr) chunk.stored_bytes = samples.read_from->TakeStoredBytes();
           Result<Bytes> cut = IsCellChunk(request.chunk)
                                   ? CutCells(samples, request, chunk)
                                   : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
@@ -180,6 +181,7 @@ void VoxelServer::ReadNext() {
                auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
                  if (!samples.ok()) return samples.status();
                  Chunk chunk{.epoch = epoch, .dataset = asked.request.dataset, .box = asked.request.box, .chunk = asked.request.chunk};
+                 chunk.stored_bytes = asked.from.source->TakeStoredBytes();
                  Bytes payload = PackChunk(*std::move(samples), codec, chunk);
                  return std::pair(chunk, std::move(payload));
                });

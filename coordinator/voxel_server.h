@@ -49,6 +49,7 @@ class VoxelServer {
       int level = 0;
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
+    std::shared_ptr<VolumeSource> read_from = nullptr;  // of `volume`, if chunks tell what was read of it
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().

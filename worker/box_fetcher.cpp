@@ -192,6 +192,7 @@ void BoxFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actio
     return;
   }
   request.storing = true;
+  padded->report.stored_bytes += chunk.stored_bytes;
   actions.push_back(StoreChunk{padded->key, chunk, std::move(payload)});
 }
 

@@ -147,6 +147,7 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   if (job.job.waited) {
     const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
     report.voxel_bytes = fetched.voxel_bytes;
+    report.stored_bytes = fetched.stored_bytes;
     if (fetched.voxel_bytes > 0) {
       AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
     }

@@ -59,11 +59,12 @@ struct StoredVoxels::Shared {
     });
   }
 
-  void Deliver(const ChunkRequest& request, Result<Bytes> samples) {
+  void Deliver(const ChunkRequest& request, VolumeSource& source, Result<Bytes> samples) {
     MessageReceived message;
     const Status packed = Guarded("a chunk of voxels", [&] {
       if (!samples.ok()) return samples.status();
       Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+      chunk.stored_bytes = source.TakeStoredBytes();
       message.payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
       message.message = chunk;
       return Status::Ok();
@@ -71,7 +72,10 @@ struct StoredVoxels::Shared {
     if (!packed.ok()) message.message = ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, packed};
     const std::lock_guard lock(mutex);
     const auto asked = reading.extract({request.dataset, request.box, request.chunk});
-    for (int i = 0; deliver && i < asked.mapped(); ++i) deliver(message);
+    for (int i = 0; deliver && i < asked.mapped(); ++i) {
+      deliver(message);
+      if (auto* chunk = std::get_if<Chunk>(&message.message)) chunk->stored_bytes = 0;  // told once
+    }
   }
 };
 
@@ -96,7 +100,7 @@ bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored) {
   }
   const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);
   ReadPart(source, stored.level, request.box, part.begin, part.bytes,
-           [shared = shared_, request](Result<Bytes> samples) { shared->Deliver(request, std::move(samples)); });
+           [shared = shared_, request, source](Result<Bytes> samples) { shared->Deliver(request, *source, std::move(samples)); });
   return true;
 }
 

@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/convert_source.h"
 #include "client/cli/convert_to_zarr.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
+#include "data/survey/survey.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -39,6 +42,16 @@ std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const Loade
   return stored && FileSamples::Of(*loaded.volume, stored).ok() ? stored : std::nullopt;
 }
 
+// A box of a level, or the whole volume.
+Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source) {
+  if (!options.converts_part()) return ReadInputVolume(source);
+  const Result<std::shared_ptr<VolumeSource>> part = OpenToConvert(options, source, {});
+  if (!part.ok()) return part.status();
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**part, 0);
+  if (!volume.ok()) return AsInput(volume.status());
+  return LoadedVolume{.info = FileInfoOf((*part)->info()), .volume = *std::move(volume)};
+}
+
 }  // namespace
 
 Status RunConvert(const ConvertOptions& options) {
@@ -53,7 +66,9 @@ Status RunConvert(const ConvertOptions& options) {
     if (options.type && !needs_type) return Status::InvalidArgument("--type: an OME-Zarr keeps the type of SOURCE");
     return ConvertToZarr(options, *source);
   }
-  if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+  if (!options.converts_part()) {
+    if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+  }
   const VolumeFormat* const to = FindWritableFormat(options.output);
   if (to == nullptr) {
     return Status::InvalidArgument(fmt::format("OUTPUT '{}' must end in one of {}, .zarr", options.output, WritableEndings()));
@@ -63,7 +78,7 @@ Status RunConvert(const ConvertOptions& options) {
 
   ProgressBar bar(options.progress, 1);
   bar.Show(0, "reading " + source->path);
-  const Result<LoadedVolume> loaded = ReadInputVolume(*source);
+  const Result<LoadedVolume> loaded = Read(options, *source);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
   if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;

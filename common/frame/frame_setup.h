@@ -113,11 +113,13 @@ inline GridMap MapTo(const FrameSetup& setup, std::uint8_t level) {
   return MapBetween(setup.description.geometry, GeometryOf(setup, level));
 }
 
-// Voxels that a worker must hold to render `at`, in those of its level: the ones that cover the box, and their halo, cut to the volume.
+// The voxels of its level that cover `at`.
+inline Box VoxelsOf(const LevelBox& at, const FrameSetup& setup) {
+  return at.level == 0 ? at.box : CoveringVoxels(at.box, MapTo(setup, at.level), GeometryOf(setup, at.level).size);
+}
+// Voxels of its level that a worker must hold to render `at`: with their halo, cut to the volume.
 inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup) {
-  const VolumeGeometry& geometry = GeometryOf(setup, at.level);
-  const Box voxels = at.level == 0 ? at.box : CoveringVoxels(at.box, MapTo(setup, at.level), geometry.size);
-  return Grown(voxels, setup.halo, geometry.bounds());
+  return Grown(VoxelsOf(at, setup), setup.halo, GeometryOf(setup, at.level).bounds());
 }
 
 }  // namespace slabstream

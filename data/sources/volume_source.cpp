@@ -12,4 +12,12 @@ Status VolumeSource::ReadNow(int level, const Box& box, std::span<std::byte> out
   return read.get();
 }
 
+std::uint64_t VolumeSource::TakeStoredBytes() {
+  const std::uint64_t now = counts().stored_bytes;
+  std::uint64_t taken = taken_bytes_;
+  while (taken < now && !taken_bytes_.compare_exchange_weak(taken, now)) {
+  }
+  return taken < now ? now - taken : 0;
+}
+
 }  // namespace slabstream

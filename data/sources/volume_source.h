@@ -8,6 +8,7 @@
 // Any thread may call a source. It answers on threads of its own (ReadContext).
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -66,6 +67,11 @@ class VolumeSource {
     std::uint64_t stored_bytes = 0, chunks = 0;
   };
   virtual Counts counts() const = 0;
+  // The part of counts().stored_bytes that no call before has returned.
+  std::uint64_t TakeStoredBytes();
+
+ private:
+  std::atomic<std::uint64_t> taken_bytes_ = 0;
 };
 
 }  // namespace slabstream

@@ -85,6 +85,55 @@ TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {
                             });
 }
 
+TEST_F(InPartsTest, StatisticsAndRecordsTellLevelsAndBytes) {
+  const std::string levels = MakeLevels();
+  std::uintmax_t size = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(Path(levels)))
+    size += entry.is_regular_file() ? entry.file_size() : 0;
+  MustRun({"turntable", levels, "--local=1", "-o", "f_%04d.png", "--frames", "2", "--in-flight", "1", "--size", "64", "--level", "1",
+           "--stats", "stats.json"});
+  const json stats = json::parse(ReadFile("stats.json"));
+  for (const json& frame : stats["frames"]) {
+    ASSERT_EQ(frame["levels"].size(), 1U);
+    EXPECT_EQ(frame["levels"][0]["level"], 1);
+    EXPECT_GE(frame["levels"][0]["boxes"], 1);
+    EXPECT_GT(frame["levels"][0]["voxels"], 0);
+    EXPECT_LE(frame["levels"][0]["voxels"], 65 * 65 * 65);
+  }
+  EXPECT_GT(stats["frames"][0]["bytes"]["stored"], 0) << "the coordinator reads the level for the first frame";
+  EXPECT_LE(stats["bytes"]["stored"], size) << "packed as they lie in the file";
+  EXPECT_EQ(stats["frames"][1]["bytes"]["stored"], 0) << "and holds it for the second one";
+  EXPECT_EQ(json::parse(MustRun({"info", "f_0000.png", "--json"}).out)["levels"], json::array({1}));
+  EXPECT_THAT(MustRun({"info", "f_0000.png"}).out, HasSubstr("drawn from"));
+
+  MakeLarge("large.nrrd");
+  MustRun({"render", "large.nrrd", "--local=1", "--memory", "768M", "--renderer", "mip", "--zoom", "8", "--size", "64", "-o", "l.png",
+           "--stats", "stats.json"});
+  const json in_parts = json::parse(ReadFile("stats.json"));
+  EXPECT_EQ(in_parts["frames"][0]["levels"][0]["level"], 0);
+  EXPECT_GT(in_parts["bytes"]["stored"], 0) << "a worker reads it";
+  EXPECT_FALSE(json::parse(MustRun({"info", "l.png", "--json"}).out).contains("levels")) << "level 0 alone";
+}
+
+TEST_F(InPartsTest, ConvertWritesALevelOrABoxOfIt) {
+  const std::string levels = MakeLevels();
+  MustRun({"convert", levels, "part.nrrd", "--level", "1", "--box", "10:20,:5,60:"});
+  const json whole = json::parse(MustRun({"info", levels, "--json"}).out)["levels"][1];
+  const json part = json::parse(MustRun({"info", "part.nrrd", "--json"}).out);
+  EXPECT_EQ(part["size"], json::array({10, 5, 5}));
+  EXPECT_EQ(part["spacing"], whole["spacing"]);
+  MustRun({"convert", levels, "part.ome.zarr", "--level", "1", "--box", "10:20,:5,60:"});
+  EXPECT_EQ(json::parse(MustRun({"info", "part.ome.zarr", "--json"}).out)["histogram"], part["histogram"]);
+  ExpectEachRefused({"convert", levels, "no.nrrd"}, {
+                                                        {{"--level", "3"}, "has levels 0 to 2"},
+                                                        {{"--level", "1", "--box", "0:66,:,:"}, "x from 0 to 66"},
+                                                        {{"--box", "5:5,:,:"}, "x from 5 to 5"},
+                                                        {{"--box", "5:9"}, "X0:X1,Y0:Y1,Z0:Z1"},
+                                                        {{"--box", "a:9,:,:"}, "--box"},
+                                                    });
+  ExpectEachRefused({"convert", "ball.nrrd", "no.nrrd"}, {{{"--level", "1"}, "has level 0 alone"}});
+}
+
 TEST_F(InPartsTest, ADamagedChunkEndsInOneLineThatNamesIt) {
   const std::string levels = MakeLevels();
   int damaged = 0;

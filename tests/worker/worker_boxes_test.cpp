@@ -139,6 +139,23 @@ TEST_F(WorkerBoxesTest, KeepsBoxesForTheNextFrame) {
   EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second)[0]))[0].reports.at(0).voxel_bytes, 0U);
 }
 
+TEST_F(WorkerBoxesTest, ReportsAddUpWhatWasReadFromStores) {
+  const auto requests = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
+  ASSERT_THAT(requests, SizeIs(2));
+  Actions last;
+  for (const SendChunkRequest& request : requests) {
+    Chunk chunk = Answer(request.request);
+    chunk.stored_bytes = 1000;
+    const auto stores = All<StoreChunk>(Tell(chunk));
+    ASSERT_THAT(stores, SizeIs(1));
+    last = Tell(ChunkStored{stores[0].padded, chunk.box, chunk.chunk, {}});
+  }
+  ASSERT_THAT(All<StartRender>(last), SizeIs(1));
+  EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(last)[0])).at(0).reports.at(0).stored_bytes, 2000U);
+  const Actions second = Tell(Assignment(2, {kSelf}));
+  EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second).at(0)))[0].reports.at(0).stored_bytes, 0U) << "all was cached";
+}
+
 TEST_F(WorkerBoxesTest, ALargerHaloReplacesTheBoxOnceItIsCopied) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
   Rendered(first.at(0));

@@ -25,7 +25,8 @@ RankReport FullReport() {
   RankReport report{.worker = kMax32, .group = 1023, .rank = 65535, .box = kMax32};
   for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
   for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
-  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = kMax64;
+  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = report.stored_bytes =
+      kMax64;
   report.image_bounds = {0, 1, 16384, 16384};
   return report;
 }
@@ -326,6 +327,7 @@ std::vector<FrameReply> SamplesOf() {
                                    kLongName, kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   FrameStatistics predicted = statistics;
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
+  predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
@@ -381,6 +383,7 @@ std::vector<StatusReply> SamplesOf() {
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
+  full.datasets[2].levels = {Description(), Description()};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
   full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};
   return {{}, full};

@@ -182,6 +182,18 @@ TEST(ChunkedSourceTest, ChunksArriveInAnyOrder) {
   }
 }
 
+TEST(ChunkedSourceTest, StoredBytesAreTakenOnce) {
+  const auto source = SourceOf(SmallCube(), Context({.decode_threads = 1, .cache_bytes = 0}));
+  std::vector<std::byte> out(512);
+  EXPECT_EQ(source->TakeStoredBytes(), 0U);
+  ASSERT_TRUE(source->ReadNow(0, kCube, out).ok());
+  EXPECT_EQ(source->TakeStoredBytes(), 56U);
+  EXPECT_EQ(source->TakeStoredBytes(), 0U);
+  ASSERT_TRUE(source->ReadNow(0, kCube, out).ok());
+  EXPECT_EQ(source->TakeStoredBytes(), 56U);
+  EXPECT_EQ(source->counts().stored_bytes, 112U);
+}
+
 TEST(ChunkedSourceTest, ChunksAreAskedForInTheOrderOfTheStore) {
   const std::shared_ptr<MemoryArray> array = SmallCube();
   const auto source = *MakeChunkedSource("cube", {.levels = {{.array = array, .axes = {0, 2, 1}, .at = {0, 0, 0}}}}, Context());

@@ -1,0 +1,57 @@
+#include "client/cli/convert_source.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+#include <vector>
+
+#include "client/cli/input_volume.h"
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+#include "data/sources/memory_source.h"
+#include "data/sources/part_source.h"
+
+namespace slabstream {
+namespace {
+
+Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadContext::Limits& limits) {
+  if (FindSourceFormat(source.path, source.options) != nullptr) {
+    Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
+    if (!opened.ok()) return AsInput(opened.status());
+    WarnOfChannel(source.path, source.options, FileInfoOf((*opened)->info()));
+    return opened;
+  }
+  if (Status status = CheckInputVolume(source); !status.ok()) return status;
+  Result<std::vector<std::string>> files = CheckVolumeHeaders(source.path, source.options);
+  if (!files.ok()) return AsInput(files.status());
+  const Result<LoadedVolume> loaded = ReadInputVolume(source);
+  if (!loaded.ok()) return loaded.status();
+  const VolumeFileInfo& info = loaded->info;
+  return MakeMemorySource(loaded->volume,
+                          {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)});
+}
+
+}  // namespace
+
+Result<std::shared_ptr<VolumeSource>> OpenToConvert(const ConvertOptions& options, const SourceText& source,
+                                                    const ReadContext::Limits& limits) {
+  Result<std::shared_ptr<VolumeSource>> opened = Open(source, limits);
+  if (!opened.ok() || !options.converts_part()) return opened;
+  const std::vector<SourceLevel>& levels = (*opened)->info().levels;
+  if (std::size_t(options.level) >= levels.size()) {
+    return Status::InvalidArgument(
+        levels.size() == 1 ? fmt::format("--level is {}, but '{}' has level 0 alone", options.level, source.path)
+                           : fmt::format("--level is {}, but '{}' has levels 0 to {}", options.level, source.path, levels.size() - 1));
+  }
+  const Index3& size = levels[std::size_t(options.level)].description.geometry.size;
+  Box box = options.box;
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    if (box.end[axis] == 0) box.end[axis] = size[axis];
+    if (box.begin[axis] < box.end[axis] && box.end[axis] <= size[axis]) continue;
+    return Status::InvalidArgument(fmt::format("--box: {} from {} to {}, but level {} of '{}' has {} voxels there", Letter(axis),
+                                               box.begin[axis], box.end[axis], options.level, source.path, size[axis]));
+  }
+  return MakePartSource(*std::move(opened), options.level, box);
+}
+
+}  // namespace slabstream
