@@ -88,7 +88,7 @@ Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels) {
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
-  const double most = request.detail * LeastPixel(setup->camera, overview);
+  const double most = (request.detail == 0 ? 1 : request.detail) * LeastPixel(setup->camera, overview);
   int level = 0;
   for (int next = 1; next < count && CoarseSpacing(finest, levels.levels[std::size_t(next)].geometry) <= most; ++next) level = next;
   return level;
@@ -102,8 +102,10 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
     if (!view.eye && view.distance == 0) {
       view.distance = BoundingRadius(finest) / std::sin(view.fov_degrees * (std::numbers::pi / 360));
     }
-  } else if (!view.fit) {
-    view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
+  } else {
+    const Vec3 centre = level.orientation.FromWorld(level.ToWorld(level.centre()) - finest.orientation.origin) / finest.spacing;
+    view.distance = MakeCamera(view, request.size, finest).Project(centre).depth;
+    if (!view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);
