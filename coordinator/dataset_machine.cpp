@@ -96,7 +96,10 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const DatasetTable::Entry& entry = *datasets.Find(use.entry);
   if (entry.state == DatasetState::kReady && entry.levels == nullptr) {
     DatasetReady ready{.dataset = entry.id, .summary = entry.summary, .seen = entry.checks.IsOver(use.check)};
-    if (IsLevelName(use.entry)) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
+    if (IsLevelName(use.entry)) {
+      ready.levels = datasets.Find(use.request->dataset)->levels;
+      ready.level = NumberOfLevel(use.entry);
+    }
     news.uses[id] = std::move(ready);
   } else {
     news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
@@ -177,7 +180,8 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   }
   if (datasets.bytes() <= share) return;
   // All that are loaded are in use. What came last goes, with its requests.
-  const Status full = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status too_large = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status full(too_large.code(), too_large.message() + "; an .ome.zarr, as slabstream convert makes it, is read in parts");
   Lose(event.name, full, &RefusedRequests::too_large);
   UnloadOne();
 }

@@ -33,6 +33,7 @@ using LoadId = std::uint32_t;
 // The entry of a level. No dataset of a catalogue has such a name.
 inline std::string LevelName(const std::string& name, int level) { return name + '\n' + std::to_string(level); }
 inline bool IsLevelName(const std::string& name) { return name.find('\n') != std::string::npos; }
+inline int NumberOfLevel(const std::string& name) { return std::stoi(name.substr(name.find('\n') + 1)); }  // of a LevelName
 inline std::string DatasetOfLevel(const std::string& name) { return name.substr(0, name.find('\n')); }
 
 class DatasetTable {

@@ -24,6 +24,7 @@
 #include "common/base/bytes.h"
 #include "common/base/log.h"
 #include "common/base/status.h"
+#include "common/planning/levels.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/peer_token.h"
 
@@ -76,7 +77,9 @@ struct DatasetAwaited {
 struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
-  std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
+  // Of a dataset with several levels; null: it has one. The voxels are those of `level` (AtLevel).
+  std::shared_ptr<const VolumeLevels> levels = nullptr;
+  int level = 0;
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

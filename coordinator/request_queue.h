@@ -10,6 +10,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -28,8 +29,7 @@ struct PlanAsked {
   std::uint64_t version = 0;
 };
 struct PlanMade {
-  std::shared_ptr<const PlannedFrame> frame;
-  int fit = 1;  // such frames fit the workers' memory at a time (FramesThatFit), >= 1
+  std::shared_ptr<const PlannedFrame> frame;  // which fits
   std::uint64_t version = 0;
 };
 
@@ -37,7 +37,9 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
-  UseId use = 0;                 // of its dataset
+  UseId use = 0;             // of its dataset
+  std::string lowered = {};  // FrameStatistics::lowered
+  // Once it has its dataset.
   bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
   bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
 
@@ -46,6 +48,8 @@ struct OpenRequest {
   struct HasDataset {
     std::shared_ptr<const ResolvedRequest> resolved;  // never null
     bool seen = false;                                // DatasetReady::seen: its frame may begin
+    std::shared_ptr<const VolumeLevels> levels;       // DatasetReady::levels and level
+    int level = 0;
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
   };

@@ -30,7 +30,7 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
     : id_(id),
       request_(std::move(request)),
       planned_(request_.plan<PlanMade>()->frame),
-      fit_(request_.plan<PlanMade>()->fit),
+      fit_(*request_.plan<PlanMade>()->frame->fit),
       plan_(planned_->plan),
       roster_(planned_->asked.roster),
       limits_(limits),
@@ -354,7 +354,8 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = planned_->prediction};
+                             .predicted = planned_->prediction,
+                             .lowered = request_.lowered};
   const auto append = [&](const std::vector<RankReport>& reports) {
     std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };

@@ -62,6 +62,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Any(m.display, &P::display, &P::set_display);
   io.Message("grid", m.grid, &P::grid, &P::mutable_grid);
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
+  io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
 }
 
 void Fields(auto& io, Is<PictureGeometry> auto& m) {

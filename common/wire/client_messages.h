@@ -74,6 +74,7 @@ struct FrameStatistics {
   std::uint32_t display = 0;                                                  // worker
   PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
   std::optional<FramePrediction> predicted;                                   // if the policy left a choice
+  std::string lowered;  // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 

@@ -67,6 +67,7 @@ class Statistics:
     frame_seconds: float         # from the plan to the last byte at the coordinator
     latency_seconds: float       # from submit() to the last byte here
     worker_seconds: dict[str, float]  # worker time by stage, summed over all of them
+    lowered: str                 # with detail="auto": which coarser level was drawn, and why; else empty
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 
@@ -114,6 +115,7 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
         frame_seconds=(message.end_ns - message.begin_ns) * 1e-9,
         latency_seconds=latency_seconds,
         worker_seconds=stages,
+        lowered=message.lowered,
         message=message,
     )
 
