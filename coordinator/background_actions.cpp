@@ -147,7 +147,8 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
 
 // The levels of a source, or its only one.
 BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, OpenedSource opened) {
-  const std::vector<SourceLevel>& levels = opened.source->info().levels;
+  const SourceInfo& info = opened.source->info();
+  const std::vector<SourceLevel>& levels = info.levels;
   (void)opened.source->TakeStoredBytes();  // the survey's, which belong to no frame
   std::vector<DataSource> sources;
   auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
@@ -155,7 +156,7 @@ BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, Opene
     described->levels.push_back(levels[level].description);
     SourceAtLevel at{.source = opened.source,
                      .surveyed = opened.survey.summary,
-                     .stored = {opened.text, int(level), opened.version, {{0, 0, 0}, levels[level].block}},
+                     .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
                      .stamp = opened.stamp};
     if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
@@ -178,10 +179,16 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
   VolumeSummary summary;
   if (with_coarser <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, tell);
-    if (!volume.ok()) return volume.status();
-    samples.volume = *volume;
-    samples.read_from = at.source;
-    summary = at.surveyed_level ? *at.surveyed : Summarize(**volume);
+    // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
+    const Result<bool> changed = volume.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
+    if (!volume.ok() && (!changed.ok() || !*changed)) return volume.status();
+    if (volume.ok()) {
+      samples.volume = *volume;
+      samples.read_from = at.source;
+    }
+  }
+  if (samples.volume != nullptr) {
+    summary = at.surveyed_level ? *at.surveyed : Summarize(*samples.volume);
     summary.range = at.surveyed->range;
     summary.histogram = at.surveyed->histogram;
     summary.non_finite = at.surveyed->non_finite;

@@ -311,15 +311,14 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     const Result<FileStamp> stamp = StampFiles(info.files);
     if (!stamp.ok()) return stamp.status();
     AwaitRest(*stamp);
-    const Result<std::uint64_t> version = VersionOf(info.files);
     Result<Survey> survey = SurveySource(**source, tell);
     const Result<bool> changed = HaveChanged(*stamp);
-    if (!changed.ok() || *changed || !version.ok()) continue;
+    if (!changed.ok() || *changed) continue;
     if (!survey.ok()) return survey.status();
     WarnOfChannel(parsed->path, parsed->options, FileInfoOf(info));
     // Other processes may run in other folders.
     const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
-    return std::optional(OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
+    return std::optional(OpenedSource{*std::move(source), *std::move(survey), place, std::make_shared<const FileStamp>(*stamp)});
   }
   return BeingWritten(data);
 }

@@ -69,8 +69,7 @@ void CheckFiles(FoundData& found);
 struct OpenedSource {
   std::shared_ptr<VolumeSource> source;
   Survey survey;
-  std::string text;           // where workers find it
-  std::uint64_t version = 0;  // VersionOf its files
+  std::string text;  // where workers find it
   std::shared_ptr<const FileStamp> stamp;
 };
 // Does not change between the two stamps that it takes, as LoadSource. Errors of OpenSource and SurveySource.

@@ -114,8 +114,8 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
     }
   }
   if (use.map != nullptr) {
-    ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
-    ready.levels = use.map->levels;
+    ready.levels = datasets.Find(use.request->dataset)->levels;
+    ready.drawn = use.map->levels;
   }
   if (use.map != nullptr && !use.map->one_level()) ready.map = use.map;
   news.uses[id] = std::move(ready);
@@ -198,7 +198,8 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   }
   if (datasets.bytes() <= share) return;
   // All that are loaded are in use. What came last goes, with its requests.
-  const Status full = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status too_large = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status full(too_large.code(), too_large.message() + "; an .ome.zarr, as slabstream convert makes it, is read in parts");
   Lose(event.name, full, &RefusedRequests::too_large);
   UnloadOne();
 }

@@ -121,6 +121,15 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   return entry.layout;
 }
 
+bool LayoutTable::HasMade(const Request& request) {
+  Key key = KeyOf(request, true);
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock && std::ranges::any_of(entries_, [&](const Entry& entry) {
+           key.box_bytes_target = entry.key.box_bytes_target;
+           return entry.key == key;
+         });
+}
+
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
   const std::unique_lock lock(mutex_, std::try_to_lock);

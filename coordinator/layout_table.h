@@ -51,7 +51,10 @@ class LayoutTable {
   };
   // The layout to plan the frame with; null: it was stopped.
   std::shared_ptr<const Layout> Find(const Request& request);
-  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone. Does not wait
+  // Whether FindMade may find one, for some box_bytes_target.
+  bool HasMade(const Request& request);
+  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone. Does not
+  // wait
   // for other threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 

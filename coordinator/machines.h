@@ -24,6 +24,7 @@
 #include "common/base/bytes.h"
 #include "common/base/log.h"
 #include "common/base/status.h"
+#include "common/planning/levels.h"
 #include "common/planning/resolved_request.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/peer_token.h"
@@ -77,11 +78,12 @@ struct DatasetAwaited {
 struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
-  std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
-  // If the picture is drawn from several of them: which parts, and those beside this one (ResolvedRequest).
+  // Of a dataset with several levels; null: it has one. The voxels are those of the finest one that is drawn (AtLevel).
+  std::shared_ptr<const VolumeLevels> levels = nullptr;
+  std::vector<int> drawn = {0};  // numbers of levels, finest first
+  // If there are several of these: which parts, and those beside the finest one (ResolvedRequest).
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
-  std::vector<int> levels = {0};  // their numbers, finest first
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

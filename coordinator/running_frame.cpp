@@ -30,7 +30,7 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
     : id_(id),
       request_(std::move(request)),
       planned_(request_.plan<PlanMade>()->frame),
-      fit_(request_.plan<PlanMade>()->fit),
+      fit_(*request_.plan<PlanMade>()->frame->fit),
       plan_(planned_->plan),
       roster_(planned_->asked.roster),
       limits_(limits),
@@ -355,8 +355,9 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
                              .predicted = planned_->prediction,
-                             .levels = {}};
-  for (const int level : request_.dataset()->levels) statistics.levels.push_back({.level = std::uint32_t(level)});
+                             .levels = {},
+                             .lowered = request_.lowered};
+  for (const int level : request_.dataset()->drawn) statistics.levels.push_back({.level = std::uint32_t(level)});
   for (const GroupPlan& group : plan_.groups) {
     for (const Placement& placement : group.placements) {
       LevelUse& use = statistics.levels[placement.level];

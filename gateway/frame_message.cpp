@@ -79,6 +79,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                  {"balance", statistics.balance},
                  {"combine", statistics.combine},
                  {"balance_by", statistics.balance_by}}}};
+  if (!statistics.lowered.empty()) json["lowered"] = statistics.lowered;
   if (timeline) json["timeline"] = TimelineJson(statistics);
   return json;
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 
 #include "common/base/check.h"
 #include "common/volume/box_assembly.h"
@@ -139,9 +140,11 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
   std::uint64_t begun_bytes = BegunBytes();
   bool first = true;
   for (const std::vector<Generation>& boxes : by_client) {
-    std::uint64_t in_flight_bytes = 0;  // of this client
+    std::uint64_t in_flight_bytes = 0, in_flight = 0;  // of this client
     for (const auto& [name, request] : in_flight_) {
-      if (std::ranges::find(boxes, name.first) != boxes.end()) in_flight_bytes += request.bytes;
+      if (std::ranges::find(boxes, name.first) == boxes.end()) continue;
+      in_flight_bytes += request.bytes;
+      ++in_flight;
     }
     bool has_credit = true;
     for (const Generation generation : boxes) {
@@ -156,12 +159,14 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         const std::uint32_t bytes = padded.BytesOf(chunk);
         if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
         if (padded.stored_at != nullptr && in_flight_.size() >= kMostRequests) return;
-        has_credit = in_flight_bytes == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        has_credit = in_flight == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        if (padded.stored_at != nullptr) has_credit = has_credit && in_flight <= kMostRequests / std::uint64_t(clients);
         if (!has_credit) break;
         padded.missing.pop_back();
         in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
         in_flight_bytes_ += bytes;
         in_flight_bytes += bytes;
+        ++in_flight;
         if (!padded.requested) padded.report.begin = now;
         padded.requested = true;
         actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
@@ -243,7 +248,10 @@ void BoxFetcher::ExpireRequests(Time now) {
   }
   const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
   for (const auto& [generation, chunk] : expired) {
-    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a padded box did not arrive within {} ms", chunk.chunk, waited)));
+    const HeldBox* const padded = Find(generation);
+    const std::string from = padded == nullptr || padded->stored_at == nullptr ? "" : padded->stored_at->source + ": ";
+    Retry(generation, chunk,
+          Status::Unavailable(fmt::format("{}chunk {} of a padded box did not arrive within {} ms", from, chunk.chunk, waited)));
   }
 }
 

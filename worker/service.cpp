@@ -274,7 +274,7 @@ void WorkerService::Impl::Perform(StopProcess& action) {
 }
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
-  if (action.stored != nullptr && stored_voxels.Read(action.request, *action.stored)) return;
+  if (action.stored != nullptr && stored_voxels.Read(action.request, *action.stored, MonotonicNow())) return;
   if (voxels) Send(*voxels, action.request);
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <string>
@@ -28,9 +29,7 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
   Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
   if (!source.ok()) return source;
   const SourceInfo& info = (*source)->info();
-  const Result<std::uint64_t> version = VersionOf(info.files);
-  if (!version.ok()) return version.status();
-  const bool same = *version == stored.version && std::size_t(stored.level) < info.levels.size() &&
+  const bool same = info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
                     info.levels[std::size_t(stored.level)].block == stored.block.end;
   return same ? source : Status::InvalidArgument(text->path + ": another one than the coordinator's");
 }
@@ -39,24 +38,53 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
 
 struct StoredVoxels::Shared {
   using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
-  struct Place {  // of a source and version
-    bool known = false;
-    std::shared_ptr<VolumeSource> source = nullptr;  // null: it is not seen from here
+  using PlaceName = std::pair<std::string, std::uint64_t>;  // a source, and its version
+  struct Place {
+    bool looking = false;                            // at it, just now
+    Time looked;                                     // the last time
+    Time used;                                       // likewise
+    std::shared_ptr<VolumeSource> source = nullptr;  // null: it is not seen from here, as far as is known
   };
 
   std::mutex mutex;  // guards what follows
   std::function<void(MessageReceived)> deliver;
-  std::map<std::pair<std::string, std::uint64_t>, Place> places;
+  std::map<PlaceName, Place> places;
   std::map<ChunkName, int> reading;  // how often each was asked for: two boxes may need the same voxels
   BackgroundTasks opening{kOpensAtOnce};
+
+  // The source at this place; null: it is not seen from here, or not known to be, and looked for if it is time. Called with the mutex.
+  std::shared_ptr<VolumeSource> SourceAt(const StoredAt& stored, Time now, const std::shared_ptr<Shared>& self) {
+    const auto [found, is_new] = places.try_emplace({stored.source, stored.version});
+    Place& place = found->second;
+    place.used = now;
+    if (place.source == nullptr && !place.looking && (is_new || now >= place.looked + kLookAgain)) {
+      place.looking = true;
+      place.looked = now;
+      Find(stored, self);
+    }
+    const std::shared_ptr<VolumeSource> source = place.source;
+    if (places.size() > kMostPlaces) {
+      places.erase(std::ranges::min_element(places, {}, [](const auto& each) { return each.second.used; }));
+    }
+    return source;
+  }
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
     opening.Post([self, stored] {
       Result<std::shared_ptr<VolumeSource>> source = Guarded("a source of voxels", [&] { return OpenSame(stored); });
       LogInfo(source.ok() ? "reads " + stored.source + " itself" : "asks the coordinator for voxels: " + source.status().message());
       const std::lock_guard lock(self->mutex);
-      self->places[{stored.source, stored.version}] = {true, source.ok() ? *std::move(source) : nullptr};
+      const auto place = self->places.find({stored.source, stored.version});
+      if (place == self->places.end()) return;  // dropped meanwhile
+      place->second.looking = false;
+      if (source.ok()) place->second.source = *std::move(source);
     });
+  }
+
+  // A read from there has failed: the coordinator may see what is not seen from here any more.
+  void Lose(const PlaceName& name) {
+    const std::lock_guard lock(mutex);
+    if (const auto place = places.find(name); place != places.end()) place->second.source = nullptr;
   }
 
   void Deliver(const ChunkRequest& request, VolumeSource& source, Result<Bytes> samples) {
@@ -88,19 +116,20 @@ StoredVoxels::~StoredVoxels() {
   shared_->deliver = nullptr;
 }
 
-bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored) {
+bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored, Time now) {
   std::shared_ptr<VolumeSource> source;
   {
     const std::lock_guard lock(shared_->mutex);
-    const auto [place, is_new] = shared_->places.try_emplace({stored.source, stored.version});
-    if (is_new) shared_->Find(stored, shared_);
-    if (place->second.source == nullptr) return false;
+    source = shared_->SourceAt(stored, now, shared_);
+    if (source == nullptr) return false;
     if (++shared_->reading[{request.dataset, request.box, request.chunk}] > 1) return true;
-    source = place->second.source;
   }
   const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);
   ReadPart(source, stored.level, request.box, part.begin, part.bytes,
-           [shared = shared_, request, source](Result<Bytes> samples) { shared->Deliver(request, *source, std::move(samples)); });
+           [shared = shared_, request, source, name = Shared::PlaceName(stored.source, stored.version)](Result<Bytes> samples) {
+             if (samples.status().code() == StatusCode::kUnavailable) shared->Lose(name);
+             shared->Deliver(request, *source, std::move(samples));
+           });
   return true;
 }
 

@@ -47,6 +47,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
                {"stages_ms", stages},
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share}};
+  if (!frame.statistics.lowered.empty()) json["lowered"] = frame.statistics.lowered;
   if (frame.statistics.predicted) AddPrediction(json, *frame.statistics.predicted, frame, summary);
   return json;
 }

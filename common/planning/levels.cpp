@@ -196,9 +196,10 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   const Camera& camera = setup->camera;
+  const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
     return LevelMap{
-        .levels = {CoarsestFor(request.detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
+        .levels = {CoarsestFor(detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
   };
   const bool mixes =
       camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();
@@ -206,7 +207,7 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
 
   const double least = LeastWidth(finest, *setup);
   if (least == 0) return whole();
-  return WithoutUnused(MapOf(request.detail, levels, CoarsestFor(request.detail * least, levels, count), *setup));
+  return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
 }
 
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level) {
@@ -217,8 +218,10 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
     if (!view.eye && view.distance == 0) {
       view.distance = BoundingRadius(finest) / std::sin(view.fov_degrees * (std::numbers::pi / 360));
     }
-  } else if (!view.fit) {
-    view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
+  } else {
+    const Vec3 centre = level.orientation.FromWorld(level.ToWorld(level.centre()) - finest.orientation.origin) / finest.spacing;
+    view.distance = MakeCamera(view, request.size, finest).Project(centre).depth;
+    if (!view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);

@@ -25,7 +25,7 @@ struct VolumeLevels {
 // Of the dataset, without bricks.
 VolumeSummary StatisticsOf(const VolumeLevels& levels);
 
-// The coarsest level whose voxels are at most request.detail pixels wide wherever the picture shows the volume, or the one that
+// The coarsest level whose voxels are at most request.detail pixels wide (0: as 1) wherever the picture shows the volume, or the one that
 // request.level names. Counts are those axes along which a level has coarser voxels than the finest one.
 //
 // In perspective, far parts need coarser voxels than near ones. If the renderer has Ability::kLevels, each zone of a regular grid is drawn

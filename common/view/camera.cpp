@@ -75,7 +75,8 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   look.frame = {orientation.FromWorld(rolled.right), orientation.FromWorld(rolled.up), orientation.FromWorld(rolled.forward)};
   if (view.look_at) look.target = orientation.FromWorld(target - centre);
   if (view.projection != Projection::kPerspective) {
-    look.distance = 2 * radius + Dot(look.frame.forward, look.target);  // the eye plane stands 2 R before the volume's centre
+    // The eye plane stands 2 R before the volume's centre, or as far before it as before that of another level.
+    look.distance = (view.distance != 0 ? view.distance : 2 * radius) + Dot(look.frame.forward, look.target);
   } else if (view.eye) {
     look.distance = Length(target - *view.eye);
   } else {

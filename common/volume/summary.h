@@ -65,6 +65,9 @@ struct VolumeSummary {
 // The range of all values that samples of this type can stand for: of a brick of which nothing is known.
 ValueRange AnyValue(const VolumeDescription& description);
 
+// What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and bricks of any value.
+VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+
 // The summary of a volume that is given piece by piece, and is never in memory as a whole.
 class PiecewiseSummary {
  public:

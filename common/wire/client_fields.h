@@ -70,6 +70,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Message("grid", m.grid, &P::grid, &P::mutable_grid);
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
   io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
+  io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
 }
 
 void Fields(auto& io, Is<PictureGeometry> auto& m) {

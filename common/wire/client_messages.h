@@ -83,6 +83,7 @@ struct FrameStatistics {
   PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
   std::optional<FramePrediction> predicted;                                   // if the policy left a choice
   std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
+  std::string lowered;  // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 

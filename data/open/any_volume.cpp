@@ -1,14 +1,8 @@
 #include "data/open/any_volume.h"
 
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <xxhash.h>
-
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include "common/base/log.h"
@@ -45,20 +39,6 @@ const SourceContext& ProcessReadContext() {
 }
 
 void SetReadMemory(std::uint64_t process_bytes) { process_memory = process_bytes; }
-
-Result<std::uint64_t> VersionOf(const std::vector<std::string>& files) {
-  std::string text;
-  for (const std::string& file : files) {
-    struct stat found {};
-    if (::stat(file.c_str(), &found) != 0) {
-      const int error = errno;
-      return Status(error == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable,
-                    file + ": " + std::generic_category().message(error));
-    }
-    text += fmt::format("{} {}.{} ", found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec);
-  }
-  return XXH3_64bits(text.data(), text.size());
-}
 
 VolumeFileInfo FileInfoOf(const SourceInfo& source) {
   const VolumeDescription& finest = source.levels.front().description;

@@ -19,9 +19,6 @@ namespace slabstream {
 const SourceContext& ProcessReadContext();
 void SetReadMemory(std::uint64_t process_bytes);
 
-// Of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one cannot be looked at.
-Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
-
 // Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
 VolumeFileInfo FileInfoOf(const SourceInfo& source);
 

@@ -42,6 +42,7 @@ struct SourceInfo {
   int times = 1;                           // that the source holds, of which it shows one
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
+  std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
 };
 
 class VolumeSource {

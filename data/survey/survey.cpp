@@ -113,14 +113,6 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
   return Survey{int(level), !whole, std::make_shared<const VolumeSummary>(pieces.Take())};
 }
 
-VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
-  VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
-  summary.non_finite = surveyed.non_finite;
-  summary.brick_counts = CubesOver(description.geometry.size, kBrick);
-  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
-  return summary;
-}
-
 Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, const std::function<void(int percent)>& tell) {
   const SourceLevel& of = source.info().levels[std::size_t(level)];
   if (Status fits = CheckFitsMemory(of.description.voxel_bytes(), source.info().format + " volume"); !fits.ok()) return fits;

@@ -34,9 +34,6 @@ struct Survey {
 Result<Survey> SurveySource(
     VolumeSource& source, const std::function<void(int percent)>& tell = [](int) {});
 
-// What is known of a level of which nobody has read all voxels: the statistics of the survey, and bricks of any value.
-VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
-
 // A whole level in memory. ResourceExhausted: it does not fit; errors of VolumeSource::Read.
 Result<std::shared_ptr<const Volume>> ReadLevel(
     VolumeSource& source, int level, const std::function<void(int percent)>& tell = [](int) {});

@@ -125,10 +125,10 @@ def _scalar(field: FieldDescriptor, option: Option, value: Any) -> Any:
         return values.flag(option.name, value)
     if field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
         return _text(option, value)
+    if value == "auto" and (option.type or "").endswith("|auto"):
+        return 0  # left to the service
     if field.cpp_type in (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT):
         return values.number(option.name, value, option.least, option.most, option.above)
-    if value == option.default == "auto":
-        return 0
     return values.integer(option.name, value, int(option.least), int(option.most))
 
 

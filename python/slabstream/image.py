@@ -70,6 +70,7 @@ class Statistics:
     levels: tuple[int, ...]      # that the picture was drawn from; 0 is the finest
     voxel_bytes: int             # that workers received for it
     stored_bytes: int            # that were read from the dataset's source for it, as they are stored
+    lowered: str                 # with detail="auto": which coarser level was drawn, and why; else empty
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 
@@ -120,6 +121,7 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
         levels=tuple(use.level for use in message.levels),
         voxel_bytes=sum(report.voxel_bytes for report in message.reports),
         stored_bytes=sum(report.stored_bytes for report in message.reports),
+        lowered=message.lowered,
         message=message,
     )
 

@@ -1,6 +1,7 @@
 // What the coordinator does about datasets with several levels, told as scripts.
 #include "common/planning/levels.h"
 
+#include "common/volume/memory_budget.h"
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {
@@ -241,6 +242,90 @@ TEST_F(LevelRules, NamesOfLevelsAreNoDatasets) {
     EXPECT_THAT(ToClients<DataReply>(script.Client(kOther, DataOrder{.action = action, .items = {name}})), IsEmpty()) << int(action);
   }
   EXPECT_THAT(script.QueryStatus().datasets, SizeIs(2)) << "a status has datasets, not levels";
+}
+
+// ---------------------------------------------------------------- memory
+
+// Of 512 x 512 x 768 voxels at level 0, in one group: 384 MiB with what renderers make of them, a worker has room for 120.
+class LevelsThatFit : public LevelRules {
+ protected:
+  LevelsThatFit() {
+    FakeWorker worker{.token = 12, .incarnation = 2};
+    Register message = CoordinatorScript::RegisterOf(worker);
+    message.memory_bytes = kIdleMemoryBytes + (std::uint64_t{120} << 20);
+    worker.id = ToWorkers<Welcome>(script.Worker(worker, message)).at(0).message.worker;
+    script.tokens[worker.id] = worker.token;
+    script.workers.push_back(worker);
+  }
+  static std::shared_ptr<const VolumeSummary> LargeSummary(int level) {
+    VolumeDescription description{.geometry = GeometryOfLevel(level)};
+    description.geometry.size = 16 * description.geometry.size;
+    return std::make_shared<const VolumeSummary>(UnreadSummary(description, *BlockSummary()));
+  }
+  // Opens the dataset and loads whatever level is sought, until a frame is planned or refused.
+  Actions Settle(Actions actions) {
+    for (std::size_t next = 0; next < script.loads.size(); ++next) {
+      const LoadDataset load = script.loads[next];
+      if (IsLevelName(load.name)) {
+        const auto summary = LargeSummary(load.name.back() - '0');
+        CoordinatorScript::Append(actions, NothingChanged(script.Step(DatasetLoaded{load.name, load.load, load.load, summary, 0, stamp_})));
+        continue;
+      }
+      auto levels = std::make_shared<VolumeLevels>();
+      for (int level = 0; level < kLevels; ++level) levels->levels.push_back(LargeSummary(level)->description);
+      levels->overview = LargeSummary(kLevels - 1);
+      std::vector<DataSource> sources(kLevels, DataSource("a level", ""));
+      CoordinatorScript::Append(actions, script.Step(DatasetOpened{load.name, load.load, levels, std::move(sources), stamp_}));
+    }
+    return actions;
+  }
+};
+
+TEST_F(LevelsThatFit, AFrameThatDoesNotFitNamesTheLevelThatWould) {
+  const std::vector<Status> failed = Failures(Settle(script.Client(kClient, AtLevelFrame(1, "0"))));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message(), HasSubstr("limit 312 MiB"));
+  EXPECT_THAT(failed[0].message(), HasSubstr("--level 1 would fit, and --detail auto chooses such a level"));
+  EXPECT_EQ(script.QueryStatus().refused.too_large, 1U);
+  EXPECT_EQ(script.machine.sizes().uses, 0U);
+}
+
+TEST_F(LevelsThatFit, DetailAutoDrawsTheFinestLevelThatFitsAndTellsSo) {
+  SubmitFrame submit = Frame(1);
+  submit.frame.view.zoom = 20;  // a voxel of level 0 is wider than a pixel
+  submit.frame.detail = 0;
+  const Actions actions = Settle(script.Client(kClient, submit));
+  EXPECT_THAT(LoadedNames(), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  const std::vector<GroupAssignment> groups = HandedOut(actions);
+  ASSERT_THAT(groups, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.description.geometry.size, 8 * Index3({32, 32, 48}));
+  const auto replies = ToClients<FrameReply>(script.Answer(groups[0]));
+  ASSERT_THAT(replies, SizeIs(1));
+  EXPECT_THAT(replies[0].message.statistics.lowered, HasSubstr("level 1 is drawn instead of level 0"));
+  EXPECT_THAT(replies[0].message.statistics.lowered, HasSubstr("limit 312 MiB"));
+  EXPECT_EQ(script.machine.sizes().uses, 0U);
+  // What fits is drawn as ever, and nothing is told.
+  submit.request = 2;
+  submit.frame.view.zoom = 2;
+  const auto again = ToClients<FrameReply>(script.AnswerAll(Settle(NothingChanged(script.Client(kClient, submit)))));
+  ASSERT_THAT(again, SizeIs(1));
+  EXPECT_EQ(again[0].message.statistics.lowered, "");
+}
+
+TEST_F(LevelsThatFit, AVolumeWithoutLevelsNeedsConversion) {
+  script.Client(kClient, Frame(1, 1, "other"));
+  const LoadDataset load = script.loads.back();
+  const std::vector<Status> failed = Failures(script.Step(DatasetLoaded{load.name, load.load, load.load, LargeSummary(0)}));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_THAT(failed[0].message(), HasSubstr("the volume has no coarser levels, which would fit: slabstream convert makes them"));
+  // A picture that is too large at any level, for the only worker.
+  script.Kill(script.workers.front());
+  SubmitFrame huge = Frame(2, 1, "other");
+  huge.frame.size = {8192, 8192};
+  const std::vector<Status> too_large = Failures(script.Client(kClient, huge));
+  ASSERT_THAT(too_large, SizeIs(1));
+  EXPECT_THAT(too_large[0].message(), testing::Not(HasSubstr("convert")));
 }
 
 // ---------------------------------------------------------------- files

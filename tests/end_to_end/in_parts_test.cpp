@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -81,7 +82,7 @@ TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {
                                 {{levels, "--level", "9"}, "has levels 0 to 2"},
                                 {{"ball.nrrd", "--level", "1"}, "has level 0 alone"},
                                 {{levels, "--level", "fine"}, "level"},
-                                {{levels, "--detail", "0"}, "detail"},
+                                {{levels, "--detail", "-1"}, "detail"},
                             });
 }
 
@@ -134,6 +135,31 @@ TEST_F(InPartsTest, ConvertWritesALevelOrABoxOfIt) {
   ExpectEachRefused({"convert", "ball.nrrd", "no.nrrd"}, {{{"--level", "1"}, "has level 0 alone"}});
 }
 
+// A rod that begins close to the eye: there a voxel of level 0 is as wide as a pixel, and at the other end fifteen are.
+TEST_F(InPartsTest, WhatDoesNotFitNamesTheLevelThatWouldAndDetailAutoDrawsIt) {
+  std::ofstream(Path("rod.nrrd"), std::ios::binary)
+      << ("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8000 8 8\nencoding: raw\n\n" + std::string(8000 * 8 * 8, char(200)));
+  MustRun({"convert", "rod.nrrd", "rod.ome.zarr"});
+  const std::vector<std::string> view = {"--local=1",   "--memory", "768M", "--renderer", "zbuffer", "--size",    "2000", "--projection",
+                                         "perspective", "--fov",    "60",   "--distance", "4100",    "--azimuth", "90"};
+  std::vector<std::string> command = {"render", "rod.ome.zarr", "-o", "rod.png"};
+  command.insert(command.end(), view.begin(), view.end());
+  const ProgramResult refused = Slabstream(command);
+  EXPECT_EQ(refused.exit_status, 1);
+  ASSERT_EQ(refused.err_lines().size(), 1U) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("limit 512 MiB"), HasSubstr("would fit, and --detail auto chooses such a level")));
+  command.insert(command.end(), {"--detail", "auto", "--stats", "stats.json"});
+  const ProgramResult lowered = MustRun(command);
+  EXPECT_THAT(lowered.err, HasSubstr("is drawn instead of level 0: "));
+  const json stats = json::parse(ReadFile("stats.json"));
+  EXPECT_THAT(stats["frames"][0]["lowered"].get<std::string>(), HasSubstr("is drawn instead of level 0"));
+  // The volume itself has no other level.
+  command[1] = "rod.nrrd";
+  const ProgramResult single = Slabstream(command);
+  EXPECT_EQ(single.exit_status, 1);
+  EXPECT_THAT(single.err, HasSubstr("slabstream convert makes them"));
+}
+
 TEST_F(InPartsTest, ADamagedChunkEndsInOneLineThatNamesIt) {
   const std::string levels = MakeLevels();
   int damaged = 0;
@@ -184,6 +210,35 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
     if (text.find("reads " + Path("large.nrrd") + " itself") != std::string::npos) ++reading;
   }
   EXPECT_GT(reading, 0) << logs;
+}
+
+// Levels are small, so that the coordinator holds them; shards of level 0 are read when its first picture is asked for.
+TEST_F(InPartsTest, AServiceGoesOnAfterBadChunksAndReadsThemAgainOnceTheyAreRepaired) {
+  const std::string levels = MakeLevels();
+  MakeSphere("other.nrrd", 2, 30);
+  const std::string endpoint = "ipc://" + Path("s");
+  MustRun({"up", "--detach", "--listen", endpoint, "--data", "ball=" + levels, "--data", "other=other.nrrd"});
+  const PictureFile expected = Render("ball.nrrd", {"--local=1"});
+  MustRun({"render", "ball", "-o", "coarse.png", "--level", "2"});  // so it is open
+  const std::string shard = Path(levels + "/0/c/0/0/0"), kept = Path("kept");
+  ASSERT_TRUE(std::filesystem::exists(shard));
+  std::filesystem::copy_file(shard, kept);
+  const auto size = std::filesystem::file_size(shard);
+  const std::vector<std::function<void()>> damages = {
+      [&] { std::filesystem::resize_file(shard, size / 3); },
+      [&] { std::ofstream(shard, std::ios::binary | std::ios::app) << "more"; },
+      [&] { std::ofstream(shard, std::ios::binary | std::ios::in | std::ios::out).seekp(std::streamoff(size / 2)) << "damage"; },
+  };
+  for (const auto& damage : damages) {
+    damage();
+    const ProgramResult result = Slabstream({"render", "ball", "-o", "no.png", "--level", "0"});
+    EXPECT_EQ(result.exit_status, 1);
+    ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("ball.ome.zarr/0/c/0/0/0"));
+    MustRun({"render", "other", "-o", "other.png"});
+    std::filesystem::copy_file(kept, shard, std::filesystem::copy_options::overwrite_existing);
+  }
+  EXPECT_LE(LargestDifference(Render("ball", {"--level", "0"}), expected), kSame);
 }
 
 TEST_F(InPartsTest, AWorkerThatDoesNotSeeTheFilesGetsVoxelsFromTheCoordinator) {

@@ -314,6 +314,47 @@ TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
   }
 }
 
+TEST_F(InPartsTest, WhatAPixelShowsIsFoundInVoxelsThatAreReadForIt) {
+  for (const std::string& path : {Nrrd(*ball_), Zarr(ball_)}) {
+    const auto pick = [&](const RendererKind* renderer, double x, double y) -> Result<PickReply> {
+      FrameRequest frame = TestRequest(renderer, 30);
+      frame.level = "0";
+      const RequestId asked = client_->Submit(Question(PickQuery{.frame = frame, .x = x, .y = y}), seconds(60));
+      while (const auto event = client_->Next(seconds(60))) {
+        if (event->request != asked) continue;
+        if (const auto* reply = std::get_if<QuestionReply>(&event->what)) {
+          PickReply picked = std::get<PickReply>(*reply);
+          picked.nonce = 0;
+          return picked;
+        }
+        return std::get<Status>(event->what);
+      }
+      return Status::Internal("no answer");
+    };
+    std::vector<PickReply> held;
+    for (const bool in_parts : {false, true}) {
+      constexpr std::uint64_t kNoLimit = 0, kLittle = std::uint64_t{512} << 10;
+      Start(path, 1, in_parts ? kLittle : kNoLimit);
+      std::size_t next = 0, hits = 0;
+      for (const RendererKind* renderer : VoxelRenderers()) {
+        for (const double x : {5.5, 40.5, 48.25}) {
+          SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name() << ", x " << x);
+          const Result<PickReply> picked = pick(renderer, x, 40.5);
+          ASSERT_TRUE(picked.ok()) << picked.status().message();
+          hits += picked->sample ? 1 : 0;
+          if (!in_parts) {
+            held.push_back(*picked);
+          } else {
+            EXPECT_EQ(*picked, held[next++]);
+          }
+        }
+      }
+      EXPECT_GT(hits, 5U);
+    }
+    ExpectNothingHeld();
+  }
+}
+
 // ---------------------------------------------------------------- files that change or are damaged
 
 TEST_F(InPartsTest, AReplacedFileGivesTheNewPictureAndARemovedOneAnError) {

@@ -94,6 +94,7 @@ TEST(AtLevelTest, PointsOfTheWorldFallOnTheSamePixels) {
       const double near = 1e-7 * (1 + std::abs(at.x) + std::abs(at.y));
       ASSERT_NEAR(at.x, same.x, near) << "round " << round << ", " << NameOf(request.view.projection);
       ASSERT_NEAR(at.y, same.y, near) << "round " << round << ", " << NameOf(request.view.projection);
+      ASSERT_NEAR(at.depth, same.depth, 1e-7 * (1 + std::abs(at.depth))) << "round " << round << ", " << NameOf(request.view.projection);
     }
   }
 }

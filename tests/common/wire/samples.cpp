@@ -328,6 +328,7 @@ std::vector<FrameReply> SamplesOf() {
   FrameStatistics predicted = statistics;
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
   predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
+  predicted.lowered = kUmlaut;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
