@@ -40,6 +40,7 @@ struct SourceInfo {
   int times = 1;                           // that the source holds, of which it shows one
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
+  std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them
 };
 
 class VolumeSource {
