@@ -86,6 +86,27 @@ class BrickRow {
   std::vector<T> low_, high_;
 };
 
+// Of a piece of a volume, calls met(part, row of samples, their number) for each row, and found(part, brick, its range) for each brick.
+// Parallel: each row of bricks by one thread, which calls local() for its `part` first.
+template <class T, class Local, class Met, class Found>
+void ForEachRowOfBricks(const VoxelBlock& piece, Local&& local, Met&& met, Found&& found) {
+  const Index3 begin = piece.box.begin, end = piece.box.end;
+  const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
+  tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
+    auto* const part = local();
+    BrickRow<T> brick_row(end.x - begin.x);
+    const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
+    for (std::int32_t z = row.z * kBrick; z < std::min((row.z + 1) * kBrick, end.z); ++z) {
+      for (std::int32_t y = row.y * kBrick; y < std::min((row.y + 1) * kBrick, end.y); ++y) {
+        const T* const samples = piece.samples<T>() + piece.Offset({begin.x, y, z});
+        brick_row.Fold(samples);
+        met(*part, samples, end.x - begin.x);
+      }
+    }
+    for (std::int32_t brick = 0; brick < bricks.x; ++brick) found(*part, row + Index3{brick, 0, 0}, brick_row.Brick(brick));
+  });
+}
+
 // How often each stored integer occurs. Neighbouring voxels are often equal, and counting them in one table would make each wait for the
 // one before it: four tables take turns.
 template <class T>
@@ -131,26 +152,12 @@ template <class T>
 class PiecesOf {
  public:
   void Add(const VoxelBlock& piece, VolumeSummary& summary) {
-    const Index3 begin = piece.box.begin, end = piece.box.end;
-    const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
-    tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
-      Part<T>& part = parts_.local();
-      BrickRow<T> brick_row(end.x - begin.x);
-      const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
-      for (std::int32_t z = row.z * kBrick; z < std::min((row.z + 1) * kBrick, end.z); ++z) {
-        for (std::int32_t y = row.y * kBrick; y < std::min((row.y + 1) * kBrick, end.y); ++y) {
-          const T* const samples = piece.samples<T>() + piece.Offset({begin.x, y, z});
-          brick_row.Fold(samples);
-          part.counts.Add(samples, end.x - begin.x);
-        }
-      }
-      ValueRange* out = &summary.bricks[NumberIn(summary.brick_counts, row)];
-      for (std::int32_t brick = 0; brick < bricks.x; ++brick) {
-        const StoredRange<T> range = brick_row.Brick(brick);
-        part.range.Include(range);
-        *out++ = ToDataValues(range, summary.description.mapping, kNoFiniteValue);
-      }
-    });
+    ForEachRowOfBricks<T>(
+        piece, [&] { return &parts_.local(); }, [](Part<T>& part, const T* row, std::int32_t width) { part.counts.Add(row, width); },
+        [&](Part<T>& part, const Index3& brick, const StoredRange<T>& range) {
+          part.range.Include(range);
+          summary.bricks[NumberIn(summary.brick_counts, brick)] = ToDataValues(range, summary.description.mapping, kNoFiniteValue);
+        });
   }
 
   void AddSample(const VoxelBlock& piece) {
@@ -223,6 +230,20 @@ VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSu
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
   summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
   return summary;
+}
+
+ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples) {
+  return ToDataValues(StoredRange<float>{samples.min, samples.max}, description.mapping, kNoFiniteValue);
+}
+
+void FindBrickRanges(const VoxelBlock& piece, const Index3& brick_counts, BrickRangeList& bricks) {
+  VisitScalarType(piece.type, [&]<class T>(const T*) {
+    ForEachRowOfBricks<T>(
+        piece, [&] { return &bricks; }, [](BrickRangeList&, const T*, std::int32_t) {},
+        [&](BrickRangeList& all, const Index3& brick, const StoredRange<T>& range) {
+          all[NumberIn(brick_counts, brick)] = ToDataValues(range, ValueMapping{}, kNoFiniteValue);
+        });
+  });
 }
 
 struct PiecewiseSummary::State {

@@ -28,6 +28,9 @@ struct ValueRange {
 // The range of a brick without any finite value: min > max.
 inline constexpr ValueRange kNoFiniteValue = {1, 0};
 
+// Ranges of bricks, x fastest.
+using BrickRangeList = std::vector<ValueRange>;
+
 // The bin of a data value, in [0, kHistogramBins): equal bins over `range`; the last one includes range.max, and values outside go to the
 // nearest bin. If the range is one value, everything is in bin 0.
 inline int HistogramBin(const ValueRange& range, double value) {
@@ -41,13 +44,16 @@ struct VolumeSummary {
   ValueRange range;                                       // of finite data values; {0, 0} if there is none
   std::array<std::uint64_t, kHistogramBins> histogram{};  // of finite data values, by HistogramBin(range, value)
   Index3 brick_counts;                                    // bricks along each axis
-  std::vector<ValueRange> bricks;                         // x fastest; of finite values; kNoFiniteValue: there is none
+  BrickRangeList bricks;                                  // of finite values; kNoFiniteValue: there is none
   std::int64_t non_finite = 0;                            // voxels that are NaN or infinite: never visible
   // Of its layers; null: there is no such layer. Values of labels are their numbers.
   std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
   // Nobody holds the voxels, but they can be read there. Ranges of bricks may then be those of any value of the type. None: they are held.
   std::optional<StoredAt> stored = {};
+  // Of a stored level, what an index knows of its bricks, in place of `bricks`. It says which voxels need not be read, and nothing else:
+  // no picture may depend on whether there is an index. Null: there is none.
+  std::shared_ptr<const BrickRangeList> indexed = nullptr;
   std::vector<std::uint32_t> cells;  // of an unstructured grid, by brick: cells with their centres there; empty: it is no grid
 
   LayerTypes layers() const {
@@ -67,6 +73,13 @@ ValueRange AnyValue(const VolumeDescription& description);
 
 // What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and bricks of any value.
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+
+// Of data values, from one of stored samples: kNoFiniteValue stays what it is.
+ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples);
+
+// The ranges of stored samples of the bricks of a piece of a volume, into the places of these bricks in `bricks`, which has all
+// `brick_counts` bricks of the volume. The piece is as for PiecewiseSummary::Add. Parallel.
+void FindBrickRanges(const VoxelBlock& piece, const Index3& brick_counts, BrickRangeList& bricks);
 
 // The summary of a volume that is given piece by piece, and is never in memory as a whole.
 class PiecewiseSummary {

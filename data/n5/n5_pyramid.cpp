@@ -283,6 +283,7 @@ Result<Pyramid> Container::Open() {
     std::ranges::sort(files_);
     files_.erase(std::unique(files_.begin(), files_.end()), files_.end());
     pyramid->info.files = files_;
+    pyramid->info.folder = store_->name();
   }
   return pyramid;
 }

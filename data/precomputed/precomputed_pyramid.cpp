@@ -124,7 +124,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
     return scales.Wrong(fmt::format("a list of 1 to {} scales", kMostScales));
   }
 
-  Pyramid pyramid{.info = {.format = "Neuroglancer precomputed", .files = {object}}};
+  Pyramid pyramid{.info = {.format = "Neuroglancer precomputed", .files = {object}, .folder = store->name()}};
   pyramid.info.labels = info["type"].given() && info["type"].value() == "segmentation";
   if (*channels > 1) pyramid.info.channels = names;
   pyramid.info.channel = *channel;

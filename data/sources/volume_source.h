@@ -43,6 +43,7 @@ struct SourceInfo {
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
   std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
+  std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them
 };
 
 class VolumeSource {

@@ -1,41 +1,17 @@
 #include "data/survey/survey.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <future>
 #include <utility>
 #include <vector>
 
 #include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
+#include "data/survey/pieces.h"
 
 namespace slabstream {
 namespace {
-
-constexpr std::int64_t kPieceBytes = std::int64_t{16} << 20;
-
-// Voxels along each axis of pieces: whole blocks of the source and whole bricks as far as that fits into kPieceBytes, then more of them
-// along x, y and z.
-Index3 PieceSize(const SourceLevel& level) {
-  const Index3& size = level.description.geometry.size;
-  const auto bytes = [&](const Index3& piece) {
-    return std::int64_t(CountIn(piece)) * std::int64_t(BytesPerSample(level.description.type));
-  };
-  Index3 piece;
-  for (const Axis axis : kAxes)
-    piece[axis] = std::min((level.block[axis] + kBrick - 1) / kBrick * kBrick, CubesOver(size, kBrick)[axis] * kBrick);
-  for (const Axis axis : {Axis::kZ, Axis::kY, Axis::kX}) {
-    while (bytes(piece) > 2 * kPieceBytes && piece[axis] > kBrick) piece[axis] = (piece[axis] / kBrick + 1) / 2 * kBrick;
-  }
-  for (const Axis axis : kAxes) {
-    while (2 * bytes(piece) <= kPieceBytes && piece[axis] < size[axis]) piece[axis] *= 2;
-  }
-  return piece;
-}
-
-std::vector<Box> PiecesOf(const SourceLevel& level) { return CutAtBlocks(level.description.geometry.bounds(), PieceSize(level)); }
 
 // Blocks of the source, or several of them together, spread evenly: about `most` bytes in all.
 std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
@@ -59,33 +35,6 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   return sample;
 }
 
-// Calls take(block) for each box in turn, while the next one is being read.
-template <class Take>
-Status ReadPieces(VolumeSource& source, int level, const std::vector<Box>& boxes, Take&& take) {
-  struct Piece {
-    VoxelBlock block;
-    std::promise<Status> end;
-  };
-  const ScalarType type = source.info().levels[std::size_t(level)].description.type;
-  std::vector<std::unique_ptr<Piece>> under_way(boxes.size());
-  const auto begin = [&](std::size_t i) {
-    under_way[i] = std::make_unique<Piece>(Piece{MakeVoxelBlock(boxes[i], type), {}});
-    Piece& piece = *under_way[i];
-    source.Read(level, boxes[i], piece.block.bytes, {}, [&piece](Status status) { piece.end.set_value(std::move(status)); });
-  };
-  Status first_error;
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    if (i == 0) begin(i);
-    if (i + 1 < boxes.size() && first_error.ok()) begin(i + 1);
-    if (under_way[i] == nullptr) break;
-    const Status status = under_way[i]->end.get_future().get();
-    if (status.ok() && first_error.ok()) take(under_way[i]->block);
-    if (first_error.ok()) first_error = status;
-    under_way[i].reset();
-  }
-  return first_error;
-}
-
 }  // namespace
 
 Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int percent)>& tell) {
@@ -102,12 +51,12 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
   PiecewiseSummary pieces(description);
   std::size_t done = 0;
   const auto count = [&] { tell(int(100 * ++done / boxes.size())); };
-  Status read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) {
+  Status read = ReadPieces(source, int(level), boxes, 1, [&](const VoxelBlock& block) {
     whole ? pieces.Add(block) : pieces.AddSample(block);
     count();
   });
   if (read.ok() && pieces.EndOfPieces()) {
-    read = ReadPieces(source, int(level), boxes, [&](const VoxelBlock& block) { pieces.AddAgain(block); });
+    read = ReadPieces(source, int(level), boxes, 1, [&](const VoxelBlock& block) { pieces.AddAgain(block); });
   }
   if (!read.ok()) return read;
   return Survey{int(level), !whole, std::make_shared<const VolumeSummary>(pieces.Take())};

@@ -250,7 +250,10 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
   const ArrayContext arrays = MakeArrayContext(store, context);
   Result<Pyramid> pyramid =
       found->node.array ? PyramidOfArray(arrays, found->node, options) : PyramidOfImage(arrays, found->node, options, found->keys);
-  if (pyramid.ok()) pyramid->info.files = FilesOf(*store, found->keys);
+  if (pyramid.ok()) {
+    pyramid->info.files = FilesOf(*store, found->keys);
+    pyramid->info.folder = store->name();
+  }
   return pyramid;
 }
 
