@@ -24,8 +24,8 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
   questions.emplace(++last_question, std::move(open));
 }
 
-// Of a dataset with several levels, that is open: a question about a picture is one about the finest level that it shows, any other one about
-// the finest level of all. Errors of LevelsOf.
+// Of a dataset with several levels, that is open: a question about a picture is one about the finest level that it shows, any other one
+// about the finest level of all. Errors of LevelsOf.
 Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
   int level = 0;
   if (auto* pick = std::get_if<PickQuery>(&open.question)) {

@@ -77,8 +77,7 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
-  LayoutTable::Request wanted{
-      .policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
+  LayoutTable::Request wanted{.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
   if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();

@@ -150,7 +150,7 @@ void ViewSession::Render(std::uint64_t seq, double scale, double coarseness) {
   }
   for (FrameRequest& frame : job->frames) {
     frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
-    frame.detail = std::min(frame.detail * coarseness, kMostDetail);
+    if (coarseness > 1) frame.detail = std::min((frame.detail == 0 ? 1 : frame.detail) * coarseness, kMostDetail);
   }
   // A level that the view names is drawn, however coarse pictures may be.
   const bool names_level = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return LevelNumber(frame.level).has_value(); });

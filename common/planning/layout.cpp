@@ -171,20 +171,21 @@ struct LayoutMaker::State {
 
   Layout MakeByLevels(const ResolvedPolicy& policy) {
     const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
-    LevelPartition made = DivideByLevels(
-        {.map = request.map,
-         .size = request.summary->description.geometry.size,
-         .least_boxes = int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes)),
-         .most_bytes = request.box_bytes_target,
-         .bytes_of = [&](const LevelBox& at) { return PaddedBoxOf(at).voxel_count() * sample_bytes; },
-         .blocks_of =
-             [&](std::uint8_t level) {
-               Index3 voxels;
-               const std::optional<StoredAt>& stored = SummaryOf(level).stored;
-               const GridMap map = MapToLevel(level);
-               for (const Axis axis : kAxes) voxels[axis] = stored ? std::int32_t(stored->block.end[axis] / map.scale[axis] + 0.5) : 0;
-               return voxels;
-             }});
+    LevelPartition made =
+        DivideByLevels({.map = request.map,
+                        .size = request.summary->description.geometry.size,
+                        .least_boxes = int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes)),
+                        .most_bytes = request.box_bytes_target,
+                        .bytes_of = [&](const LevelBox& at) { return PaddedBoxOf(at).voxel_count() * sample_bytes; },
+                        .blocks_of =
+                            [&](std::uint8_t level) {
+                              Index3 voxels;
+                              const std::optional<StoredAt>& stored = SummaryOf(level).stored;
+                              const GridMap map = MapToLevel(level);
+                              for (const Axis axis : kAxes)
+                                voxels[axis] = stored ? std::int32_t(stored->block.end[axis] / map.scale[axis] + 0.5) : 0;
+                              return voxels;
+                            }});
     std::vector<BrickVisibility> visible;
     for (std::size_t level = 0; level <= request.coarser.size(); ++level) {
       const VolumeSummary& summary = SummaryOf(std::uint8_t(level));
@@ -194,8 +195,9 @@ struct LayoutMaker::State {
       const LevelBox at(box, made.levels[id]);
       return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(at.box) && visible[at.level].AnyVisible(PaddedBoxOf(at));
     };
-    Layout layout = Share(std::move(made.partition), policy, shows,
-                          [&](const Box& box, BoxId id) { return double(PaddedBoxOf({box, made.levels[id]}).voxel_count()); });
+    Layout layout = Share(std::move(made.partition), policy, shows, [&](const Box& box, BoxId id) {
+      return double(PaddedBoxOf({box, made.levels[id]}).voxel_count());
+    });
     layout.levels = std::move(made.levels);
     for (std::size_t box = 0; box < layout.levels.size(); ++box) {
       if (layout.owners[box] == kNoSlot) layout.levels[box] = 0;

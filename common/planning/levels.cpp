@@ -198,8 +198,7 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   const Camera& camera = setup->camera;
   const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
-    return LevelMap{
-        .levels = {CoarsestFor(detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
+    return LevelMap{.levels = {CoarsestFor(detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
   };
   const bool mixes =
       camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();

@@ -47,13 +47,15 @@ std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) {
   return kBytesACell * cells;
 }
 
-// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of(padded box, level)` tells what one takes.
+// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of(padded box, level)` tells what one
+// takes.
 template <class BytesOf>
 std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
   std::map<WorkerId, std::uint64_t> most = {{plan.display, 0}};
   for (const GroupPlan& group : plan.groups) {
     std::map<WorkerId, std::uint64_t> bytes;
-    for (const Placement& placement : group.placements) bytes[placement.worker] += bytes_of(PaddedBox(placement.at(), plan.setup), placement.level);
+    for (const Placement& placement : group.placements)
+      bytes[placement.worker] += bytes_of(PaddedBox(placement.at(), plan.setup), placement.level);
     for (const auto& [worker, of_group] : bytes) most[worker] = std::max(most[worker], of_group);
   }
   return most;
@@ -130,9 +132,8 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
       workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit) + (kEnough - 1) * images <= limit.bytes; });
   if (all_fit) return int(kEnough);
   // Only now it matters how much of the volume is empty, which takes longer to find out.
-  voxels = MostVoxels(plan, [&](const Box& padded, std::uint8_t level) {
-    return level == 0 ? VoxelBytes(padded, summary) : at_most(padded, level);
-  });
+  voxels = MostVoxels(
+      plan, [&](const Box& padded, std::uint8_t level) { return level == 0 ? VoxelBytes(padded, summary) : at_most(padded, level); });
 
   std::uint64_t fit = kEnough;
   for (const WorkerLimit& limit : workers) {

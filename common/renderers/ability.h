@@ -22,8 +22,8 @@ enum class Ability : std::uint8_t {
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 10> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",  "overlay",
-                                                                  "cells",       "lights",      "depth-shading",    "transfer", "levels"};
+inline constexpr std::array<std::string_view, 10> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",   "overlay",
+                                                                   "cells",       "lights",      "depth-shading",    "transfer", "levels"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

@@ -217,7 +217,8 @@ HWY_INLINE RayPacket AmongVoxels(const RayPacket& packet, const RayBox& box) {
   return among;
 }
 
-// The position of sample k of each ray in the box. `packet`: AmongVoxels. If the box does not own a ray's sample, the ray's indices are arbitrary.
+// The position of sample k of each ray in the box. `packet`: AmongVoxels. If the box does not own a ray's sample, the ray's indices are
+// arbitrary.
 struct SamplePlace {
   Floats position[3];
   Floats fraction[3];  // position - floor
