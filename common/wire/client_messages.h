@@ -66,7 +66,7 @@ struct FrameProgress {
 // A level that a picture was drawn from.
 struct LevelUse {
   std::uint32_t level = 0;   // [0, kMaxLevels); 0 is the finest
-  std::uint32_t boxes = 0;   // that were rendered
+  std::uint32_t boxes = 0;   // of the plan; those that turn out to be hidden or outside the picture are not read
   std::uint64_t voxels = 0;  // in these boxes
   friend bool operator==(const LevelUse&, const LevelUse&) = default;
 };

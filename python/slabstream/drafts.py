@@ -113,6 +113,8 @@ _MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
 def _text(option: Option, value: Any) -> str:
     if option.choices:
         values.choice(option.name, value, option.choices)
+    if isinstance(value, int) and not isinstance(value, bool):
+        value = str(value)  # level=2
     if not isinstance(value, str) or not 1 <= len(value.encode()) <= values.MOST_NAME_BYTES:
         raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {values.MOST_NAME_BYTES} bytes")
     return value

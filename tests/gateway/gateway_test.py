@@ -202,10 +202,15 @@ class HttpTest(WithService):
         self.assertEqual(self.gateway.request("/api/v1/render.png", method="POST", body="{")[0], 400)
         self.assertEqual(self.gateway.request("/api/v1/view")[0], 426)
 
+    def datasets_with(self, loaded):
+        """The catalogue by name, once the gateway knows that this dataset is loaded."""
+        listed = lambda: {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}  # noqa: E731
+        wait_until(lambda: listed()[loaded]["state"] == "ready", f"{loaded} is loaded")
+        return listed()
+
     def test_what_the_service_has(self):
         self.get("/api/v1/render.png", dataset="a", size=16)
-        wait_until(lambda: any(d["state"] == "ready" for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "a is loaded")
-        datasets = {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
+        datasets = self.datasets_with("a")
         self.assertEqual(set(datasets), {"a", "b", "c", "levels"})
         self.assertEqual(datasets["a"]["size"], [24, 24, 24])
         self.assertEqual([level["size"] for level in datasets["a"]["levels"]], [[24, 24, 24]])
@@ -222,7 +227,7 @@ class HttpTest(WithService):
         self.assertEqual(pixels["{'detail': 100}"], pixels["{'level': 2}"])
         self.assertEqual(len({picture[2] for picture in pixels.values()}), 3)
         self.assertIn(b'"levels":[2]', pictures["{'level': 2}"], "the record tells the level")
-        levels = next(d["levels"] for d in self.gateway.json("/api/v1/datasets")[1]["datasets"] if d["name"] == "levels")
+        levels = self.datasets_with("levels")["levels"]["levels"]
         self.assertEqual([level["size"] for level in levels], [[130] * 3, [65] * 3, [33] * 3])
         self.assertEqual(levels[0]["voxel_bytes"], 130**3)
         for fields, said in (({"level": 3}, "has levels 0 to 2"), ({"level": "x"}, "level"), ({"detail": 0}, "detail")):
