@@ -99,7 +99,7 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
     if (IsLevelName(use.entry)) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
     news.uses[id] = std::move(ready);
   } else {
-    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
+    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
   }
 }
 
@@ -153,7 +153,7 @@ void DatasetMachine::State::LoadData(const std::string& name) {
 
 void DatasetMachine::State::On(const DatasetReading& event) {
   if (!datasets.IsLoading(event.name, event.load)) return;
-  datasets.Find(event.name)->percent = event.percent;
+  datasets.Find(event.name)->read = event.read;
   TellUses(event.name);
 }
 

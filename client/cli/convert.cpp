@@ -10,6 +10,7 @@
 #include "client/cli/convert_to_zarr.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
@@ -62,7 +63,9 @@ Status RunConvert(const ConvertOptions& options) {
   if (Status status = CheckCanWrite("OUTPUT", options.output); !status.ok()) return status;
 
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source->path);
+  ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source->path)); });
+  bar.Show(0, Describe(ReadShare{}, source->path));
+  source->options.progress = &reading;
   const Result<LoadedVolume> loaded = ReadInputVolume(*source);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;

@@ -15,9 +15,11 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
+#include "data/positional/slice_stream.h"
 #include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 
@@ -36,21 +38,36 @@ Shares Share(std::uint64_t memory, std::uint64_t volume_bytes) {
   return {{.under_way_bytes = memory / 8, .cache_bytes = memory / 8}, memory - std::min(memory, taken)};
 }
 
-// Read in parts if its format allows that, else as a whole.
-Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadContext::Limits& limits) {
+struct Opened {
+  std::shared_ptr<VolumeSource> source;
+  std::optional<SliceOrder> slices = {};  // of a compressed stream
+  std::uint64_t memory = 0;               // bytes that it holds
+};
+
+// Read in parts if its format allows that, or slice by slice, else as a whole.
+Result<Opened> Open(const SourceText& source, const ReadContext::Limits& limits, ProgressBar& bar) {
   if (FindSourceFormat(source.path, source.options) != nullptr) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
-    return opened;
+    return Opened{*std::move(opened)};
+  }
+  if (SliceStream::Recognises(source.path, source.options)) {
+    const auto stream = SliceStream::Open(source.path, source.options, std::make_shared<ReadContext>(limits));
+    if (!stream.ok()) return AsInput(stream.status());
+    return Opened{*stream, SliceOrder{(*stream)->along(), (*stream)->from_end()}};
   }
   if (Status status = CheckInputVolume(source); !status.ok()) return status;
   Result<std::vector<std::string>> files = CheckVolumeHeaders(source.path, source.options);
   if (!files.ok()) return AsInput(files.status());
-  const Result<LoadedVolume> loaded = ReadInputVolume(source);
+  ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source.path)); });
+  SourceText with_progress = source;
+  with_progress.options.progress = &reading;
+  const Result<LoadedVolume> loaded = ReadInputVolume(with_progress);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
-  return MakeMemorySource(loaded->volume,
-                          {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)});
+  return Opened{MakeMemorySource(loaded->volume,
+                                 {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)}),
+                std::nullopt, std::uint64_t(info.description.voxel_bytes())};
 }
 
 }  // namespace
@@ -65,11 +82,11 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   constexpr std::uint64_t kUsual = std::uint64_t{1} << 30;
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsual;
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source.path);
-  const Result<std::shared_ptr<VolumeSource>> opened = Open(source, Share(memory, 0).reading);
+  bar.Show(0, Describe(ReadShare{}, source.path));
+  const Result<Opened> opened = Open(source, Share(memory, 0).reading, bar);
   if (!opened.ok()) return opened.status();
-  const VolumeDescription& volume = (*opened)->info().levels[0].description;
-  const bool whole = FindSourceFormat(source.path, source.options) == nullptr && options.memory > 0;
+  const VolumeDescription& volume = opened->source->info().levels[0].description;
+  const std::uint64_t held = options.memory > 0 ? opened->memory : 0;
 
   Wakeup wakeup;
   const InterruptGuard guard(wakeup);
@@ -87,9 +104,10 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
     bar.Show(0.01 * its, fmt::format("writing {}: {} % of {}, {} a second", options.output, its, MemoryText(now.all_bytes),
                                      MemoryText(std::uint64_t(rate))));
   };
-  const Status status = WriteOmeZarr(**opened, options.output,
+  const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
-                                      .memory = Share(memory, whole ? std::uint64_t(volume.voxel_bytes()) : 0).writing,
+                                      .slices = opened->slices,
+                                      .memory = Share(memory, held).writing,
                                       .source = options.source,
                                       .stop = stop.get_token(),
                                       .progress = progress});
