@@ -102,7 +102,7 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   for (const Use::Entry& awaited : use.entries) {
     const DatasetTable::Entry& entry = *datasets.Find(awaited.name);
     if (entry.state != DatasetState::kReady || entry.levels != nullptr) {
-      news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
+      news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
       return;
     }
     ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
@@ -174,7 +174,7 @@ void DatasetMachine::State::LoadData(const std::string& name) {
 
 void DatasetMachine::State::On(const DatasetReading& event) {
   if (!datasets.IsLoading(event.name, event.load)) return;
-  datasets.Find(event.name)->percent = event.percent;
+  datasets.Find(event.name)->read = event.read;
   TellUses(event.name);
 }
 

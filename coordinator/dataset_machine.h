@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/read_share.h"
 #include "common/base/time.h"
 #include "common/wire/limits.h"
 #include "coordinator/data_source.h"
@@ -83,7 +84,7 @@ struct DatasetOpened {
 struct DatasetReading {  // not the end yet
   std::string name;
   LoadId load = 0;
-  int percent = 0;  // of its samples that have been read, [1, 100]
+  ReadShare read;
 };
 struct DatasetFailed {
   std::string name;

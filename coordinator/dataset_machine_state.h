@@ -21,7 +21,6 @@ namespace slabstream {
 
 // What datasets may take of a coordinator's memory; the rest is for a volume that is being read, and for pictures. `memory_bytes` 0: no
 // limit.
-inline std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? UINT64_MAX : memory_bytes / 4 * 3; }
 
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 

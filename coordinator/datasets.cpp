@@ -99,7 +99,7 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   entry.state = DatasetState::kLoading;
   entry.since = now;
   entry.error.clear();
-  entry.percent = 0;
+  entry.read = {};
   return entry.load = ++last_load_;
 }
 

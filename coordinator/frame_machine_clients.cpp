@@ -32,7 +32,7 @@ void FrameMachine::State::On(const DatasetNews& event) {
     if (const auto* awaited = std::get_if<DatasetAwaited>(&news->second)) {
       const bool first = std::holds_alternative<OpenRequest::Submitted>(request.state);
       request.state = OpenRequest::AwaitsDataset{};  // DropPlans drops a plan that it had
-      if (first || awaited->percent > 0) SendQueued(request, awaited);
+      if (first || awaited->read.percent > 0) SendQueued(request, awaited);
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
@@ -159,7 +159,8 @@ void FrameMachine::State::SendQueued(const OpenRequest& request, const DatasetAw
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
                                            .workers = std::uint32_t(roster.staying()),
-                                           .read_percent = loading ? std::uint32_t(awaited->percent) : 0});
+                                           .read_percent = loading ? std::uint32_t(awaited->read.percent) : 0,
+                                           .read_rate = loading ? awaited->read.bytes_per_second : 0});
 }
 
 void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {

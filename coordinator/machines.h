@@ -23,6 +23,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/log.h"
+#include "common/base/read_share.h"
 #include "common/base/status.h"
 #include "common/planning/levels.h"
 #include "common/planning/resolved_request.h"
@@ -73,7 +74,7 @@ using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetCl
 // ---- from DatasetMachine to FrameMachine
 struct DatasetAwaited {
   bool loading = false;  // else it is not known yet whether there is such a dataset
-  int percent = 0;       // of its samples that have been read, as far as is known
+  ReadShare read;        // of its samples, as far as is known
 };
 struct DatasetReady {
   DatasetId dataset = 0;

@@ -11,6 +11,7 @@
 #include "client/cli/convert_to_zarr.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
@@ -43,13 +44,13 @@ std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const Loade
 }
 
 // A box of a level, or the whole volume.
-Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source) {
+Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source, ProgressBar& bar) {
   if (!options.converts_part()) return ReadInputVolume(source);
-  const Result<std::shared_ptr<VolumeSource>> part = OpenToConvert(options, source, {});
+  const Result<SourceToConvert> part = OpenToConvert(options, source, {}, bar);
   if (!part.ok()) return part.status();
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**part, 0);
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(*part->source, 0, source.options.progress);
   if (!volume.ok()) return AsInput(volume.status());
-  return LoadedVolume{.info = FileInfoOf((*part)->info()), .volume = *std::move(volume)};
+  return LoadedVolume{.info = FileInfoOf(part->source->info()), .volume = *std::move(volume)};
 }
 
 }  // namespace
@@ -77,8 +78,10 @@ Status RunConvert(const ConvertOptions& options) {
   if (Status status = CheckCanWrite("OUTPUT", options.output); !status.ok()) return status;
 
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source->path);
-  const Result<LoadedVolume> loaded = Read(options, *source);
+  ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source->path)); });
+  bar.Show(0, Describe(ReadShare{}, source->path));
+  source->options.progress = &reading;
+  const Result<LoadedVolume> loaded = Read(options, *source, bar);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
   if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;

@@ -8,36 +8,50 @@
 #include "client/cli/input_volume.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/positional/slice_stream.h"
 #include "data/sources/memory_source.h"
 #include "data/sources/part_source.h"
+#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 namespace {
 
-Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadContext::Limits& limits) {
+Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits,
+                             ProgressBar& bar) {
   if (FindSourceFormat(source.path, source.options) != nullptr) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
     WarnOfChannel(source.path, source.options, FileInfoOf((*opened)->info()));
-    return opened;
+    return SourceToConvert{*std::move(opened)};
+  }
+  if (!options.converts_part() && SliceStream::Recognises(source.path, source.options)) {
+    const auto stream = SliceStream::Open(source.path, source.options, std::make_shared<ReadContext>(limits));
+    if (!stream.ok()) return AsInput(stream.status());
+    return SourceToConvert{*stream, SliceOrder{(*stream)->along(), (*stream)->from_end()}};
   }
   if (Status status = CheckInputVolume(source); !status.ok()) return status;
   Result<std::vector<std::string>> files = CheckVolumeHeaders(source.path, source.options);
   if (!files.ok()) return AsInput(files.status());
-  const Result<LoadedVolume> loaded = ReadInputVolume(source);
+  ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source.path)); });
+  SourceText with_progress = source;
+  with_progress.options.progress = &reading;
+  const Result<LoadedVolume> loaded = ReadInputVolume(with_progress);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
-  return MakeMemorySource(loaded->volume,
-                          {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)});
+  return SourceToConvert{MakeMemorySource(loaded->volume, {.format = info.format,
+                                                           .file_type = info.file_type,
+                                                           .labels = info.labels,
+                                                           .files = *std::move(files)}),
+                         std::nullopt, std::uint64_t(info.description.voxel_bytes())};
 }
 
 }  // namespace
 
-Result<std::shared_ptr<VolumeSource>> OpenToConvert(const ConvertOptions& options, const SourceText& source,
-                                                    const ReadContext::Limits& limits) {
-  Result<std::shared_ptr<VolumeSource>> opened = Open(source, limits);
+Result<SourceToConvert> OpenToConvert(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits,
+                                      ProgressBar& bar) {
+  Result<SourceToConvert> opened = Open(options, source, limits, bar);
   if (!opened.ok() || !options.converts_part()) return opened;
-  const std::vector<SourceLevel>& levels = (*opened)->info().levels;
+  const std::vector<SourceLevel>& levels = opened->source->info().levels;
   if (std::size_t(options.level) >= levels.size()) {
     return Status::InvalidArgument(
         levels.size() == 1 ? fmt::format("--level is {}, but '{}' has level 0 alone", options.level, source.path)
@@ -51,7 +65,8 @@ Result<std::shared_ptr<VolumeSource>> OpenToConvert(const ConvertOptions& option
     return Status::InvalidArgument(fmt::format("--box: {} from {} to {}, but level {} of '{}' has {} voxels there", Letter(axis),
                                                box.begin[axis], box.end[axis], options.level, source.path, size[axis]));
   }
-  return MakePartSource(*std::move(opened), options.level, box);
+  opened->source = MakePartSource(std::move(opened->source), options.level, box);
+  return opened;
 }
 
 }  // namespace slabstream

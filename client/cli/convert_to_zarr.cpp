@@ -16,6 +16,7 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
@@ -48,11 +49,11 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   constexpr std::uint64_t kUsual = std::uint64_t{1} << 30;
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsual;
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source.path);
-  const Result<std::shared_ptr<VolumeSource>> opened = OpenToConvert(options, source, Share(memory, 0).reading);
+  bar.Show(0, Describe(ReadShare{}, source.path));
+  const Result<SourceToConvert> opened = OpenToConvert(options, source, Share(memory, 0).reading, bar);
   if (!opened.ok()) return opened.status();
-  const VolumeDescription& volume = (*opened)->info().levels[0].description;
-  const bool whole = FindSourceFormat(source.path, source.options) == nullptr && options.memory > 0;
+  const VolumeDescription& volume = opened->source->info().levels[0].description;
+  const std::uint64_t held = options.memory > 0 ? opened->memory : 0;
 
   Wakeup wakeup;
   const InterruptGuard guard(wakeup);
@@ -70,9 +71,10 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
     bar.Show(0.01 * its, fmt::format("writing {}: {} % of {}, {} a second", options.output, its, MemoryText(now.all_bytes),
                                      MemoryText(std::uint64_t(rate))));
   };
-  const Status status = WriteOmeZarr(**opened, options.output,
+  const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
-                                      .memory = Share(memory, whole ? std::uint64_t(volume.voxel_bytes()) : 0).writing,
+                                      .slices = opened->slices,
+                                      .memory = Share(memory, held).writing,
                                       .source = options.source,
                                       .stop = stop.get_token(),
                                       .progress = progress});

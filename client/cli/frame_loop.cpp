@@ -74,7 +74,7 @@ class FrameLoop {
     if (found == open_.end()) return Status::Ok();
     const std::size_t index = found->second;
     if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
-      display_.Show(int(index), *progress);
+      display_.Show(int(index), *progress, jobs_[index].source);
       return Status::Ok();
     }
     if (const auto* failure = std::get_if<Status>(&event.what)) {

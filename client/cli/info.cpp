@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +20,8 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/mesh_info.h"
 #include "client/cli/picture_info.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
@@ -41,12 +44,15 @@ struct VolumeFacts {
 
 // Of a volume with several levels, or a large one, what a survey of it tells; of any other one, what all voxels tell.
 Result<VolumeFacts> FactsOf(const std::string& source) {
-  Result<std::optional<OpenedSource>> opened = OpenInParts({source, ""}, std::uint64_t(kExactBytes));
-  if (!opened.ok()) return AsInput(opened.status());
-  if (*opened) return VolumeFacts{FileInfoOf((*opened)->source->info()), (*opened)->survey.summary, *std::move(opened)};
-  const Result<LoadedVolume> loaded = ReadInputVolume(source);
-  if (!loaded.ok()) return loaded.status();
-  return VolumeFacts{loaded->info, std::make_shared<const VolumeSummary>(Summarize(*loaded->volume))};
+  ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
+  const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
+  Result<ReadableSource> read = ReadSource({source, ""}, std::uint64_t(kExactBytes), tell);
+  if (!read.ok()) return AsInput(read.status());
+  if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
+    return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};
+  }
+  const LoadedSource& loaded = std::get<LoadedSource>(*read);
+  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(Summarize(*loaded.volume))};
 }
 
 std::uint64_t CountedVoxels(const VolumeSummary& summary) {

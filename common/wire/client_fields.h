@@ -31,6 +31,7 @@ void Fields(auto& io, Is<FrameProgress> auto& m) {
   io.Any(m.attempt, &P::attempt, &P::set_attempt);
   io.Any(m.workers, &P::workers, &P::set_workers);
   io.Range("read_percent", m.read_percent, &P::read_percent, &P::set_read_percent, 0, 100);
+  io.Any(m.read_rate, &P::read_rate, &P::set_read_rate);
 }
 
 void Fields(auto& io, Is<FramePrediction> auto& m) {

@@ -60,6 +60,7 @@ struct FrameProgress {
   std::uint32_t attempt = 0;  // above 1: workers were lost
   std::uint32_t workers = 0;
   std::uint32_t read_percent = 0;  // kLoading: of the dataset's samples, as far as is known; [0, 100]
+  std::uint64_t read_rate = 0;     // kLoading: bytes of samples a second; 0: not known
   friend bool operator==(const FrameProgress&, const FrameProgress&) = default;
 };
 

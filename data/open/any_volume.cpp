@@ -8,16 +8,13 @@
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
+#include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace {
-
-bool IsReadWhole(const std::string& path, const ReadOptions& options) {
-  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
-}
 
 // A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
@@ -56,6 +53,10 @@ void WarnOfChannel(const std::string& path, const ReadOptions& options, const Vo
   if (const auto text = ShownChannelText(path, info.channels, info.channel, options)) LogWarning(*text);
 }
 
+bool IsReadWhole(const std::string& path, const ReadOptions& options) {
+  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
+}
+
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
   if (IsReadWhole(path, options)) {
     Result<LoadedVolume> loaded = ReadVolume(path, options);
@@ -64,11 +65,7 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
   }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();
-  if (options.progress != nullptr) options.progress->Begin(100);
-  int told = 0;
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, [&](int percent) {
-    if (options.progress != nullptr) options.progress->Add(percent - std::exchange(told, percent));
-  });
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, options.progress);
   if (!volume.ok()) return volume.status();
   LoadedVolume loaded{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
   WarnOfChannel(path, options, loaded.info);
@@ -78,8 +75,14 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {
   if (IsReadWhole(path, options)) {
     Result<std::vector<std::string>> files = CheckVolumeHeaders(path, options);
-    const bool too_large = files.status().code() == StatusCode::kResourceExhausted;
-    if (!too_large || FindSourceFormat(path, options) == nullptr) return files;
+    if (files.status().code() != StatusCode::kResourceExhausted) return files;
+    // Too large to be held, but perhaps not to be read.
+    if (SliceStream::Recognises(path, options)) {
+      const Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(path, options, nullptr);
+      if (!stream.ok()) return stream.status();
+      return (*stream)->info().files;
+    }
+    if (FindSourceFormat(path, options) == nullptr) return files;
   }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();

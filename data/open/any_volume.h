@@ -27,8 +27,10 @@ void WarnOfChannel(const std::string& path, const ReadOptions& options, const Vo
 
 // ReadVolume, or the finest level of a source; and WarnOfChannel.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
-// CheckVolumeHeaders, or the files of a source, which it opens.
+// CheckVolumeHeaders, or the files of a source, which it opens, or of a compressed stream, which may be larger than the memory.
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});
+// Whether ReadVolume knows the path; else only a source can be it.
+bool IsReadWhole(const std::string& path, const ReadOptions& options);
 // CheckVolume, or whether a format of sources knows the path.
 Status CheckAnyVolume(const std::string& path, const ReadOptions& options = {});
 bool LooksLikeAnyVolume(const std::string& path);

@@ -62,7 +62,8 @@ TEST_F(ConvertTest, WritesAnOmeZarrWithLevels) {
   MustRun({"convert", "a.ome.zarr", "b.ome.zarr/", "--zarr-version", "0.4"});
   EXPECT_TRUE(std::filesystem::exists(Path("b.ome.zarr/0/1/1/1")));
   MustRun({"convert", "b.ome.zarr", "c.ome.zarr"});
-  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("c.ome.zarr" + shard), Read("a.ome.zarr" + shard));
+  MustRun({"convert", "a.ome.zarr", "d.ome.zarr"});
+  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("c.ome.zarr" + shard), Read("d.ome.zarr" + shard));
   ExpectRefused({"convert", "s.nrrd", "a.ome.zarr"}, "OUTPUT 'a.ome.zarr' exists: remove it, or name another folder");
   ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--type", "int8"}, "--type: an OME-Zarr keeps the type of SOURCE");
   ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--zarr-version", "0.3"}, "--zarr-version: expected 0.4 or 0.5, not '0.3'");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -12,7 +13,9 @@
 #include "data/open/open_source.h"
 #include "data/sources/memory_source.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/volume_reader.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
 #include "tests/support/temporary_directory.h"
 
@@ -126,6 +129,88 @@ TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
     ExpectNothingHeld();
   }
 }
+
+// ---------------------------------------------------------------- compressed streams
+
+class StreamsInPartsTest : public InPartsTest {
+ protected:
+  StreamsInPartsTest() { ::setenv("XDG_CACHE_HOME", (directory_ / "cache").c_str(), 1); }
+
+  // The ball as a compressed stream: a file for each format.
+  std::vector<std::string> Streams() const {
+    const auto* const bytes = reinterpret_cast<const char*>(ball_->block.bytes.data());
+    const FileBytes samples(bytes, ball_->block.bytes.size()), zlib = Zlib(samples);
+    const FileSpec spec{.size = ball_->description.geometry.size, .spacing = {1, 1, 1}};
+    const std::pair<std::string, FileBytes> files[] = {{"ball.nii.gz", Gzip(NiftiHeader(spec) + samples)},
+                                                       {"ball.nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)},
+                                                       {"ball.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())) + zlib}};
+    std::vector<std::string> paths;
+    for (const auto& [name, file] : files) {
+      paths.push_back((directory_ / name).string());
+      WriteFile(paths.back(), file);
+    }
+    return paths;
+  }
+  fs::path StoreOf(const std::string& path) const {
+    for (const auto& each : fs::directory_iterator(directory_ / "cache/slabstream/streams")) {
+      if (each.is_directory() && each.path().filename().string().starts_with(fs::path(path).stem().stem().string())) return each.path();
+    }
+    return {};
+  }
+};
+
+TEST_F(StreamsInPartsTest, PicturesAreThoseOfVoxelsInMemory) {
+  for (const std::string& path : Streams()) {
+    const Volume whole = *ReadVolume(path)->volume;
+    ASSERT_EQ(whole.block.bytes, ball_->block.bytes);
+    for (const bool first : {true, false}) {
+      Start(path);
+      for (const RendererKind* renderer : VoxelRenderers()) {
+        FrameRequest request = RequestsFor(renderer)[first ? 0 : 3];
+        SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name());
+        ExpectPictureOf(request, whole);  // it has one level, as in memory
+        request.level = "1";
+        EXPECT_THAT(Render(request).status().message(), HasSubstr("has level 0 alone"));
+      }
+      ExpectNothingHeld();
+    }
+    fs::remove_all(directory_ / "cache");
+  }
+}
+
+TEST_F(StreamsInPartsTest, AStoreThatIsRemovedIsNoticedAndMadeAgain) {
+  const std::string path = Streams().front();
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  ExpectPictureOf(request, *ball_);
+  // What is not there would be zeros.
+  for (const auto& each : fs::directory_iterator(StoreOf(path) / "0/c")) fs::remove_all(each);
+  const Result<Picture> without = Render(request);
+  if (without.ok()) {
+    ExpectPictureOf(request, *ball_);
+  } else {
+    EXPECT_EQ(std::ranges::count(without.status().message(), '\n'), 0);
+  }
+  fs::remove_all(StoreOf(path));
+  for (int attempt = 0; attempt < 3 && !Render(request).ok(); ++attempt) {
+  }
+  ExpectPictureOf(request, *ball_);
+  EXPECT_TRUE(fs::exists(StoreOf(path) / "zarr.json"));
+}
+
+TEST_F(StreamsInPartsTest, AStreamThatChangesIsReadAgain) {
+  const std::string path = Streams().front();
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  ExpectPictureOf(request, *ball_);
+  const std::shared_ptr<const Volume> smaller = TestSphere(90);
+  const FileSpec spec{.size = smaller->description.geometry.size, .spacing = {1, 1, 1}};
+  WriteFile(path,
+            Gzip(NiftiHeader(spec) + FileBytes(reinterpret_cast<const char*>(smaller->block.bytes.data()), smaller->block.bytes.size())));
+  ExpectPictureOf(request, *smaller);
+}
+
+// ---------------------------------------------------------------- workers
 
 TEST_F(InPartsTest, WorkersComeAndGo) {
   Start(Zarr(ball_), 3);

@@ -318,7 +318,7 @@ std::vector<SubmitFrame> SamplesOf() {
 
 template <>
 std::vector<FrameProgress> SamplesOf() {
-  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2, 100}};
+  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2, 100, kMax64}};
 }
 
 template <>

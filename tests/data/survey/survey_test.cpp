@@ -28,7 +28,8 @@ TEST(SurveyTest, OfWhatIsNotLargeIsThatOfAllItsVoxels) {
     for (const Index3& size : {Index3{1, 1, 1}, Index3{150, 70, 33}, Index3{17, 400, 65}}) {
       const std::shared_ptr<const Volume> volume = SomeVolume(random, size, type);
       std::vector<int> percents;
-      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), [&](int percent) { percents.push_back(percent); });
+      ReadProgress progress([&](const ReadShare& read) { percents.push_back(read.percent); });
+      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), &progress);
       ASSERT_TRUE(survey.ok()) << survey.status().message();
       EXPECT_EQ(survey->level, 0);
       EXPECT_EQ(*survey->summary, Summarize(*volume));

@@ -75,7 +75,7 @@ const std::vector<double> kHalfValues = {0, 0x1p-24, 0.333251953125, 1, -2, 6550
 // What is told while a file is read.
 std::vector<int> PercentsOf(const std::string& path, ReadOptions options = {}) {
   std::vector<int> told;
-  ReadProgress progress([&](int percent) { told.push_back(percent); });
+  ReadProgress progress([&](const ReadShare& read) { told.push_back(read.percent); });
   options.progress = &progress;
   EXPECT_TRUE(ReadVolume(path, options).ok());
   return told;
