@@ -4,6 +4,8 @@
 
 #include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -11,10 +13,8 @@
 #include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/wire/payload.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
-#include "data/sources/read_part.h"
 
 namespace slabstream {
 namespace {
@@ -38,16 +38,16 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
 }  // namespace
 
 struct StoredVoxels::Shared {
-  using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
-  struct Place {  // of a source and version
+  using Piece = std::tuple<std::uint64_t, Box, std::uint32_t>;  // generation of the padded box; box and number of the chunk
+  struct Place {                                                // of a source and version
     bool known = false;
     std::shared_ptr<VolumeSource> source = nullptr;  // null: it is not seen from here
   };
 
   std::mutex mutex;  // guards what follows
-  std::function<void(MessageReceived)> deliver;
+  std::function<void(WorkerEvent)> deliver;
   std::map<std::pair<std::string, std::uint64_t>, Place> places;
-  std::map<ChunkName, int> reading;  // how often each was asked for: two boxes may need the same voxels
+  std::set<Piece> reading;
   BackgroundTasks opening{kOpensAtOnce};
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
@@ -59,23 +59,18 @@ struct StoredVoxels::Shared {
     });
   }
 
-  void Deliver(const ChunkRequest& request, Result<Bytes> samples) {
-    MessageReceived message;
-    const Status packed = Guarded("a chunk of voxels", [&] {
-      if (!samples.ok()) return samples.status();
-      Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-      message.payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
-      message.message = chunk;
-      return Status::Ok();
-    });
-    if (!packed.ok()) message.message = ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, packed};
+  void End(const BoxKey& padded, const ChunkRequest& request, const Status& status) {
+    WorkerEvent event = ChunkStored{padded, request.box, request.chunk, {}};
+    if (!status.ok()) {
+      event = MessageReceived{ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, status}, {}};
+    }
     const std::lock_guard lock(mutex);
-    const auto asked = reading.extract({request.dataset, request.box, request.chunk});
-    for (int i = 0; deliver && i < asked.mapped(); ++i) deliver(message);
+    reading.erase({padded.generation, request.box, request.chunk});
+    if (deliver) deliver(std::move(event));
   }
 };
 
-StoredVoxels::StoredVoxels(std::function<void(MessageReceived)> deliver) : shared_(std::make_shared<Shared>()) {
+StoredVoxels::StoredVoxels(std::function<void(WorkerEvent)> deliver) : shared_(std::make_shared<Shared>()) {
   shared_->deliver = std::move(deliver);
 }
 
@@ -84,19 +79,31 @@ StoredVoxels::~StoredVoxels() {
   shared_->deliver = nullptr;
 }
 
-bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored) {
+bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded) {
+  const ChunkRequest& request = wanted.request;
+  const StoredAt& stored = *wanted.stored;
+  if (request.chunk != 0) return false;  // not all samples of its box: BoxFetcher asks for none like that
   std::shared_ptr<VolumeSource> source;
   {
     const std::lock_guard lock(shared_->mutex);
     const auto [place, is_new] = shared_->places.try_emplace({stored.source, stored.version});
     if (is_new) shared_->Find(stored, shared_);
     if (place->second.source == nullptr) return false;
-    if (++shared_->reading[{request.dataset, request.box, request.chunk}] > 1) return true;
+    if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
     source = place->second.source;
   }
-  const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);
-  ReadPart(source, stored.level, request.box, part.begin, part.bytes,
-           [shared = shared_, request](Result<Bytes> samples) { shared->Deliver(request, std::move(samples)); });
+  const auto end = [shared = shared_, key = wanted.padded, request, padded, source](const Status& status) {
+    shared->End(key, request, status);
+  };
+  const Status begun = Guarded("voxels of a box", [&] {
+    if (const std::optional<BoxRoom> room = padded->RoomFor(request.box)) {
+      source->Read(stored.level, request.box, *room, {}, end);
+    } else {
+      end(Status::Ok());
+    }
+    return Status::Ok();
+  });
+  if (!begun.ok()) end(begun);  // no memory
   return true;
 }
 

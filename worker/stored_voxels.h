@@ -1,14 +1,14 @@
-// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds
-// out by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked.
+// StoredVoxels: reads voxels from the files that hold them, where this process sees the same files as the coordinator, straight to where a
+// padded box stores them. It finds out by looking: until a source is open and known to be the same one, and wherever it is not, the
+// coordinator is asked.
 //
-// One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
+// One thread uses an object of this class.
 #pragma once
 
 #include <functional>
 #include <memory>
 
-#include "common/volume/stored_at.h"
-#include "common/wire/any_message.h"
+#include "worker/stored_box.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
@@ -16,14 +16,14 @@ namespace slabstream {
 class StoredVoxels {
  public:
   // `deliver`: called on any thread, never once this is destroyed.
-  explicit StoredVoxels(std::function<void(MessageReceived)> deliver);
+  explicit StoredVoxels(std::function<void(WorkerEvent)> deliver);
   ~StoredVoxels();
   StoredVoxels(const StoredVoxels&) = delete;
   StoredVoxels& operator=(const StoredVoxels&) = delete;
 
-  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come for each call. False: the coordinator must be
-  // asked.
-  bool Read(const ChunkRequest& request, const StoredAt& stored);
+  // Begins to read a piece of stored voxels into the padded box, unless that is under way: ChunkStored or ChunkRefused will come. False:
+  // the coordinator must be asked.
+  bool Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded);
 
  private:
   struct Shared;  // with reads that outlive this
