@@ -39,7 +39,7 @@ Status SliceStream::ReadAll(std::int32_t slices, const Take& take, const std::st
 
   PayloadStream stream(volume_.payload, header.sample_bytes());
   if (Status status = stream.Open(); !status.ok()) return status;
-  TurnedBox to{.turn = volume_.turn, .size = description.geometry.size, .box = {}, .out = kept.data()};
+  TurnedBox to{.turn = volume_.turn, .size = description.geometry.size, .box = {}, .out = {}};
   const std::array<std::int64_t, 3> steps = {header.components, std::int64_t{header.components} * header.size.x,
                                              std::int64_t{header.components} * header.size.x * header.size.y};
   // From the volume's end on, what is left beyond the last multiple comes first.
@@ -52,6 +52,7 @@ Status SliceStream::ReadAll(std::int32_t slices, const Take& take, const std::st
     if (volume_.payload.big_endian) SwapByteOrder(header.type, bytes);
     const Box part = {{0, 0, z}, {header.size.x, header.size.y, z + count}};
     to.box = to.Turned(part);
+    to.out = BoxRoom::Dense(to.box, kept.data());
     to.Fill(part, header.type, stored.data() + std::size_t(volume_.channel) * BytesPerSample(header.type), steps);
     if (Status status = take(to.box, std::span(kept).first(std::size_t(count) * kept_slice_bytes)); !status.ok()) return status;
   }
