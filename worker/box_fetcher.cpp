@@ -11,12 +11,16 @@
 namespace slabstream {
 namespace {
 
-// Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings.
+// Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings, or at parts of one. So each piece is
+// one chunk.
 std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types) {
   Index3 block = stored.block.end, end;
   for (const Box& box : boxes) end = Max(end, box.end);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
+  }
+  for (const Axis axis : {Axis::kZ, Axis::kY, Axis::kX}) {
+    while (CountIn(block) * types.bytes_per_voxel() > kChunkBytes && block[axis] > 1) block[axis] = (block[axis] + 1) / 2;
   }
   std::vector<Box> pieces;
   for (const Box& box : boxes) {
@@ -86,7 +90,7 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
     at_hand.push_back(other.key.box);
   }
   const BoxAssembly assembly = Assemble(padded.key.box, at_hand, MostMissing(padded.key.box));
-  OpenBox open{padded.key, {}};
+  OpenBox open{padded.key, {}, padded.stored_at != nullptr};
   for (const BoxAssembly::Part& part : assembly.copied) {
     HeldBox& source = *sources[part.source];
     open.copies.push_back({source.key, part.box});
@@ -169,7 +173,7 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         ++in_flight;
         if (!padded.requested) padded.report.begin = now;
         padded.requested = true;
-        actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
+        actions.push_back(SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
       }
     }
   }
@@ -216,7 +220,7 @@ void BoxFetcher::OnRefused(const ChunkRefused& refused) {
 void BoxFetcher::OnStored(const ChunkStored& stored, Time now) {
   const ChunkPlace place{stored.box, stored.chunk};
   const auto request = in_flight_.find({stored.padded.generation, place});
-  if (request == in_flight_.end() || !request->second.storing) return;
+  if (request == in_flight_.end()) return;
   if (!stored.status.ok()) {
     HeldBox* padded = Find(stored.padded.generation);
     Retry(stored.padded.generation, place, stored.status);
@@ -236,6 +240,7 @@ void BoxFetcher::OnStored(const ChunkStored& stored, Time now) {
       padded->chunk_count += count - 1;
     }
     padded->report.voxel_bytes += bytes;
+    padded->report.stored_bytes += stored.stored_bytes;
     padded->report.end = now;
     if (padded->is_complete()) RetireCovered(*padded);
   }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -12,10 +14,8 @@
 #include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/wire/payload.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
-#include "data/sources/read_part.h"
 
 namespace slabstream {
 namespace {
@@ -37,8 +37,8 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
 }  // namespace
 
 struct StoredVoxels::Shared {
-  using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
-  using PlaceName = std::pair<std::string, std::uint64_t>;  // a source, and its version
+  using Piece = std::tuple<std::uint64_t, Box, std::uint32_t>;  // generation of the padded box; box and number of the chunk
+  using PlaceName = std::pair<std::string, std::uint64_t>;      // a source, and its version
   struct Place {
     bool looking = false;                            // at it, just now
     Time looked;                                     // the last time
@@ -47,9 +47,9 @@ struct StoredVoxels::Shared {
   };
 
   std::mutex mutex;  // guards what follows
-  std::function<void(MessageReceived)> deliver;
+  std::function<void(WorkerEvent)> deliver;
   std::map<PlaceName, Place> places;
-  std::map<ChunkName, int> reading;  // how often each was asked for: two boxes may need the same voxels
+  std::set<Piece> reading;
   BackgroundTasks opening{kOpensAtOnce};
 
   // The source at this place; null: it is not seen from here, or not known to be, and looked for if it is time. Called with the mutex.
@@ -87,27 +87,20 @@ struct StoredVoxels::Shared {
     if (const auto place = places.find(name); place != places.end()) place->second.source = nullptr;
   }
 
-  void Deliver(const ChunkRequest& request, VolumeSource& source, Result<Bytes> samples) {
-    MessageReceived message;
-    const Status packed = Guarded("a chunk of voxels", [&] {
-      if (!samples.ok()) return samples.status();
-      Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-      chunk.stored_bytes = source.TakeStoredBytes();
-      message.payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
-      message.message = chunk;
-      return Status::Ok();
-    });
-    if (!packed.ok()) message.message = ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, packed};
-    const std::lock_guard lock(mutex);
-    const auto asked = reading.extract({request.dataset, request.box, request.chunk});
-    for (int i = 0; deliver && i < asked.mapped(); ++i) {
-      deliver(message);
-      if (auto* chunk = std::get_if<Chunk>(&message.message)) chunk->stored_bytes = 0;  // told once
+  void End(const SendChunkRequest& wanted, VolumeSource& source, const Status& status) {
+    const ChunkRequest& request = wanted.request;
+    WorkerEvent event = ChunkStored{wanted.padded, request.box, request.chunk, {}, status.ok() ? source.TakeStoredBytes() : 0};
+    if (status.code() == StatusCode::kUnavailable) Lose({wanted.stored->source, wanted.stored->version});
+    if (!status.ok()) {
+      event = MessageReceived{ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, status}, {}};
     }
+    const std::lock_guard lock(mutex);
+    reading.erase({wanted.padded.generation, request.box, request.chunk});
+    if (deliver) deliver(std::move(event));
   }
 };
 
-StoredVoxels::StoredVoxels(std::function<void(MessageReceived)> deliver) : shared_(std::make_shared<Shared>()) {
+StoredVoxels::StoredVoxels(std::function<void(WorkerEvent)> deliver) : shared_(std::make_shared<Shared>()) {
   shared_->deliver = std::move(deliver);
 }
 
@@ -116,20 +109,27 @@ StoredVoxels::~StoredVoxels() {
   shared_->deliver = nullptr;
 }
 
-bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored, Time now) {
+bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now) {
+  const ChunkRequest& request = wanted.request;
+  const StoredAt& stored = *wanted.stored;
+  if (request.chunk != 0) return false;  // not all samples of its box: BoxFetcher asks for none like that
   std::shared_ptr<VolumeSource> source;
   {
     const std::lock_guard lock(shared_->mutex);
     source = shared_->SourceAt(stored, now, shared_);
     if (source == nullptr) return false;
-    if (++shared_->reading[{request.dataset, request.box, request.chunk}] > 1) return true;
+    if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
-  const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);
-  ReadPart(source, stored.level, request.box, part.begin, part.bytes,
-           [shared = shared_, request, source, name = Shared::PlaceName(stored.source, stored.version)](Result<Bytes> samples) {
-             if (samples.status().code() == StatusCode::kUnavailable) shared->Lose(name);
-             shared->Deliver(request, *source, std::move(samples));
-           });
+  const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };
+  const Status begun = Guarded("voxels of a box", [&] {
+    if (const std::optional<BoxRoom> room = padded->RoomFor(request.box)) {
+      source->Read(stored.level, request.box, *room, {}, end);
+    } else {
+      end(Status::Ok());
+    }
+    return Status::Ok();
+  });
+  if (!begun.ok()) end(begun);  // no memory
   return true;
 }
 

@@ -11,8 +11,7 @@
 #include <memory>
 
 #include "common/base/time.h"
-#include "common/volume/stored_at.h"
-#include "common/wire/any_message.h"
+#include "worker/stored_box.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
@@ -23,14 +22,14 @@ class StoredVoxels {
   static constexpr std::size_t kMostPlaces = 16;  // sources in one version each
 
   // `deliver`: called on any thread, never once this is destroyed.
-  explicit StoredVoxels(std::function<void(MessageReceived)> deliver);
+  explicit StoredVoxels(std::function<void(WorkerEvent)> deliver);
   ~StoredVoxels();
   StoredVoxels(const StoredVoxels&) = delete;
   StoredVoxels& operator=(const StoredVoxels&) = delete;
 
-  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come for each call. False: the coordinator must be
-  // asked.
-  bool Read(const ChunkRequest& request, const StoredAt& stored, Time now);
+  // Begins to read a piece of stored voxels into the padded box, unless that is under way: ChunkStored or ChunkRefused will come. False:
+  // the coordinator must be asked.
+  bool Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now);
 
  private:
   struct Shared;  // with reads that outlive this

@@ -32,7 +32,7 @@ class StoredSource : public VolumeSource {
 
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return bricks_->counts(); }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     bricks_->Read(level, box, out, std::move(stop), std::move(done));
   }
 

@@ -40,7 +40,7 @@ class UnchangedSource : public VolumeSource {
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return source_->counts(); }
 
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     source_->Read(level, box, out, std::move(stop),
                   [watched = watched_, done = std::move(done)](Status read) { done(watched->EndOf(std::move(read))); });
   }

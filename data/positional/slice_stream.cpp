@@ -41,14 +41,13 @@ VolumeSource::Counts SliceStream::counts() const {
   return counts_;
 }
 
-void SliceStream::Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) {
+void SliceStream::Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) {
   const VolumeDescription& description = info().levels.front().description;
   CHECK(level == 0 && !box.empty() && description.geometry.bounds().Contains(box)) << "a box outside the volume";
-  CHECK(out.size() == std::size_t(box.voxel_count()) * BytesPerSample(description.type)) << out.size();
   context_->PostDecode([this, box, out, stop = std::move(stop), done = std::move(done)] { done(ReadBox(box, out, stop)); });
 }
 
-Status SliceStream::ReadBox(const Box& box, std::span<std::byte> out, const std::stop_token& stop) {
+Status SliceStream::ReadBox(const Box& box, const BoxRoom& out, const std::stop_token& stop) {
   const std::lock_guard lock(mutex_);
   Status status;
   try {
@@ -67,13 +66,13 @@ Status SliceStream::Rewind() {
   return stream_->Open();
 }
 
-Status SliceStream::ReadSlices(const Box& box, std::span<std::byte> out, const std::stop_token& stop) {
+Status SliceStream::ReadSlices(const Box& box, const BoxRoom& out, const std::stop_token& stop) {
   constexpr std::size_t kPiece = std::size_t{1} << 20;  // stays in a processor's cache between the two steps
   const RawHeader& header = volume_.header;
   const std::size_t slice_bytes = std::size_t(header.sample_bytes() / header.size.z), sample_bytes = BytesPerSample(header.type);
   const std::array<std::int64_t, 3> steps = {header.components, std::int64_t{header.components} * header.size.x,
                                              std::int64_t{header.components} * header.size.x * header.size.y};
-  const TurnedBox to{.turn = volume_.turn, .size = info().levels.front().description.geometry.size, .box = box, .out = out.data()};
+  const TurnedBox to{.turn = volume_.turn, .size = info().levels.front().description.geometry.size, .box = box, .out = out};
   const Box wanted = to.Stored();
   if (stream_ == nullptr || next_ > wanted.begin.z) {
     if (Status status = Rewind(); !status.ok()) return status;

@@ -32,13 +32,13 @@ class SliceStream : public VolumeSource {
   // One level; its block is a slice.
   const SourceInfo& info() const override { return volume_.info; }
   // Memory: some slices as they are stored. DataLoss: truncated or damaged; damage may show only with the last slice.
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override;
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override;
   Counts counts() const override;
 
  private:
   SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context);
-  Status ReadBox(const Box& box, std::span<std::byte> out, const std::stop_token& stop);
-  Status ReadSlices(const Box& box, std::span<std::byte> out, const std::stop_token& stop);
+  Status ReadBox(const Box& box, const BoxRoom& out, const std::stop_token& stop);
+  Status ReadSlices(const Box& box, const BoxRoom& out, const std::stop_token& stop);
   Status Rewind();
 
   const std::string path_;

@@ -22,7 +22,7 @@ class PartSource : public VolumeSource {
 
   const SourceInfo& info() const override { return info_; }
 
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     CHECK_EQ(level, 0);
     source_->Read(level_, {box.begin + begin_, box.end + begin_}, out, std::move(stop), std::move(done));
   }

@@ -3,7 +3,15 @@
 #include <future>
 #include <utility>
 
+#include "common/base/check.h"
+
 namespace slabstream {
+
+void VolumeSource::Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) {
+  const ScalarType type = info().levels.at(std::size_t(level)).description.type;
+  CHECK_EQ(out.size(), std::size_t(box.voxel_count()) * BytesPerSample(type));
+  Read(level, box, BoxRoom::Dense(box, out.data()), std::move(stop), std::move(done));
+}
 
 Status VolumeSource::ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop) {
   std::promise<Status> end;

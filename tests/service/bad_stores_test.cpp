@@ -35,7 +35,7 @@ class FaultySource : public VolumeSource {
 
   const SourceInfo& info() const override { return source_->info(); }
   Counts counts() const override { return {}; }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     std::unique_lock lock(mutex_);
     if (failing_ > 0) {
       --failing_;

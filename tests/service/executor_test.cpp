@@ -408,25 +408,27 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {
     const RankReport expected = render(direct, 1);
     EXPECT_GT(expected.image_pixels, 0U);
 
-    // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
-    executor_.Perform(OpenBox{lower, {}});
-    store(lower, lower.box);
-    executor_.Perform(OpenBox{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}});
-    store(side, {{20, 0, 30}, {60, 60, 50}});
-    executor_.Perform(OpenBox{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}});
-    store(put_together, {{0, 0, 30}, {20, 60, 50}});
-    store(put_together, {{0, 0, 50}, {60, 60, 60}});
-    store_cells(put_together);
-    executor_.Perform(DropBox{lower});
-    executor_.Perform(DropBox{side});
-    const RankReport report = render(put_together, 2);
-    EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
-    EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
-    EXPECT_EQ(report.image_bounds, expected.image_bounds);
-    EXPECT_EQ(report.image_pixels, expected.image_pixels);
-    for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
+    for (const bool stored : {false, true}) {  // voxels that are read in parts are stored in another way
+      // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
+      executor_.Perform(OpenBox{lower, {}, stored});
+      store(lower, lower.box);
+      executor_.Perform(OpenBox{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}, stored});
+      store(side, {{20, 0, 30}, {60, 60, 50}});
+      executor_.Perform(OpenBox{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}, stored});
+      store(put_together, {{0, 0, 30}, {20, 60, 50}});
+      store(put_together, {{0, 0, 50}, {60, 60, 60}});
+      store_cells(put_together);
+      executor_.Perform(DropBox{lower});
+      executor_.Perform(DropBox{side});
+      const RankReport report = render(put_together, 2);
+      EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
+      EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
+      EXPECT_EQ(report.image_bounds, expected.image_bounds);
+      EXPECT_EQ(report.image_pixels, expected.image_pixels);
+      for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
+      executor_.Perform(DropBox{put_together});
+    }
     executor_.Perform(DropBox{direct});
-    executor_.Perform(DropBox{put_together});
   }
 }
 

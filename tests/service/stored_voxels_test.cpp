@@ -27,40 +27,47 @@ class StoredVoxelsTest : public testing::Test {
     stored_ = {path_, 0, source->info().version, {{0, 0, 0}, source->info().levels.front().block}};
   }
   // Once it reads there. Looks end on another thread.
-  MessageReceived Read(Time now) {
-    std::promise<MessageReceived> read;
-    std::future<MessageReceived> message = read.get_future();
+  WorkerEvent Read(Time now) {
+    std::promise<WorkerEvent> read;
+    std::future<WorkerEvent> event = read.get_future();
     reads_ = std::move(read);
-    while (!voxels_.Read(request_, stored_, now)) std::this_thread::yield();
-    return message.get();
+    while (!Begin(now)) std::this_thread::yield();
+    return event.get();
+  }
+  bool Begin(Time now) { return voxels_.Read({kPadded, request_, std::make_shared<const StoredAt>(stored_)}, box_, now); }
+  static bool Refused(const WorkerEvent& event) {
+    const auto* message = std::get_if<MessageReceived>(&event);
+    return message != nullptr && std::holds_alternative<ChunkRefused>(message->message);
   }
 
   const TemporaryDirectory directory_;
   const std::string path_ = directory_ / "v.nrrd", elsewhere_ = directory_ / "elsewhere";
+  static inline const BoxKey kPadded{.dataset = 3, .box = {{0, 0, 0}, kSize}, .types = ScalarType::kUint8, .generation = 1};
+  const std::shared_ptr<StoredBox> box_ = std::make_shared<StoredBox>(kPadded, std::vector<StoredBox::Copy>(), true);
   const ChunkRequest request_{.epoch = 1, .worker = 2, .dataset = 3, .box = {{0, 0, 0}, kSize}};
   StoredAt stored_;
-  std::promise<MessageReceived> reads_;
-  StoredVoxels voxels_{[this](MessageReceived message) { reads_.set_value(std::move(message)); }};
+  std::promise<WorkerEvent> reads_;
+  StoredVoxels voxels_{[this](WorkerEvent event) { reads_.set_value(std::move(event)); }};
 };
 
 TEST_F(StoredVoxelsTest, AreReadOnceTheFilesAreSeen) {
   fs::rename(path_, elsewhere_);
   const Time now = Time{} + std::chrono::hours(1);
-  EXPECT_FALSE(voxels_.Read(request_, stored_, now));
+  EXPECT_FALSE(Begin(now));
   fs::rename(elsewhere_, path_);
-  const MessageReceived message = Read(now + StoredVoxels::kLookAgain);
-  ASSERT_TRUE(std::holds_alternative<Chunk>(message.message));
-  EXPECT_EQ(message.payload.size(), CountIn(kSize));
+  const WorkerEvent event = Read(now + StoredVoxels::kLookAgain);
+  ASSERT_TRUE(std::holds_alternative<ChunkStored>(event));
+  EXPECT_EQ(*box_->RoomFor(kPadded.box)->first, std::byte{7});
 }
 
 TEST_F(StoredVoxelsTest, WhatCannotBeReadAnyMoreIsLeftToTheCoordinatorUntilItIsSeenAgain) {
   const Time now = Time{} + std::chrono::hours(1);
-  EXPECT_TRUE(std::holds_alternative<Chunk>(Read(now).message));
+  EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now)));
   fs::rename(path_, elsewhere_);
-  EXPECT_TRUE(std::holds_alternative<ChunkRefused>(Read(now).message));
-  EXPECT_FALSE(voxels_.Read(request_, stored_, now));
+  EXPECT_TRUE(Refused(Read(now)));
+  EXPECT_FALSE(Begin(now));
   fs::rename(elsewhere_, path_);
-  EXPECT_TRUE(std::holds_alternative<Chunk>(Read(now + StoredVoxels::kLookAgain).message));
+  EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now + StoredVoxels::kLookAgain)));
 }
 
 }  // namespace

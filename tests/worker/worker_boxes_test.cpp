@@ -339,6 +339,34 @@ TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
   EXPECT_GT(requests.size(), 1U);
 }
 
+TEST_F(WorkerBoxesTest, AsksForPartsOfLargeBlocksEachOfWhichIsOneChunk) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  StoreAt(StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 512}}}, assignment);
+  assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};
+  std::int64_t voxels = 0;
+  for (const SendChunkRequest& request : All<SendChunkRequest>(Tell(assignment))) {
+    EXPECT_EQ(request.request.chunk, 0U);
+    EXPECT_LE(request.request.box.voxel_count(), kChunkBytes);
+    voxels += request.request.box.voxel_count();
+  }
+  EXPECT_EQ(voxels, 128 * 128 * 256);
+}
+
+TEST_F(WorkerBoxesTest, VoxelsThatItReadsItselfNeedNoChunk) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  StoreAt(StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}}, assignment);
+  assignment.group.placements[0].box = {{0, 0, 64}, {128, 120, 128}};
+  const Actions told = Tell(assignment);
+  EXPECT_TRUE(All<OpenBox>(told).at(0).stored);
+  Actions last;
+  for (const SendChunkRequest& request : All<SendChunkRequest>(told)) {
+    EXPECT_THAT(All<StartRender>(last), IsEmpty());
+    last = Tell(ChunkStored{request.padded, request.request.box, request.request.chunk, {}});
+    EXPECT_THAT(All<StoreChunk>(last), IsEmpty());
+  }
+  EXPECT_THAT(All<StartRender>(last), SizeIs(1));
+}
+
 TEST_F(WorkerBoxesTest, AsksForSmallBlocksTogether) {
   GroupAssignment assignment = Assignment(1, {kSelf});
   StoreAt(StoredAt{.source = "/data/scan.nrrd", .block = {{0, 0, 0}, {128, 1, 1}}}, assignment);

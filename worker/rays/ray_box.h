@@ -3,8 +3,8 @@
 
 #include "common/volume/grid_map.h"
 #include "worker/rays/macrocell_ranges.h"
-#include "worker/rays/padded_voxels.h"
 #include "worker/rays/view_rays.h"
+#include "worker/renderers/padded_voxels.h"
 
 namespace slabstream {
 

@@ -22,9 +22,11 @@ std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most
 const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
   if (!pieces_.empty()) return pieces_;
   const VoxelBricks bricks = data.bricks();
-  for (const Box& layer : CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes)) {
+  const PaddedVoxels* const padded = data.padded();
+  const std::vector<Box> layers = CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes);
+  for (const Box& layer : layers) {
     RayPiece piece;
-    piece.voxels = Pad(bricks, layer);
+    piece.voxels = padded != nullptr && layers.size() == 1 ? *padded : Pad(bricks, layer);
     piece.cells = FindMacrocellRanges(piece.voxels);
     pieces_.push_back(std::move(piece));
   }
@@ -33,7 +35,10 @@ const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
 
 std::size_t RayVolume::bytes() const {
   std::size_t total = 0;
-  for (const RayPiece& piece : pieces_) total += piece.voxels.bytes() + piece.cells.bytes();
+  for (const RayPiece& piece : pieces_) {
+    const bool shared = piece.voxels.samples.use_count() > 1;  // with the padded box, which counts them
+    total += (shared ? 0 : piece.voxels.bytes()) + piece.cells.bytes();
+  }
   return total;
 }
 

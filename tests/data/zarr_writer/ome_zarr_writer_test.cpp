@@ -300,9 +300,9 @@ class CountedSource : public VolumeSource {
  public:
   explicit CountedSource(std::shared_ptr<VolumeSource> source) : source_(std::move(source)) {}
   const SourceInfo& info() const override { return source_->info(); }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     ++reads;
-    largest = std::max(largest, out.size());
+    largest = std::max(largest, std::size_t(box.voxel_count()) * BytesPerSample(info().levels[0].description.type));
     source_->Read(level, box, out, std::move(stop), std::move(done));
   }
   Counts counts() const override { return source_->counts(); }
@@ -353,7 +353,7 @@ class RecordedSource : public VolumeSource {
  public:
   explicit RecordedSource(std::shared_ptr<VolumeSource> source) : source_(std::move(source)) {}
   const SourceInfo& info() const override { return source_->info(); }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     boxes.push_back(box);
     source_->Read(level, box, out, std::move(stop), std::move(done));
   }

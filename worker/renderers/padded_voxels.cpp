@@ -1,4 +1,4 @@
-#include "worker/rays/padded_voxels.h"
+#include "worker/renderers/padded_voxels.h"
 
 #include <tbb/parallel_for.h>
 
@@ -22,18 +22,54 @@ void FillRow(const VoxelBricks& voxels, const Box& inside, std::int32_t y, std::
   std::fill_n(row + left + width, count - left - width, row[left + width - 1]);
 }
 
+// `to` is 0.
+template <class T>
+void RepeatRow(const T* from, std::int32_t count, T* to) {
+  if (std::any_of(from, from + count, [](T sample) { return sample != 0; })) std::memcpy(to, from, std::size_t(count) * sizeof(T));
+}
+
 }  // namespace
 
-PaddedVoxels Pad(const VoxelBricks& voxels, const Box& box) {
-  CHECK(!box.empty() && voxels.box().Contains(box));
+PaddedVoxels MakePaddedVoxels(const Box& box, ScalarType type) {
   PaddedVoxels padded;
   padded.box = box;
-  padded.type = voxels.type();
+  padded.type = type;
   const Index3 size = box.size();
   padded.row = size.x + 2 * kPad;
   padded.slice = std::int64_t{padded.row} * (size.y + 2 * kPad);
-  padded.samples = MakeLargeArray<std::byte>(std::size_t(padded.slice) * std::size_t(size.z + 2 * kPad) * BytesPerSample(padded.type));
+  padded.samples = MakeLargeArray<std::byte>(std::size_t(padded.slice) * std::size_t(size.z + 2 * kPad) * BytesPerSample(type));
+  return padded;
+}
 
+void FillPadding(const PaddedVoxels& voxels) {
+  VisitScalarType(voxels.type, [&](auto* type) {
+    using T = std::remove_cvref_t<decltype(*type)>;
+    const Box& box = voxels.box;
+    const std::int32_t width = box.size().x;
+    const auto row_of = [&](std::int32_t y, std::int32_t z) { return reinterpret_cast<T*>(voxels.At({box.begin.x - kPad, y, z})); };
+    tbb::parallel_for(box.begin.z, box.end.z, [&](std::int32_t z) {
+      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
+        T* const row = row_of(y, z);
+        if (row[kPad] != 0) std::fill_n(row, kPad, row[kPad]);
+        if (row[kPad + width - 1] != 0) std::fill_n(row + kPad + width, kPad, row[kPad + width - 1]);
+      }
+      for (std::int32_t i = 1; i <= kPad; ++i) {
+        RepeatRow(row_of(box.begin.y, z), voxels.row, row_of(box.begin.y - i, z));
+        RepeatRow(row_of(box.end.y - 1, z), voxels.row, row_of(box.end.y - 1 + i, z));
+      }
+    });
+    tbb::parallel_for(box.begin.y - kPad, box.end.y + kPad, [&](std::int32_t y) {
+      for (std::int32_t i = 1; i <= kPad; ++i) {
+        RepeatRow(row_of(y, box.begin.z), voxels.row, row_of(y, box.begin.z - i));
+        RepeatRow(row_of(y, box.end.z - 1), voxels.row, row_of(y, box.end.z - 1 + i));
+      }
+    });
+  });
+}
+
+PaddedVoxels Pad(const VoxelBricks& voxels, const Box& box) {
+  CHECK(!box.empty() && voxels.box().Contains(box));
+  const PaddedVoxels padded = MakePaddedVoxels(box, voxels.type());
   const Box inside = Grown(box, kPad, voxels.box());
   VisitScalarType(voxels.type(), [&](auto* type) {
     using T = std::remove_cvref_t<decltype(*type)>;
