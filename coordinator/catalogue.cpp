@@ -236,7 +236,8 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   } else if (IsReadWhole(text.path, text.options)) {
     way.read = [text] { return ReadWhole(text, {}); };
   } else {
-    way.read = [source, progress]() -> Result<ReadableSource> {
+    way.read = [source, text, progress]() -> Result<ReadableSource> {
+      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
       Result<std::shared_ptr<const Volume>> volume = ReadLevel(*source, 0, progress);
       if (!volume.ok()) return volume.status();
       return ReadableSource(LoadedSource{FileInfoOf(source->info()), *std::move(volume), {}, nullptr});

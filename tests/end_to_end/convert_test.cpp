@@ -72,7 +72,7 @@ TEST_F(ConvertTest, WritesAnOmeZarrWithLevels) {
 
 TEST_F(ConvertTest, AFullDiskIsToldAndTheConversionGoesOnWhenThereIsRoom) {
   MakeSphere("s.nrrd", 1, 130);
-  const ProgramResult full = OnFullDisk(20000, [&] { return Slabstream({"convert", "s.nrrd", "a.ome.zarr"}); });
+  const ProgramResult full = OnFullDisk(5000, [&] { return Slabstream({"convert", "s.nrrd", "a.ome.zarr"}); });
   EXPECT_EQ(full.exit_status, 1);
   ASSERT_EQ(full.err_lines().size(), 1U) << full.err;
   EXPECT_THAT(full.err, testing::AllOf(HasSubstr("a.ome.zarr"), HasSubstr("File too large")));

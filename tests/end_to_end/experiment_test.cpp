@@ -86,7 +86,7 @@ TEST_F(ExperimentTest, VolumesOfSourcesAreMeasuredAtTheirFinestLevel) {
     "policies": [{}], "workers": [2]})";
   MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick"});
   ExpectResults("out", "sweep");
-  for (const json& row : RowsOf("out")) EXPECT_EQ(row.value("volume", "ball"), "ball");
+  for (const json& row : RowsOf("out")) EXPECT_EQ(row.value("volume", "ball-opaque"), "ball-opaque");
 
   std::filesystem::create_directory(Path("none.ome.zarr"));
   std::ofstream(Path("bad.json")) << R"({"volumes": [{"file": "none.ome.zarr"}], "policies": [{}], "workers": [1]})";

@@ -230,7 +230,7 @@ class HttpTest(WithService):
         levels = self.datasets_with("levels")["levels"]["levels"]
         self.assertEqual([level["size"] for level in levels], [[130] * 3, [65] * 3, [33] * 3])
         self.assertEqual(levels[0]["voxel_bytes"], 130**3)
-        for fields, said in (({"level": 3}, "has levels 0 to 2"), ({"level": "x"}, "level"), ({"detail": 0}, "detail")):
+        for fields, said in (({"level": 3}, "has levels 0 to 2"), ({"level": "x"}, "level"), ({"detail": -1}, "detail")):
             status, _, body = self.get("/api/v1/render.png", dataset="levels", size=64, **fields)
             self.assertEqual(status, 400)
             self.assertIn(said, json.loads(body)["error"])
