@@ -174,8 +174,7 @@ TEST_F(BrickStoreTest, GoesOnAfterAStopAnywhere) {
   }
   const Result<StoredStream> stored = Open(file);
   ASSERT_TRUE(stored.ok()) << stored.status().message();
-  EXPECT_TRUE(ReadTheStream()) << "none of them has finished it";
-  ExpectVoxelsOf(file, *stored);
+  ExpectVoxelsOf(file, *stored);  // what was stopped last may have read all of the stream
   EXPECT_EQ(Stores().size(), 1U);
   EXPECT_FALSE(fs::exists(stored->path + "/left.1-2.tmp"));
 }
