@@ -24,13 +24,10 @@ FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t befor
     }
     return area;
   }
-  // Voxels are cells half a voxel to each side of their centres, and the projection of a convex box is bounded by its corners.
-  for (int corner = 0; corner < 8; ++corner) {
-    const auto at = [&](Axis axis) { return ((corner >> Number(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5; };
-    const Camera::ImagePoint point = setup.camera.Project({at(Axis::kX), at(Axis::kY), at(Axis::kZ)});
-    add(point.x, point.y);
-  }
-  return area;
+  // Voxels are cells half a voxel to each side of their centres.
+  const Vec3 half = {0.5, 0.5, 0.5};
+  const Camera::ImageExtent extent = setup.camera.ProjectBetween(ToVec3(box.begin) - half, ToVec3(box.end) - half);
+  return {extent.x_begin, extent.y_begin, extent.x_end, extent.y_end};
 }
 
 // A box owns samples between its planes, and on the volume's rim those that footprints reach.

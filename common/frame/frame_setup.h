@@ -115,7 +115,7 @@ inline GridMap MapTo(const FrameSetup& setup, std::uint8_t level) {
 
 // The voxels of its level that cover `at`.
 inline Box VoxelsOf(const LevelBox& at, const FrameSetup& setup) {
-  return at.level == 0 ? at.box : CoveringVoxels(at.box, MapTo(setup, at.level), GeometryOf(setup, at.level).size);
+  return CoveringVoxels(at.box, setup.description.geometry, GeometryOf(setup, at.level));
 }
 // Voxels of its level that a worker must hold to render `at`: with their halo, cut to the volume.
 inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup) {

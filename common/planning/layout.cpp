@@ -157,16 +157,14 @@ struct LayoutMaker::State {
     return best ? *std::move(best) : MakePartition(policy, MostGroups(request, policy), fields.Of(BalanceBy::kVoxels));
   }
 
-  // The geometry of a level of the map, and where blocks of its source end.
+  // Of the volume (0), or a coarser level.
   const VolumeSummary& SummaryOf(std::uint8_t level) const {
     return level == 0 ? *request.summary : *request.coarser[level - std::size_t{1}].summary;
   }
-  GridMap MapToLevel(std::uint8_t level) const {
-    return MapBetween(request.summary->description.geometry, SummaryOf(level).description.geometry);
-  }
   Box PaddedBoxOf(const LevelBox& at) const {
     const VolumeGeometry& geometry = SummaryOf(at.level).description.geometry;
-    return Grown(CoveringVoxels(at.box, MapToLevel(at.level), geometry.size), request.volume->renderer()->reach(), geometry.bounds());
+    return Grown(CoveringVoxels(at.box, request.summary->description.geometry, geometry), request.volume->renderer()->reach(),
+                 geometry.bounds());
   }
 
   Layout MakeByLevels(const ResolvedPolicy& policy) {
@@ -181,9 +179,10 @@ struct LayoutMaker::State {
                             [&](std::uint8_t level) {
                               Index3 voxels;
                               const std::optional<StoredAt>& stored = SummaryOf(level).stored;
-                              const GridMap map = MapToLevel(level);
+                              const Vec3 voxel =
+                                  SummaryOf(level).description.geometry.spacing / request.summary->description.geometry.spacing;
                               for (const Axis axis : kAxes)
-                                voxels[axis] = stored ? std::int32_t(stored->block.end[axis] / map.scale[axis] + 0.5) : 0;
+                                voxels[axis] = stored ? std::int32_t(stored->block.end[axis] * voxel[axis] + 0.5) : 0;
                               return voxels;
                             }});
     std::vector<BrickVisibility> visible;
@@ -199,9 +198,6 @@ struct LayoutMaker::State {
       return double(PaddedBoxOf({box, made.levels[id]}).voxel_count());
     });
     layout.levels = std::move(made.levels);
-    for (std::size_t box = 0; box < layout.levels.size(); ++box) {
-      if (layout.owners[box] == kNoSlot) layout.levels[box] = 0;
-    }
     return layout;
   }
 

@@ -23,7 +23,7 @@ inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max
 struct Layout {
   Partition partition;
   std::vector<std::uint32_t> owners;      // by box: its slot, or kNoSlot
-  std::vector<std::uint8_t> levels = {};  // by box: that it is drawn from (LevelBox); empty: all from 0
+  std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 

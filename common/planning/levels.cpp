@@ -36,32 +36,26 @@ int CoarsestFor(double width, const VolumeLevels& levels, int count) {
   return level;
 }
 
-// Corner 0 ... 7 of a box of voxels, in the camera's grid. `map`: to that grid.
-Vec3 CornerOf(const Box& box, int corner, const GridMap& map) {
-  Vec3 p;
-  for (const Axis axis : kAxes) p[axis] = map.To(((corner >> Number(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5, axis);
-  return p;
-}
-
-// Of the nearest point of the box; orthographic: of all points.
-double NearestDepth(const Box& box, const GridMap& map, const Camera& camera) {
-  if (camera.projection != Projection::kPerspective) return camera.target_depth;
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int corner = 0; corner < 8; ++corner) nearest = std::min(nearest, camera.Project(CornerOf(box, corner, map)).depth);
-  return std::max(nearest, 1e-6 * camera.target_depth);
-}
-
-// Whether the picture may show something of the box, in perspective. `setup`: of the overview's grid, and `map` to it.
-bool InPicture(const Box& box, const GridMap& map, const FrameSetup& setup) {
-  constexpr double kSlack = 1;  // pixels
-  const Camera& camera = setup.camera;
-  if (!setup.clip.MayKeep(CoveringVoxels(box, map, setup.description.geometry.size))) return false;
-  FrameArea area;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Camera::ImagePoint at = camera.Project(CornerOf(box, corner, map));
-    area.Add({at.x, at.y, at.x, at.y});
+// Where a box of voxels lies in the picture. `map`: to the camera's grid.
+Camera::ImageExtent ExtentOf(const Box& box, const GridMap& map, const Camera& camera) {
+  Vec3 low, high;
+  for (const Axis axis : kAxes) {
+    low[axis] = map.To(box.begin[axis] - 0.5, axis);
+    high[axis] = map.To(box.end[axis] - 0.5, axis);
   }
-  return area.x_end > -kSlack && area.y_end > -kSlack && area.x_begin < camera.width + kSlack && area.y_begin < camera.height + kSlack;
+  return camera.ProjectBetween(low, high);
+}
+
+bool InPicture(const Camera::ImageExtent& extent, const Camera& camera) {
+  constexpr double kSlack = 1;  // pixels
+  return extent.x_end > -kSlack && extent.y_end > -kSlack && extent.x_begin < camera.width + kSlack &&
+         extent.y_begin < camera.height + kSlack;
+}
+
+// Of the pixels that show the nearest point; orthographic: of all pixels.
+double WidthAt(const Camera::ImageExtent& extent, const Camera& camera) {
+  const bool perspective = camera.projection == Projection::kPerspective;
+  return camera.PixelSizeAt(perspective ? std::max(extent.nearest, 1e-6 * camera.target_depth) : camera.target_depth);
 }
 
 // A map without levels yet: at most 16 zones along an axis, none of less than 32 voxels.
@@ -80,7 +74,10 @@ void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetu
   const GridMap to_camera = MapBetween(grid, setup.description.geometry);
   map.ForEachZone([&](const Index3& zone) {
     const Box box = map.BoxOf(zone, grid.size);
-    function(InPicture(box, to_camera, setup) ? setup.camera.PixelSizeAt(NearestDepth(box, to_camera, setup.camera)) : 0);
+    const Camera::ImageExtent extent = ExtentOf(box, to_camera, setup.camera);
+    const bool shown =
+        InPicture(extent, setup.camera) && setup.clip.MayKeep(CoveringVoxels(box, to_camera, setup.description.geometry.size));
+    function(shown ? WidthAt(extent, setup.camera) : 0);
   });
 }
 
@@ -198,7 +195,7 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   const Camera& camera = setup->camera;
   const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
-    return LevelMap{.levels = {CoarsestFor(detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
+    return LevelMap{.levels = {CoarsestFor(detail * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera), levels, count)}};
   };
   const bool mixes =
       camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();

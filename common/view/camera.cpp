@@ -205,6 +205,17 @@ Camera::ImagePoint Camera::Project(const Vec3& data_point) const {
   return {Apply(x_row, data_point) / w, Apply(y_row, data_point) / w, Apply(depth_row, data_point)};
 }
 
+Camera::ImageExtent Camera::ProjectBetween(const Vec3& low, const Vec3& high) const {
+  ImageExtent extent;
+  for (int corner = 0; corner < 8; ++corner) {
+    const ImagePoint at =
+        Project({(corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y, (corner & 4) != 0 ? high.z : low.z});
+    extent = {std::min(extent.x_begin, at.x), std::min(extent.y_begin, at.y), std::max(extent.x_end, at.x), std::max(extent.y_end, at.y),
+              std::min(extent.nearest, at.depth)};
+  }
+  return extent;
+}
+
 Camera::Ray Camera::RayAt(double x, double y) const {
   const double scale = ScaleOf(*this);
   const Vec3 offset = ((x - 0.5 * width) / scale * right - (y - 0.5 * height) / scale * up) / spacing;

@@ -87,6 +87,13 @@ struct Camera {
   };
   ImagePoint Project(const Vec3& data_point) const;  // the point must lie before the eye (perspective)
 
+  // Of all points p with low <= p <= high on every axis. The projection of a convex body is bounded by its corners.
+  struct ImageExtent {
+    double x_begin = 1e9, y_begin = 1e9, x_end = -1e9, y_end = -1e9;
+    double nearest = 1e300;  // depth
+  };
+  ImageExtent ProjectBetween(const Vec3& low, const Vec3& high) const;
+
   // Ray of a point of the image: data-space origin (eye or eye-plane point) and direction, scaled so that depth grows by 1 per unit.
   struct Ray {
     Vec3 origin, direction;

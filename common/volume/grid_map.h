@@ -50,4 +50,8 @@ inline Box CoveringVoxels(const Box& box, const GridMap& map, const Index3& size
   return voxels;
 }
 
+inline Box CoveringVoxels(const Box& box, const VolumeGeometry& grid, const VolumeGeometry& other) {
+  return CoveringVoxels(box, MapBetween(grid, other), other.size);
+}
+
 }  // namespace slabstream

@@ -1,7 +1,6 @@
 // What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), or datasets. Sources:
 // https://github.com/saalfeldlab/n5-viewer#metadata, https://github.com/bigdataviewer/bigdataviewer-core (N5ImageLoader)
 #include "data/n5/n5_pyramid.h"
-#include "data/volume_io/chosen_channel.h"
 
 #include <fmt/format.h>
 
@@ -18,6 +17,7 @@
 #include "data/n5/n5_array.h"
 #include "data/sources/space_axes.h"
 #include "data/sources/view_setups.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
 

@@ -1,5 +1,4 @@
 #include "data/precomputed/precomputed_pyramid.h"
-#include "data/volume_io/chosen_channel.h"
 
 #include <fmt/format.h>
 
@@ -10,6 +9,7 @@
 #include "common/base/printable.h"
 #include "data/metadata/json_fields.h"
 #include "data/precomputed/precomputed_array.h"
+#include "data/volume_io/chosen_channel.h"
 
 namespace slabstream::precomputed {
 namespace {

@@ -66,7 +66,7 @@ Json ArrayV2(const ZarrLayout& layout, const WrittenLevel& level) {
 
 Json ArrayV3(const ZarrLayout& layout, const WrittenLevel& level) {
   const Json bytes = {{"name", "bytes"}, {"configuration", {{"endian", "little"}}}};
-  const Json zstd = {{"name", "zstd"}, {"configuration", {{"level", layout.codec_level}, {"checksum", false}}}};
+  const Json zstd = {{"name", "zstd"}, {"configuration", {{"level", layout.codec_level}, {"checksum", true}}}};
   const Json shards = {{"name", "sharding_indexed"},
                        {"configuration",
                         {{"chunk_shape", Numbers(Uniform(layout.chunk_side))},

@@ -67,12 +67,14 @@ bool IsZero(std::span<const std::byte> bytes) {
   return bytes.front() == std::byte{0} && std::memcmp(bytes.data(), bytes.data() + 1, bytes.size() - 1) == 0;
 }
 
-// The frame depends on the bytes and the level alone.
+// The frame depends on the bytes and the level alone, and has a checksum of the bytes.
 Result<Packed> Compress(std::span<const std::byte> bytes, int level) {
   thread_local const std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> context(ZSTD_createCCtx(), ZSTD_freeCCtx);
   if (context == nullptr) return Status::ResourceExhausted("no memory to compress");
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, level);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
   Packed packed(ZSTD_compressBound(bytes.size()));
-  const std::size_t size = ZSTD_compressCCtx(context.get(), packed.data(), packed.size(), bytes.data(), bytes.size(), level);
+  const std::size_t size = ZSTD_compress2(context.get(), packed.data(), packed.size(), bytes.data(), bytes.size());
   if (ZSTD_isError(size) != 0) return Status::ResourceExhausted(std::string("cannot compress: ") + ZSTD_getErrorName(size));
   packed.resize(size);
   return packed;
