@@ -20,7 +20,7 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     turns_.Join(client);
   }
   const Box voxels = PaddedBox(placement.box, *setup);
-  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), setup->stored, actions);
+  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), setup->stored, placement.filled, actions);
   waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
 }
 

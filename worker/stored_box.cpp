@@ -1,6 +1,8 @@
 #include "worker/stored_box.h"
 
 #include <algorithm>
+#include <limits>
+#include <span>
 #include <string>
 #include <utility>
 
@@ -18,6 +20,16 @@ void CopyVoxels(const BoxVoxels& from, Layer layer, const Box& box, BrickedVoxel
     source.Read(box, begin, slice);
     to.Write(box, begin, slice);
   }
+}
+
+void Fill(const FilledBox& filled, BrickedVoxels& to) {
+  VisitScalarType(to.type(), [&]<class T>(const T*) {
+    const Index3 size = filled.box.size();
+    const float least = float(std::numeric_limits<T>::lowest()), most = float(std::numeric_limits<T>::max());
+    const std::vector<T> slice(std::size_t(size.x) * std::size_t(size.y), T(std::clamp(filled.sample, least, most)));
+    const std::span<const std::byte> bytes = std::as_bytes(std::span(slice));
+    for (std::int32_t z = 0; z < size.z; ++z) to.Write(filled.box, std::uint64_t(z) * bytes.size(), bytes);
+  });
 }
 
 }  // namespace
@@ -55,6 +67,8 @@ bool StoredBox::Assemble() {
     BrickedVoxels& to = Arriving(layer);
     for (const Copy& copy : copies_) CopyVoxels(*copy.from->Assembled(), layer, copy.box, to);
   }
+  for (const FilledBox& filled : filled_) Fill(filled, Arriving(Layer::kVolume));
+  filled_ = {};
   voxels_ =
       std::make_shared<BoxVoxels>(*std::move(arriving_[0]), BoxLayers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()});
   arriving_ = {};

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/volume/filled_box.h"
 #include "common/wire/payload.h"
 #include "common/wire/voxel_messages.h"
 #include "worker/arriving_cells.h"
@@ -26,12 +27,15 @@ class StoredBox {
     Box box;
   };
 
-  StoredBox(const BoxKey& key, std::vector<Copy> copies) : key_(key), copies_(std::move(copies)) {}
+  // `filled`: voxels that neither copies nor chunks bring.
+  StoredBox(const BoxKey& key, std::vector<Copy> copies, std::vector<FilledBox> filled = {})
+      : key_(key), copies_(std::move(copies)), filled_(std::move(filled)) {}
 
   // DataLoss: the chunk does not fit this padded box.
   Status Store(const Chunk& chunk, const Bytes& payload);
 
-  // Call when all chunks are stored. The first call copies the voxels that other padded boxes hold. True: this call copied some.
+  // Call when all chunks are stored. The first call copies the voxels that other padded boxes hold, and fills others. True: this call
+  // copied some.
   bool Assemble();
 
   // The BoxData that a render of one client reads from and derives into. No other render uses it during the lease.
@@ -73,6 +77,7 @@ class StoredBox {
   const BoxKey key_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Copy> copies_;
+  std::vector<FilledBox> filled_;
   std::array<std::optional<BrickedVoxels>, kLayers.size()> arriving_;  // by layer
   ArrivingCells cells_;
   std::vector<std::byte> unpacked_;    // a chunk's samples

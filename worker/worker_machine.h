@@ -172,7 +172,7 @@ struct ConnectVoxels {
   std::string endpoint;
 };  // on Welcome
 // Makes room for the padded box's voxels. Voxels that other padded boxes hold are copied before the first render; those padded boxes are
-// complete, and open until that render is done. Chunks of boxes inside the padded box bring the rest.
+// complete, and open until that render is done. What is filled has its sample; chunks of boxes inside the padded box bring the rest.
 struct OpenBox {
   struct Copy {
     BoxKey from;
@@ -180,6 +180,7 @@ struct OpenBox {
   };
   BoxKey padded;
   std::vector<Copy> copies;
+  std::vector<FilledBox> filled = {};  // voxels of the volume that neither copies nor chunks bring
 };
 struct StoreChunk {
   BoxKey padded;

@@ -7,8 +7,9 @@
 
 namespace slabstream {
 
-BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers)
-    : summary_(summary), table_(std::move(drawn)), layers_(std::move(layers)), next_visible_(table_.opacity.size()) {
+BrickVisibility::BrickVisibility(const VolumeSummary& summary, const BrickRangeList& bricks, ClassificationTable drawn,
+                                 std::vector<std::uint8_t> layers)
+    : summary_(summary), bricks_(bricks), table_(std::move(drawn)), layers_(std::move(layers)), next_visible_(table_.opacity.size()) {
   int next = table_.size();
   for (int bin = table_.size() - 1; bin >= 0; --bin) {
     if (table_.opacity[std::size_t(bin)] > 0) next = bin;
@@ -31,7 +32,7 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
 
 std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
   std::vector<Box> visible;
-  for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
+  for (std::size_t i = 0; i < bricks_.size(); ++i) {
     if (!Visible(i, 0)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
     const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary_.description.geometry.bounds());

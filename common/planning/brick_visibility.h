@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/classification/classification_table.h"
@@ -17,7 +18,11 @@ namespace slabstream {
 class BrickVisibility {
  public:
   // `summary` must outlive this. `layers`: LayerBricks (layer_bricks.h).
-  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {});
+  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {})
+      : BrickVisibility(summary, summary.bricks, std::move(drawn), std::move(layers)) {}
+  // By other ranges of the bricks than summary.bricks. They must outlive this, too.
+  BrickVisibility(const VolumeSummary& summary, const BrickRangeList& bricks, ClassificationTable drawn,
+                  std::vector<std::uint8_t> layers = {});
 
   // The brick can be visible.
   bool AnyVisible(std::size_t brick) const { return Visible(brick, 1); }
@@ -33,12 +38,13 @@ class BrickVisibility {
 
  private:
   bool Visible(std::size_t brick, int slack) const {  // bins
-    return Visible(summary_.bricks[brick], slack) || (!layers_.empty() && layers_[brick] != 0);
+    return Visible(bricks_[brick], slack) || (!layers_.empty() && layers_[brick] != 0);
   }
   bool Visible(const ValueRange& brick, int slack) const;
   double StoredFromData(double value) const;
 
   const VolumeSummary& summary_;
+  const BrickRangeList& bricks_;
   ClassificationTable table_;
   std::vector<std::uint8_t> layers_;  // by brick; empty: none
   std::vector<int> next_visible_;     // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none

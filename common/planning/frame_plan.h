@@ -17,6 +17,7 @@
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
 #include "common/planning/resolved_request.h"
+#include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -28,6 +29,7 @@ struct Placement {
   BoxId id = 0;
   Box box;
   WorkerId worker = 0;
+  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read
   friend bool operator==(const Placement&, const Placement&) = default;
 };
 

@@ -11,6 +11,7 @@
 #include "common/planning/cost_estimator.h"
 #include "common/planning/layer_bricks.h"
 #include "common/planning/measured_cost.h"
+#include "common/planning/unread_parts.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
@@ -182,20 +183,40 @@ struct LayoutMaker::State {
 
   double MeanSeconds(const Box& box) { return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2; }
 
+  // An index says which boxes are rendered, and what of them is read. It does not say where they are: boxes are those that would be
+  // made without it.
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
-    std::vector<BoxId> filled;
+    std::vector<BoxId> shown;
     std::vector<double> box_costs;
     const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
-    for (BoxId box = 0; box < partition.boxes().size(); ++box) {
-      if (!fields.Shows(partition.boxes()[box])) continue;
-      filled.push_back(box);
-      box_costs.push_back(by_cost ? MeanSeconds(partition.boxes()[box]) : 1);
-    }
+    const std::optional<UnreadParts> unread = FindUnread();
     Layout layout{std::move(partition), {}};
-    layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
+    const std::span<const Box> boxes = layout.partition.boxes();
+    if (unread) layout.filled.resize(boxes.size());
+    for (BoxId box = 0; box < boxes.size(); ++box) {
+      if (!fields.Shows(boxes[box]) || (unread && !unread->Shows(boxes[box]))) continue;
+      shown.push_back(box);
+      if (unread) {
+        const Box padded = Grown(boxes[box], request.volume->renderer()->reach(), layout.partition.bounds());
+        layout.filled[box] = unread->Of(padded);
+        std::int64_t read = padded.voxel_count();
+        for (const FilledBox& part : layout.filled[box]) read -= part.box.voxel_count();
+        box_costs.push_back(double(read));
+      } else {
+        box_costs.push_back(by_cost ? MeanSeconds(boxes[box]) : 1);
+      }
+    }
+    layout.owners.assign(boxes.size(), kNoSlot);
     const std::vector<std::uint32_t> owners = policy.assignment->assign({box_costs, request.slots});
-    for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
+    for (std::size_t i = 0; i < shown.size(); ++i) layout.owners[shown[i]] = owners[i];
     return layout;
+  }
+
+  std::optional<UnreadParts> FindUnread() const {
+    if (request.summary->indexed == nullptr) return std::nullopt;
+    const RendererKind& renderer = *request.volume->renderer();
+    return UnreadParts(*request.summary, renderer.DrawnTable(request.volume->transfer(), *request.summary), renderer.reach(),
+                       LayerBricks(*request.summary, renderer, request.volume->looks()));
   }
 
   // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work

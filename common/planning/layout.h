@@ -13,6 +13,7 @@
 #include "common/decomposition/work_field.h"
 #include "common/planning/classified_volume.h"
 #include "common/planning/resolved_policy.h"
+#include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -22,6 +23,8 @@ inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max
 struct Layout {
   Partition partition;
   std::vector<std::uint32_t> owners;  // by box: its slot, or kNoSlot
+  // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box.
+  std::vector<std::vector<FilledBox>> filled = {};
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 

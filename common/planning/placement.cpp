@@ -106,7 +106,8 @@ void PlaceBoxes(FramePlan& plan) {
   for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera)) {
     if (plan.layout->owners[id] == kNoSlot) continue;
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
-    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0});
+    Placement& placement = plan.groups.back().placements.emplace_back(Placement{id, plan.layout->partition.boxes()[id]});
+    if (!plan.layout->filled.empty()) placement.filled = plan.layout->filled[id];
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }

@@ -1,6 +1,7 @@
 // Layouts of volumes that nobody holds: boxes that fit a target, and end near the blocks in which the source is read.
 #include <gtest/gtest.h>
 
+#include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
 #include "tests/common/planning/plan_support.h"
 
@@ -81,6 +82,98 @@ TEST(StoredLayout, VoxelsThatAreHeldAreCutAsEver) {
   const FramePlan plan = Plan(SomeRequest(), held, FullRoster(2));
   EXPECT_FALSE(plan.setup.stored);
   EXPECT_EQ(plan.layout->partition.boxes().size(), 2U);
+}
+
+// ---------------------------------------------------------------- with an index
+
+// What an index says of bricks of 16 voxels: `value` for their voxels.
+template <class Value>
+VolumeSummary Indexed(VolumeSummary summary, const Value& value) {
+  auto bricks = std::make_shared<BrickRangeList>();
+  for (std::size_t i = 0; i < summary.bricks.size(); ++i) bricks->push_back(value(kBrick * PlaceIn(summary.brick_counts, i)));
+  summary.indexed = bricks;
+  return summary;
+}
+
+constexpr ValueRange kAir = {3, 20}, kBody = {3, 220};
+
+TEST(IndexedLayout, BoxesThatShowNothingAreRenderedByNobody) {
+  const VolumeSummary unknown = StoredSummary({512, 256, 256}, Uniform(64));
+  const VolumeSummary known = Indexed(unknown, [](const Index3& at) { return at.x < 200 ? kBody : kAir; });
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->Can(Ability::kCells)) continue;
+    SCOPED_TRACE(renderer->name());
+    FrameRequest request = SomeRequest();
+    request.renderer = renderer->name();
+    request.policy.decomposition = "subcube";
+    const Layout without = *PlanFrame(request, 7, unknown, FullRoster(3), 4 << 20)->layout;
+    const Layout with = *PlanFrame(request, 7, known, FullRoster(3), 4 << 20)->layout;
+    EXPECT_EQ(with.partition, without.partition) << "boxes are where they would be";
+    EXPECT_TRUE(without.filled.empty());
+    const bool draws_all = renderer->format() == PixelFormat::kMaximum || renderer->format() == PixelFormat::kSum;
+    int dropped = 0;
+    for (BoxId box = 0; box < with.owners.size(); ++box) {
+      EXPECT_NE(without.owners[box], kNoSlot);
+      const bool shows = draws_all || with.partition.boxes()[box].begin.x < 208 + renderer->reach();
+      EXPECT_EQ(with.owners[box] != kNoSlot, shows) << "box " << box;
+      dropped += shows ? 0 : 1;
+    }
+    EXPECT_EQ(dropped > 0, !draws_all);
+  }
+}
+
+TEST(IndexedLayout, OnlyWhatIsFarFromAllThatIsDrawnIsFilled) {
+  Random random(62);
+  SCOPED_TRACE(random.trace());
+  int filled_parts = 0;
+  for (int round = 0; round < 20; ++round) {
+    const Index3 size = {random.Integer(500, 700), random.Integer(40, 200), random.Integer(40, 200)};
+    const Index3 block = {random.Integer(1, 40), random.Integer(1, 40), random.Integer(1, 40)};
+    const Axis axis = random.Chance(0.7) ? Axis::kX : Axis::kY;
+    std::vector<Box> drawn;
+    const VolumeSummary summary = Indexed(StoredSummary(size, Min(block, size)), [&](const Index3& at) {
+      if (at[axis] > size[axis] / 2 || random.Chance(0.9)) return ValueRange{float(random.Integer(0, 30)), float(random.Integer(30, 60))};
+      drawn.push_back({at, at + Uniform(kBrick)});
+      return kBody;
+    });
+    const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(2), 1 << 20).value();
+    const std::int32_t reach = plan.setup.renderer->reach();
+    for (const Placement& placement : PlacementsOf(plan)) {
+      const Box padded = PaddedBox(placement.box, plan.setup);
+      EXPECT_EQ(placement.filled, plan.layout->filled[placement.id]);
+      for (const FilledBox& part : placement.filled) {
+        EXPECT_TRUE(padded.Contains(part.box));
+        for (const Box& brick : drawn) EXPECT_TRUE(Intersection(Grown(part.box, 2 * reach, padded), brick).empty());
+        const ValueRange& range = (*summary.indexed)[NumberIn(
+            summary.brick_counts, {part.box.begin.x / kBrick, part.box.begin.y / kBrick, part.box.begin.z / kBrick})];
+        EXPECT_EQ(part.sample, range.min) << "a sample of a brick in it";
+        ++filled_parts;
+      }
+    }
+  }
+  EXPECT_GT(filled_parts, 20);
+}
+
+TEST(IndexedLayout, SamplesOfWhatIsFilledAreStoredOnes) {
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    VolumeSummary summary = StoredSummary({4096, 64, 64}, Uniform(16));
+    summary.description.type = type;
+    summary.description.mapping = {0.1, -1024};
+    summary.indexed = std::make_shared<BrickRangeList>(summary.bricks.size(), ValueRange{float(-1024 + 0.1 * 7), float(-1024 + 0.1 * 9)});
+    (*std::const_pointer_cast<BrickRangeList>(summary.indexed))[0] = {150, 150};
+    const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(1)).value();
+    ASSERT_FALSE(PlacementsOf(plan).empty());
+    ASSERT_FALSE(PlacementsOf(plan)[0].filled.empty());
+    for (const FilledBox& part : PlacementsOf(plan)[0].filled) EXPECT_NEAR(part.sample, 7, type == ScalarType::kFloat32 ? 1e-3 : 0);
+  }
+}
+
+TEST(IndexedLayout, FramingDoesNotDependOnIt) {
+  const VolumeSummary unknown = StoredSummary({512, 256, 256}, Uniform(64));
+  const VolumeSummary known = Indexed(unknown, [](const Index3& at) { return at.x < 100 ? kBody : kAir; });
+  FrameRequest request = SomeRequest();
+  request.view.fit = true;
+  EXPECT_EQ(SetupOf(request, known), SetupOf(request, unknown));
 }
 
 }  // namespace

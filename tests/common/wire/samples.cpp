@@ -69,6 +69,10 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
     message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
+  if (ranks > 1) {
+    setup.stored = StoredAt{.source = "/data/scan.ome.zarr?channel=1", .level = 2, .version = kMax64, .block = {{0, 0, 0}, {64, 32, 1}}};
+    message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {1 << 20, 32, 2}}, -1e30F}};
+  }
   message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
   message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
