@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/base/log.h"
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
@@ -195,6 +196,18 @@ Status TakeLayers(std::string& path, LayerFiles& layers) {
   return Status::Ok();
 }
 
+// Pictures are the same without it, so whatever is wrong with it is but a warning.
+std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, std::uint64_t version, const SourceInfo& info) {
+  const Result<IndexFile> file = IndexFileOf(source_text);
+  if (!file.ok() || !file->facts()) return nullptr;
+  const Result<std::string> name = file->NameNow(version, info);
+  Result<std::optional<BrickIndex>> index = name.ok() ? file->Read(*name, info) : name.status();
+  if (!index.ok()) {
+    LogWarning(fmt::format("the index of {} is not used: {}; `slabstream index` makes a new one", source_text, index.status().message()));
+  }
+  return index.ok() && *index ? std::make_shared<const BrickIndex>(**std::move(index)) : nullptr;
+}
+
 Status BeingWritten(const DataSource& source) {
   return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
 }
@@ -293,6 +306,12 @@ void CheckFiles(FoundData& found) {
   }
 }
 
+Result<IndexFile> IndexFileOf(const std::string& source) {
+  const Result<SourceText> parsed = ParseSourceText(source);
+  if (!parsed.ok()) return parsed.status();
+  return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));
+}
+
 Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uint64_t most_bytes,
                                                 const std::function<void(int percent)>& tell) {
   if (data.load || data.layers.any()) return std::optional<OpenedSource>();
@@ -318,7 +337,9 @@ Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uin
     if (!survey.ok()) return survey.status();
     // Other processes may run in other folders.
     const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
-    return std::optional(OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp)});
+    std::shared_ptr<const BrickIndex> index = FindIndex(data.path, *version, info);
+    return std::optional(
+        OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp), std::move(index)});
   }
   return BeingWritten(data);
 }

@@ -23,6 +23,7 @@
 
 #include "common/base/status.h"
 #include "coordinator/data_source.h"
+#include "data/survey/index_file.h"
 #include "data/survey/survey.h"
 
 namespace slabstream {
@@ -72,7 +73,10 @@ struct OpenedSource {
   std::string text;           // where workers find it
   std::uint64_t version = 0;  // VersionOf its files
   std::shared_ptr<const FileStamp> stamp;
+  std::shared_ptr<const BrickIndex> index = nullptr;  // null: there is none, or none that can be used; a line of the log says why
 };
+// Where the index of a source is kept. Errors of ParseSourceText and IndexFile::Of.
+Result<IndexFile> IndexFileOf(const std::string& source);
 // Does not change between the two stamps that it takes, as LoadSource. Errors of OpenSource and SurveySource.
 Result<std::optional<OpenedSource>> OpenInParts(
     const DataSource& source, std::uint64_t most_bytes, const std::function<void(int percent)>& tell = [](int) {});
