@@ -158,13 +158,14 @@ TEST(IndexedLayout, SamplesOfWhatIsFilledAreStoredOnes) {
   for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
     VolumeSummary summary = StoredSummary({4096, 64, 64}, Uniform(16));
     summary.description.type = type;
-    summary.description.mapping = {0.1, -1024};
-    summary.indexed = std::make_shared<BrickRangeList>(summary.bricks.size(), ValueRange{float(-1024 + 0.1 * 7), float(-1024 + 0.1 * 9)});
-    (*std::const_pointer_cast<BrickRangeList>(summary.indexed))[0] = {150, 150};
+    summary.description.mapping = {0.5, -20};
+    auto bricks = std::make_shared<BrickRangeList>(summary.bricks.size(), ValueRange{-16.5F, -15.5F});
+    bricks->front() = {105, 105};  // the only one that is drawn
+    summary.indexed = bricks;
     const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(1)).value();
     ASSERT_FALSE(PlacementsOf(plan).empty());
     ASSERT_FALSE(PlacementsOf(plan)[0].filled.empty());
-    for (const FilledBox& part : PlacementsOf(plan)[0].filled) EXPECT_NEAR(part.sample, 7, type == ScalarType::kFloat32 ? 1e-3 : 0);
+    for (const FilledBox& part : PlacementsOf(plan)[0].filled) EXPECT_EQ(part.sample, 7);
   }
 }
 
