@@ -163,9 +163,10 @@ TEST(IndexedLayout, SamplesOfWhatIsFilledAreStoredOnes) {
     bricks->front() = {105, 105};  // the only one that is drawn
     summary.indexed = bricks;
     const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(1)).value();
-    ASSERT_FALSE(PlacementsOf(plan).empty());
-    ASSERT_FALSE(PlacementsOf(plan)[0].filled.empty());
-    for (const FilledBox& part : PlacementsOf(plan)[0].filled) EXPECT_EQ(part.sample, 7);
+    const std::vector<Placement> placements = PlacementsOf(plan);
+    ASSERT_FALSE(placements.empty());
+    EXPECT_FALSE(placements[0].filled.empty());
+    for (const FilledBox& part : placements[0].filled) EXPECT_EQ(part.sample, 7);
   }
 }
 
