@@ -116,7 +116,8 @@ class PreparedPicture : public Renderer {
  public:
   PreparedPicture(const Case& config, Rank rank, Shared& shared) : picture_(MakePicture(config, rank)), shared_(shared) {}
 
-  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup&, const OcclusionMask&, const RenderControl&, RankReport&) override {
+  Result<LocalImage> Render(BoxData&, const LevelBox&, const FrameSetup&, const OcclusionMask&, const RenderControl&,
+                            RankReport&) override {
     const std::int64_t begin_ns = ProcessorNs(CLOCK_THREAD_CPUTIME_ID);
     LocalImage copy = picture_;
     shared_.made_ns += ProcessorNs(CLOCK_THREAD_CPUTIME_ID) - begin_ns;

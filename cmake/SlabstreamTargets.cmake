@@ -108,3 +108,23 @@ function(slabstream_benchmark name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINKS" ${ARGN})
   slabstream_program(${name} SOURCES ${ARG_SOURCES} LINKS ${ARG_LINKS} benchmark::benchmark benchmark::benchmark_main FOLDER bench)
 endfunction()
+
+# slabstream_missing_test(NAME PACKAGES): lists a test that cannot run here as not run, under a name that says why (tests/summarise.py).
+function(slabstream_missing_test name packages)
+  message(WARNING "${name} does not run: ${packages} missing")
+  add_test(NAME ${name}_needs_${packages} COMMAND ${CMAKE_COMMAND} -E true)
+  set_tests_properties(${name}_needs_${packages} PROPERTIES DISABLED TRUE)
+endfunction()
+
+# slabstream_find_python(VARIABLE CODE): a Python that runs this code without an error, such as one that imports modules; "" if there is none.
+# Distributions put modules beside /usr/bin/python3, which need not be the first one on the path.
+function(slabstream_find_python variable code)
+  foreach(python /usr/bin/python3 python3)
+    execute_process(COMMAND ${python} -c "${code}" RESULT_VARIABLE missing OUTPUT_QUIET ERROR_QUIET)
+    if(missing STREQUAL "0")
+      set(${variable} ${python} PARENT_SCOPE)
+      return()
+    endif()
+  endforeach()
+  set(${variable} "" PARENT_SCOPE)
+endfunction()

@@ -1,7 +1,8 @@
 #include "coordinator/answer_question.h"
 
-#include <fmt/format.h>
-
+#include <array>
+#include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -46,7 +47,7 @@ Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
 }
 
 Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
-  Result<BoxStatistics> statistics = StatisticsIn(dataset.volume.voxels, dataset.summary->description, query.box);
+  Result<BoxStatistics> statistics = StatisticsIn(*dataset.volume.voxels.held(), dataset.summary->description, query.box);
   if (!statistics.ok()) return statistics.status();
   return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = *statistics});
 }
@@ -76,17 +77,51 @@ Result<VoxelBlock> ReadBox(const VoxelServer::Samples::InParts& from, const Box&
   return block;
 }
 
-Result<QuestionReply> ReadAnswer(const SampleQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
-  const VolumeGeometry& geometry = asked.summary->description.geometry;
-  SampleReply reply{.nonce = query.nonce};
-  for (const Vec3& point : query.points) {
-    // The voxel, and those that are interpolated.
-    const Index3 voxel = Max(Min(VoxelAt(DataPoint(geometry, point)), geometry.size - Uniform(1)), Index3{});
-    const Result<VoxelBlock> block = ReadBox(from, Grown({voxel, voxel + Uniform(1)}, 1, geometry.bounds()));
-    if (!block.ok()) return block.status();
-    reply.samples.push_back(SampleAt(ProbeVolume{.voxels = *block}, *asked.summary, point));
+// Reads pieces of about a block of the source as they are asked for, and keeps the last few.
+class ReadVoxels {
+ public:
+  explicit ReadVoxels(const VoxelServer::Samples::InParts& from)
+      : from_(from), piece_(Max(Uniform(16), Min(Uniform(64), from.source->info().levels[std::size_t(from.level)].block))) {}
+
+  const Status& status() const { return status_; }  // the first failure; from then on nothing is read
+  ProbedVoxels voxels() {
+    return {from_.description().geometry.size, [this](const Index3& voxel) { return At(voxel); }};
   }
-  return QuestionReply(std::move(reply));
+
+ private:
+  double At(const Index3& voxel) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    constexpr std::size_t kMostKept = 16;
+    if (!status_.ok()) return kNone;
+    const Index3 begin = voxel / piece_ * piece_;
+    auto piece = pieces_.find(Tuple(begin));
+    if (piece == pieces_.end()) {
+      if (pieces_.size() == kMostKept) pieces_.clear();
+      Result<VoxelBlock> read = ReadBox(from_, Intersection({begin, begin + piece_}, from_.description().geometry.bounds()));
+      if (!read.ok()) {
+        status_ = read.status();
+        return kNone;
+      }
+      piece = pieces_.emplace(Tuple(begin), *std::move(read)).first;
+    }
+    const VoxelBlock& block = piece->second;
+    return VisitScalarType(block.type, [&]<class T>(const T*) { return double(block.samples<T>()[block.Offset(voxel)]); });
+  }
+  static std::array<std::int32_t, 3> Tuple(const Index3& index) { return {index.x, index.y, index.z}; }
+
+  const VoxelServer::Samples::InParts& from_;
+  const Index3 piece_;
+  std::map<std::array<std::int32_t, 3>, VoxelBlock> pieces_;  // by their begins
+  Status status_;
+};
+
+// A question about a few points.
+template <class Query>
+Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+  ReadVoxels read(from);
+  const ProbeVolume volume{.voxels = read.voxels()};
+  Result<QuestionReply> answer = Answer(query, {volume, asked.summary, asked.dataset});
+  return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
 
 Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
@@ -101,15 +136,8 @@ Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuest
   if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce});
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
-  const Dataset dataset{ProbeVolume{.voxels = *block}, asked.summary, asked.dataset};
-  return Answer(query, dataset);
-}
-
-Result<QuestionReply> ReadAnswer(const PickQuery& query, const AnswerQuestion&, const VoxelServer::Samples::InParts& from) {
-  return Status::InvalidArgument(
-      fmt::format("what a pixel shows is not found in level {} of dataset \"{}\", which is larger than the coordinator's memory; a coarser "
-                  "level may fit",
-                  from.level, query.frame.dataset));
+  const ProbeVolume volume{.voxels = VoxelBricks(*block)};
+  return Answer(query, {volume, asked.summary, asked.dataset});
 }
 
 Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
@@ -120,15 +121,18 @@ BackgroundActions::AtOnce BackgroundActions::PostResult(auto&& tasks, const char
       tasks, what, [find = std::move(find), end] { return News{end(find())}; }, end);
 }
 
-Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const std::function<void(int percent)>& tell) {
+Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& action, const TellRead& tell) {
   if (action.source.at_level != nullptr) return LoadLevel(action, *action.source.at_level, tell);
-  Result<std::optional<OpenedSource>> opened = OpenInParts(action.source, action.most_bytes, tell);
-  if (!opened.ok()) return opened.status();
-  if (*opened) return Open(action, **std::move(opened));
-  const Result<LoadedSource> loaded = LoadSource(action.source, tell);
-  if (!loaded.ok()) return loaded.status();
-  const std::shared_ptr<const Volume>& volume = loaded->volume;
-  const Layers& layers = loaded->layers;
+  Result<ReadableSource> read = ReadSource(action.source, action.most_bytes, tell);
+  if (!read.ok()) return read.status();
+  if (auto* const opened = std::get_if<OpenedSource>(&*read)) return Open(action, std::move(*opened), tell);
+  return Hold(action, std::get<LoadedSource>(*read));
+}
+
+// A volume that was read as a whole.
+Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& action, const LoadedSource& loaded) {
+  const std::shared_ptr<const Volume>& volume = loaded.volume;
+  const Layers& layers = loaded.layers;
   auto summary = std::make_shared<const VolumeSummary>(SummaryOf(LayeredVolume{volume, layers}));
   VoxelServer::Samples samples;
   const bool held = action.source.held_bytes > 0;  // as a whole, in any case
@@ -142,40 +146,54 @@ Result<BackgroundActions::News> BackgroundActions::Load(const LoadDataset& actio
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
-  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded->stamp}, id, std::move(samples)};
+  return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp}, id, std::move(samples)};
 }
 
 // The levels of a source, or its only one.
-BackgroundActions::News BackgroundActions::Open(const LoadDataset& action, OpenedSource opened) {
-  const std::vector<SourceLevel>& levels = opened.source->info().levels;
+Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& action, OpenedSource opened, const TellRead& tell) {
+  const SourceInfo& info = opened.source->info();
+  const std::vector<SourceLevel>& levels = info.levels;
+  (void)opened.source->TakeStoredBytes();  // the survey's, which belong to no frame
   std::vector<DataSource> sources;
   auto described = std::make_shared<VolumeLevels>(VolumeLevels{.overview = opened.survey.summary});
   for (std::size_t level = 0; level < levels.size(); ++level) {
     described->levels.push_back(levels[level].description);
     SourceAtLevel at{.source = opened.source,
                      .surveyed = opened.survey.summary,
-                     .stored = {opened.text, int(level), opened.version, {{0, 0, 0}, levels[level].block}},
+                     .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
                      .stamp = opened.stamp,
                      .index = opened.index};
     if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
   }
-  if (sources.size() == 1) return *LoadLevel(action, *sources.front().at_level, [](int) {});  // it stays where it is, so this cannot fail
+  if (sources.size() == 1) return LoadLevel(action, *sources.front().at_level, tell);
   return News{DatasetOpened{action.name, action.load, std::move(described), std::move(sources), opened.stamp}};
 }
 
 // Holds the voxels of the level if there is room for them.
-Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at,
-                                                             const std::function<void(int percent)>& tell) {
+Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell) {
   const VolumeDescription& description = at.source->info().levels[std::size_t(at.stored.level)].description;
   const auto bytes = std::uint64_t(description.voxel_bytes());
+  // A picture may be drawn from several levels, which must be held together.
+  std::uint64_t with_coarser = 0;
+  for (const SourceLevel& level : std::span(at.source->info().levels).subspan(std::size_t(at.stored.level))) {
+    with_coarser += std::uint64_t(level.description.voxel_bytes());
+  }
   VoxelServer::Samples samples;
   VolumeSummary summary;
-  if (bytes <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
-    const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, tell);
-    if (!volume.ok()) return volume.status();
-    samples.volume = *volume;
-    summary = at.surveyed_level ? *at.surveyed : Summarize(**volume);
+  if (with_coarser <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+    ReadProgress progress(tell);
+    const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, &progress);
+    // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
+    const Result<bool> changed = volume.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
+    if (!volume.ok() && (!changed.ok() || !*changed)) return volume.status();
+    if (volume.ok()) {
+      samples.volume = *volume;
+      samples.read_from = at.source;
+    }
+  }
+  if (samples.volume != nullptr) {
+    summary = at.surveyed_level ? *at.surveyed : Summarize(*samples.volume);
     summary.range = at.surveyed->range;
     summary.histogram = at.surveyed->histogram;
     summary.non_finite = at.surveyed->non_finite;
@@ -199,7 +217,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   return Post(
       loads_, barrier.c_str(),
       [action, inbox = inbox_] {
-        return Load(action, [&](int percent) { inbox->Post(News{DatasetReading{action.name, action.load, percent}}); });
+        return Load(action, [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); });
       },
       EndOf<DatasetFailed>(action.name, action.load));
 }

@@ -77,9 +77,10 @@ class BackgroundActions {
     VoxelServer::Samples samples = {};
     std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
   };
-  static Result<News> Load(const LoadDataset& action, const std::function<void(int percent)>& tell);
-  static News Open(const LoadDataset& action, OpenedSource opened);
-  static Result<News> LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const std::function<void(int percent)>& tell);
+  static Result<News> Load(const LoadDataset& action, const TellRead& tell);
+  static Result<News> Open(const LoadDataset& action, OpenedSource opened, const TellRead& tell);
+  static Result<News> Hold(const LoadDataset& action, const LoadedSource& loaded);
+  static Result<News> LoadLevel(const LoadDataset& action, const SourceAtLevel& at, const TellRead& tell);
   // Has `make` make news on a thread of `tasks`; if it fails, `failed(why)` makes the event.
   AtOnce Post(auto&& tasks, const char* what, auto make, auto failed);
   // Where the event holds a result: that of `find`, or the error.

@@ -6,6 +6,8 @@
 #include <array>
 #include <chrono>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -14,6 +16,7 @@
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
+#include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 #include "data/volume_io/formats.h"
@@ -157,18 +160,6 @@ Result<std::vector<std::string>> FilesOf(const DataSource& data) {
   return files;
 }
 
-Result<LayeredVolume> ReadSource(const DataSource& data, const std::function<void(int)>& tell) {
-  Result<SourceText> source = ParseSourceText(data.path);
-  if (!source.ok()) return source.status();
-  ReadProgress progress(tell);
-  source->options.progress = &progress;
-  const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
-  if (!read.ok()) return read.status();
-  Result<Layers> layers = ReadLayers(data.layers, read->volume->description.geometry);
-  if (!layers.ok()) return layers.status();
-  return LayeredVolume{.volume = read->volume, .layers = *std::move(layers)};
-}
-
 // Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.
 Status TakeLayers(std::string& path, LayerFiles& layers) {
   constexpr std::array<std::string_view, 2> kMarks = {",labels=", ",overlay="};
@@ -197,10 +188,10 @@ Status TakeLayers(std::string& path, LayerFiles& layers) {
 }
 
 // Pictures are the same without it, so whatever is wrong with it is but a warning.
-std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, std::uint64_t version, const SourceInfo& info) {
+std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, const SourceInfo& info) {
   const Result<IndexFile> file = IndexFileOf(source_text);
   if (!file.ok() || !file->facts()) return nullptr;
-  const Result<std::string> name = file->NameNow(version, info);
+  const Result<std::string> name = file->NameNow(info.version, info);
   Result<std::optional<BrickIndex>> index = name.ok() ? file->Read(*name, info) : name.status();
   if (!index.ok()) {
     LogWarning(fmt::format("the index of {} is not used: {}; `slabstream index` makes a new one", source_text, index.status().message()));
@@ -218,6 +209,97 @@ void AwaitRest(const FileStamp& stamp) {
   constexpr std::chrono::milliseconds kRest(50);
   const auto age = std::chrono::system_clock::now() - stamp.newest;
   if (age >= age.zero() && age < kRest) std::this_thread::sleep_for(kRest - age);  // a clock that is ahead of ours tells nothing
+}
+
+// How a source is read: what of it may change, and the reading.
+struct WayToRead {
+  std::vector<std::string> files;
+  std::function<Result<ReadableSource>()> read;
+};
+
+Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
+                                ReadProgress& progress) {
+  Result<Survey> survey = SurveySource(*source, &progress);
+  if (!survey.ok()) return survey.status();
+  return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
+}
+
+// The voxels, those of layers too.
+Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
+  Result<LoadedVolume> read = ReadAnyVolume(text.path, text.options);
+  if (!read.ok()) return read.status();
+  Result<Layers> with = ReadLayers(layers, read->volume->description.geometry);
+  if (!with.ok()) return with.status();
+  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr});
+}
+
+// Other processes may run in other folders.
+std::string PlaceOf(const DataSource& data, const SourceText& text) {
+  return fs::absolute(text.path).string() + data.path.substr(text.path.size());
+}
+
+// Of a source that its format can read in parts.
+WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& data, const SourceText& text, bool in_parts) {
+  ReadProgress* const progress = text.options.progress;
+  WayToRead way{source->info().files, {}};
+  if (in_parts) {
+    way.read = [source, source_text = data.path, place = PlaceOf(data, text), text, progress] {
+      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
+      return Surveyed(source, place, FindIndex(source_text, source->info()), *progress);
+    };
+  } else if (IsReadWhole(text.path, text.options)) {
+    way.read = [text] { return ReadWhole(text, {}); };
+  } else {
+    way.read = [source, progress]() -> Result<ReadableSource> {
+      Result<std::shared_ptr<const Volume>> volume = ReadLevel(*source, 0, progress);
+      if (!volume.ok()) return volume.status();
+      return ReadableSource(LoadedSource{FileInfoOf(source->info()), *std::move(volume), {}, nullptr});
+    };
+  }
+  return way;
+}
+
+// Of a stream that is larger than what may be held.
+WayToRead WayOfStream(SourceInfo info, const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
+  constexpr std::uint64_t kLeastMemory = std::uint64_t{64} << 20, kMostMemory = std::uint64_t{1} << 30;
+  const std::uint64_t memory = std::clamp(most_bytes, kLeastMemory, kMostMemory);
+  return {std::move(info.files), [source = data.path, memory, &progress]() -> Result<ReadableSource> {
+            const Result<StoreFolder> stores = StoreFolder::Usual();
+            if (!stores.ok()) return stores.status();
+            Result<StoredStream> stored = OpenStored(source, *stores, ProcessReadContext(), {.memory = memory}, &progress);
+            if (!stored.ok()) return stored.status();
+            return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress);
+          }};
+}
+
+Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
+  Result<SourceText> text = ParseSourceText(data.path);
+  if (!text.ok()) return text.status();
+  text->options.progress = &progress;
+  if (!data.layers.any()) {
+    const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
+    const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };
+    if (FindSourceFormat(text->path, text->options) != nullptr) {
+      const Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
+      if (!source.ok()) return source.status();
+      return WayOf(*source, data, *text, (*source)->info().levels.size() > 1 || is_large((*source)->info()));
+    }
+    Result<std::optional<SourceInfo>> stream = DescribeStream(text->path, text->options);
+    if (!stream.ok()) return stream.status();
+    if (*stream && is_large(**stream)) return WayOfStream(**std::move(stream), data, most_bytes, progress);
+  }
+  Result<std::vector<std::string>> files = FilesOf(data);
+  if (!files.ok()) return files.status();
+  return WayToRead{*std::move(files), [text = *std::move(text), layers = data.layers] { return ReadWhole(text, layers); }};
+}
+
+// Of all that was read. A source may have more files than its volume, which come with it.
+Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, const FileStamp& before) {
+  const auto* const opened = std::get_if<OpenedSource>(&read);
+  if (opened == nullptr) return std::make_shared<const FileStamp>(before);
+  Result<FileStamp> stamp = StampFiles(opened->source->info().files);
+  if (!stamp.ok()) return stamp.status();
+  return std::make_shared<const FileStamp>(*std::move(stamp));
 }
 
 }  // namespace
@@ -309,59 +391,33 @@ void CheckFiles(FoundData& found) {
 Result<IndexFile> IndexFileOf(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
+  if (FindSourceFormat(parsed->path, parsed->options) == nullptr) {
+    return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
+  }
   return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));
 }
 
-Result<std::optional<OpenedSource>> OpenInParts(const DataSource& data, std::uint64_t most_bytes,
-                                                const std::function<void(int percent)>& tell) {
-  if (data.load || data.layers.any()) return std::optional<OpenedSource>();
-  const Result<SourceText> parsed = ParseSourceText(data.path);
-  if (!parsed.ok()) return parsed.status();
-  if (FindSourceFormat(parsed->path, parsed->options) == nullptr) return std::optional<OpenedSource>();
-  constexpr int kAttempts = 2;
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    Result<std::shared_ptr<VolumeSource>> source = OpenSource(parsed->path, parsed->options, ProcessReadContext());
-    if (!source.ok()) return source.status();
-    const SourceInfo& info = (*source)->info();
-    const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
-    if (info.levels.size() == 1 && info.levels.front().description.voxel_bytes() <= most) {
-      return std::optional<OpenedSource>();
-    }
-    const Result<FileStamp> stamp = StampFiles(info.files);
-    if (!stamp.ok()) return stamp.status();
-    AwaitRest(*stamp);
-    const Result<std::uint64_t> version = VersionOf(info.files);
-    Result<Survey> survey = SurveySource(**source, tell);
-    const Result<bool> changed = HaveChanged(*stamp);
-    if (!changed.ok() || *changed || !version.ok()) continue;
-    if (!survey.ok()) return survey.status();
-    // Other processes may run in other folders.
-    const std::string place = fs::absolute(parsed->path).string() + data.path.substr(parsed->path.size());
-    std::shared_ptr<const BrickIndex> index = FindIndex(data.path, *version, info);
-    return std::optional(
-        OpenedSource{*std::move(source), *std::move(survey), place, *version, std::make_shared<const FileStamp>(*stamp), std::move(index)});
-  }
-  return BeingWritten(data);
-}
-
-Result<LoadedSource> LoadSource(const DataSource& source, const std::function<void(int percent)>& tell) {
+Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell) {
   if (source.load) {
-    Result<LayeredVolume> loaded = source.load();
+    Result<LayeredVolume> loaded = source.load(tell);
     if (!loaded.ok()) return loaded.status();
-    return LoadedSource{std::move(loaded->volume), std::move(loaded->layers), nullptr};
+    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr});
   }
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    Result<std::vector<std::string>> files = FilesOf(source);
-    if (!files.ok()) return files.status();
-    const Result<FileStamp> stamp = StampFiles(*std::move(files));
-    if (!stamp.ok()) return stamp.status();
-    AwaitRest(*stamp);
-    Result<LayeredVolume> read = ReadSource(source, tell);
-    const Result<bool> changed = HaveChanged(*stamp);
-    if (!changed.ok() || *changed) continue;
-    if (!read.ok()) return read.status();
-    return LoadedSource{std::move(read->volume), std::move(read->layers), std::make_shared<const FileStamp>(*stamp)};
+    ReadProgress progress(tell);
+    const Result<WayToRead> way = FindWay(source, most_bytes, progress);
+    if (!way.ok()) return way.status();
+    const Result<FileStamp> before = StampFiles(way->files);
+    if (!before.ok()) return before.status();
+    AwaitRest(*before);
+    Result<ReadableSource> read = way->read();
+    Result<std::shared_ptr<const FileStamp>> stamp = std::shared_ptr<const FileStamp>();
+    if (read.ok()) stamp = StampOf(*read, *before);
+    const Result<bool> changed = HaveChanged(*before);
+    if (!changed.ok() || *changed || !stamp.ok()) continue;
+    if (read.ok()) std::visit([&](auto& each) { each.stamp = *std::move(stamp); }, *read);
+    return read;
   }
   return BeingWritten(source);
 }

@@ -15,16 +15,17 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "common/base/status.h"
 #include "coordinator/data_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/read_progress.h"
+#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 
@@ -65,31 +66,34 @@ Result<FoundData> ListFolder(const std::string& folder);
 // a complaint and stays.
 void CheckFiles(FoundData& found);
 
-// A volume that is read in parts, if it is to be: it has several levels, or more voxels than `most_bytes`. Null: it is to be read as a
-// whole.
+// A volume that is read in parts.
 struct OpenedSource {
   std::shared_ptr<VolumeSource> source;
   Survey survey;
-  std::string text;           // where workers find it
-  std::uint64_t version = 0;  // VersionOf its files
-  std::shared_ptr<const FileStamp> stamp;
-  std::shared_ptr<const BrickIndex> index = nullptr;  // null: there is none, or none that can be used; a line of the log says why
+  std::string text;                              // where workers find it
+  std::shared_ptr<const FileStamp> stamp;        // of its files as they were surveyed
+  std::shared_ptr<const BrickIndex> index = {};  // null: there is none, or none that can be used; a line of the log says why
 };
-// Where the index of a source is kept. Errors of ParseSourceText and IndexFile::Of.
-Result<IndexFile> IndexFileOf(const std::string& source);
-// Does not change between the two stamps that it takes, as LoadSource. Errors of OpenSource and SurveySource.
-Result<std::optional<OpenedSource>> OpenInParts(
-    const DataSource& source, std::uint64_t most_bytes, const std::function<void(int percent)>& tell = [](int) {});
 
+// A volume that was read as a whole.
 struct LoadedSource {
+  VolumeFileInfo file;  // of its paths; nothing if a function has loaded it
   std::shared_ptr<const Volume> volume;
   Layers layers;
   std::shared_ptr<const FileStamp> stamp;  // of its files as they were read; null: they never change
 };
-// Reads the voxels, those of layers too. Files that change meanwhile are read a second time, so the voxels are never those of two files.
-// `tell` hears, on this thread, each whole percent of the volume's samples that has been read. Errors: of ReadVolume and ReadLayers;
+
+using ReadableSource = std::variant<OpenedSource, LoadedSource>;
+
+// Opens and surveys a volume that has several levels, or more voxels than `most_bytes` or kExactBytes, if its format can be read in parts;
+// a compressed stream of that size becomes so (data/brick_store). Anything else, and whatever has layers, is read as a whole.
+//
+// Files that change meanwhile are read a second time, so the voxels are never those of two files. `tell`, if any, hears how much of the
+// samples has been read, on any thread, one call at a time. Errors: of OpenSource, SurveySource, OpenStored, ReadVolume and ReadLayers;
 // Unavailable: they change again.
-Result<LoadedSource> LoadSource(
-    const DataSource& source, const std::function<void(int percent)>& tell = [](int) {});
+Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell = {});
+
+// Where the index of a source is kept. Errors: of ParseSourceText and IndexFile::Of; InvalidArgument: its format cannot be read in parts.
+Result<IndexFile> IndexFileOf(const std::string& source);
 
 }  // namespace slabstream

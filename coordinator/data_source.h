@@ -18,6 +18,7 @@
 #include "common/volume/summary.h"
 #include "data/layers/layer_reader.h"
 #include "data/sources/volume_source.h"
+#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 
@@ -34,7 +35,7 @@ struct SourceAtLevel {
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
-using DataLoader = std::function<Result<LayeredVolume>()>;
+using DataLoader = std::function<Result<LayeredVolume>(const TellRead&)>;
 
 // Paths, or a function whose volume never changes.
 struct DataSource {
@@ -45,7 +46,7 @@ struct DataSource {
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
   DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one whose volume has no layers
-      : load([loader = VolumeLoader(std::move(loader))]() -> Result<LayeredVolume> {
+      : load([loader = VolumeLoader(std::move(loader))](const TellRead&) -> Result<LayeredVolume> {
           Result<std::shared_ptr<const Volume>> volume = loader();
           if (!volume.ok()) return volume.status();
           return LayeredVolume{.volume = *std::move(volume)};

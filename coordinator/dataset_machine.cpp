@@ -18,7 +18,7 @@ void DatasetMachine::State::On(const SeekDataset& event) {
     news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset};
     return;
   }
-  const auto use = uses.insert_or_assign(event.use, Use{.request = event.request, .entry = name, .check = Seek(name)}).first;
+  const auto use = uses.insert_or_assign(event.use, Use{.request = event.request, .entries = {{name, Seek(name)}}}).first;
   if (const Status found = DescendUse(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
     uses.erase(use);
@@ -29,7 +29,7 @@ void DatasetMachine::State::On(const SeekDataset& event) {
 
 void DatasetMachine::State::On(const KeepDataset& event) {
   const auto use = uses.find(event.use);
-  if (use != uses.end()) use->second.kept = event.dataset;
+  if (use != uses.end()) use->second.kept = event.datasets;
 }
 
 void DatasetMachine::State::On(const ForgetClient& event) {
@@ -79,48 +79,65 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
   return 0;
 }
 
-// If its dataset has several levels and is open, it seeks the one that it draws. Errors of LevelOf.
+// If its dataset has several levels and is open, it seeks those that it draws. Errors of LevelsOf.
 Status DatasetMachine::State::DescendUse(Use& use) {
-  const DatasetTable::Entry& entry = *datasets.Find(use.entry);
-  if (entry.state != DatasetState::kReady || entry.levels == nullptr) return Status::Ok();
-  const Result<int> level = LevelOf(*use.request, *entry.levels);
-  if (!level.ok()) return level.status();
-  use.entry = LevelName(use.request->dataset, *level);
-  use.check = Seek(use.entry);
+  const std::shared_ptr<const VolumeLevels> levels = datasets.Find(use.entries.front().name)->levels;
+  if (levels == nullptr) return Status::Ok();
+  Result<LevelMap> map = LevelsOf(*use.request, *levels);
+  if (!map.ok()) return map.status();
+  use.map = std::make_shared<const LevelMap>(*std::move(map));
+  use.entries.clear();
+  for (const int level : use.map->levels) {
+    const std::string name = LevelName(use.request->dataset, level);
+    const CheckId check = Seek(name);
+    use.entries.push_back({name, check});
+  }
   return Status::Ok();
 }
 
 // Until a check has shown that the files have not changed, requests are planned for the voxels that are there.
 void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   const auto& [id, use] = each;
-  const DatasetTable::Entry& entry = *datasets.Find(use.entry);
-  if (entry.state == DatasetState::kReady && entry.levels == nullptr) {
-    DatasetReady ready{.dataset = entry.id, .summary = entry.summary, .seen = entry.checks.IsOver(use.check)};
-    if (IsLevelName(use.entry)) ready.finest = datasets.Find(use.request->dataset)->levels->levels.front().geometry;
-    news.uses[id] = std::move(ready);
-  } else {
-    news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .percent = entry.percent};
+  DatasetReady ready;
+  for (const Use::Entry& awaited : use.entries) {
+    const DatasetTable::Entry& entry = *datasets.Find(awaited.name);
+    if (entry.state != DatasetState::kReady || entry.levels != nullptr) {
+      news.uses[id] = DatasetAwaited{.loading = entry.state == DatasetState::kLoading, .read = entry.read};
+      return;
+    }
+    ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
+    if (ready.dataset == 0) {
+      ready.dataset = entry.id;
+      ready.summary = entry.summary;
+    } else {
+      ready.coarser.push_back({entry.id, entry.summary});
+    }
   }
+  if (use.map != nullptr) {
+    ready.levels = datasets.Find(use.request->dataset)->levels;
+    ready.drawn = use.map->levels;
+  }
+  if (use.map != nullptr && !use.map->one_level()) ready.map = use.map;
+  news.uses[id] = std::move(ready);
 }
 
 void DatasetMachine::State::TellUses(const std::string& name) {
   for (const auto& use : uses) {
-    if (use.second.entry == name && !use.second.kept) TellUse(use);
+    if (use.second.WaitsFor(name) && !use.second.begun()) TellUse(use);
   }
 }
 
 // What waits for the dataset, or for a level of it, ends; or what waits for this level.
 void DatasetMachine::State::Lose(const std::string& name, const Status& why, RefusedAs as) {
-  const auto waits_for_it = [&](const auto& each) { return each.entry == name || DatasetOfLevel(each.entry) == name; };
   std::erase_if(uses, [&](const auto& each) {
     const auto& [id, use] = each;
-    if (!waits_for_it(use) || use.kept) return false;
+    if (use.begun() || !(use.WaitsFor(name) || use.request->dataset == name)) return false;
     news.uses[id] = DatasetLost{why, as};
     return true;
   });
   std::erase_if(questions, [&](const auto& each) {
     const OpenQuestion& open = each.second;
-    if (open.asked || !waits_for_it(open)) return false;
+    if (open.asked || !(open.entry == name || DatasetOfLevel(open.entry) == name)) return false;
     if (as != nullptr) ++(refused.*as);
     RefuseQuestion(open, why);
     return true;
@@ -128,7 +145,7 @@ void DatasetMachine::State::Lose(const std::string& name, const Status& why, Ref
 }
 
 bool DatasetMachine::State::IsWanted(const std::string& name) const {
-  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.entry == name && !use.second.kept; }) ||
+  return std::ranges::any_of(uses, [&](const auto& use) { return use.second.WaitsFor(name) && !use.second.begun(); }) ||
          std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && open.second.entry == name; });
 }
 
@@ -137,8 +154,12 @@ bool DatasetMachine::State::InUse(DatasetId dataset) const {
     const DatasetTable::Entry* const entry = datasets.Find(name);
     return entry != nullptr && entry->id == dataset;
   };
-  return std::ranges::any_of(uses,
-                             [&](const auto& use) { return use.second.kept ? use.second.kept == dataset : is_of(use.second.entry); }) ||
+  const auto uses_it = [&](const auto& each) {
+    const Use& use = each.second;
+    if (use.begun()) return std::ranges::find(use.kept, dataset) != use.kept.end();
+    return std::ranges::any_of(use.entries, [&](const Use::Entry& entry) { return is_of(entry.name); });
+  };
+  return std::ranges::any_of(uses, uses_it) ||
          std::ranges::any_of(questions, [&](const auto& open) { return !open.second.asked && is_of(open.second.entry); });
 }
 
@@ -153,7 +174,7 @@ void DatasetMachine::State::LoadData(const std::string& name) {
 
 void DatasetMachine::State::On(const DatasetReading& event) {
   if (!datasets.IsLoading(event.name, event.load)) return;
-  datasets.Find(event.name)->percent = event.percent;
+  datasets.Find(event.name)->read = event.read;
   TellUses(event.name);
 }
 
@@ -177,7 +198,8 @@ void DatasetMachine::State::On(const DatasetLoaded& event) {
   }
   if (datasets.bytes() <= share) return;
   // All that are loaded are in use. What came last goes, with its requests.
-  const Status full = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status too_large = TooLarge(event.name, event.bytes, datasets.bytes() - event.bytes);
+  const Status full(too_large.code(), too_large.message() + "; an .ome.zarr, as slabstream convert makes it, is read in parts");
   Lose(event.name, full, &RefusedRequests::too_large);
   UnloadOne();
 }
@@ -192,7 +214,7 @@ void DatasetMachine::State::On(const DatasetOpened& event) {
   for (auto next = uses.begin(); next != uses.end();) {
     const auto each = next++;
     auto& [id, use] = *each;
-    if (use.entry != event.name || use.kept) continue;
+    if (!use.WaitsFor(event.name) || use.begun()) continue;
     const Status found = DescendUse(use);
     if (found.ok()) continue;
     news.uses[id] = DatasetLost{found, &RefusedRequests::bad_request};
@@ -224,16 +246,16 @@ void DatasetMachine::State::FailData(const std::string& name, const Status& stat
 // All levels of a dataset change together.
 void DatasetMachine::State::RenewData(const std::string& changed) {
   const std::string name = DatasetOfLevel(changed);
-  const auto go_back = [&](auto& waiting) {
-    if (DatasetOfLevel(waiting.entry) != name || waiting.entry == name) return;
-    waiting.entry = name;
-    waiting.check = 0;  // of the level; the dataset is opened anew
-  };
+  // What waits for a level waits for the dataset, which is opened anew.
   for (auto& [id, use] : uses) {
-    if (!use.kept) go_back(use);
+    if (use.begun() || use.map == nullptr || use.request->dataset != name) continue;
+    use.entries = {{name}};
+    use.map = nullptr;
   }
   for (auto& [id, open] : questions) {
-    if (!open.asked) go_back(open);
+    if (open.asked || DatasetOfLevel(open.entry) != name || open.entry == name) continue;
+    open.entry = name;
+    open.check = 0;
   }
   datasets.Reset(name, now);
   if (IsWanted(name)) LoadData(name);
@@ -282,10 +304,15 @@ void DatasetMachine::State::On(const DatasetSeen& event) {
     RenewData(event.name);
   } else {
     CheckFilesOf(event.name);
-    for (auto& use : uses) {
-      if (use.second.check == 0 || use.second.entry != event.name || !entry->checks.IsOver(use.second.check)) continue;
-      use.second.check = 0;
-      if (!use.second.kept) TellUse(use);
+    for (auto& each : uses) {
+      Use& use = each.second;
+      bool over = false;
+      for (Use::Entry& awaited : use.entries) {
+        if (awaited.check == 0 || awaited.name != event.name || !entry->checks.IsOver(awaited.check)) continue;
+        awaited.check = 0;
+        over = true;
+      }
+      if (over && !use.begun()) TellUse(each);
     }
   }
   AnswerLists();

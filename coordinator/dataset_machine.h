@@ -4,7 +4,7 @@
 //   datasets   A dataset is loaded when it is first used. Requests wait for it; a failed load fails them. Datasets that no request needs
 //              are unloaded, the least recently used one first, if they take more than their share of memory_bytes, or if another one
 //              cannot be loaded for want of memory.
-//   levels     A dataset with several levels is only opened. A request seeks the level that it draws (LevelOf), and that one is loaded.
+//   levels     A dataset with several levels is only opened. A request seeks the levels that it draws (LevelsOf), and these are loaded.
 //   files      A frame of a dataset begins only after a check of its files that began after the request came. If they have changed, they
 //              are read anew, and what has not begun waits. Frames that have begun end with the voxels that they began with, which stay
 //              until then. Watched folders are looked through every check_interval, and when somebody asks for a name that is not known;
@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/read_share.h"
 #include "common/base/time.h"
 #include "common/wire/limits.h"
 #include "coordinator/data_source.h"
@@ -83,7 +84,7 @@ struct DatasetOpened {
 struct DatasetReading {  // not the end yet
   std::string name;
   LoadId load = 0;
-  int percent = 0;  // of its samples that have been read, [1, 100]
+  ReadShare read;
 };
 struct DatasetFailed {
   std::string name;

@@ -24,14 +24,14 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
   questions.emplace(++last_question, std::move(open));
 }
 
-// Of a dataset with several levels, that is open: a question about a picture is one about the level that it shows, any other one about the
-// finest level. Errors of LevelOf.
+// Of a dataset with several levels, that is open: a question about a picture is one about the finest level that it shows, any other one
+// about the finest level of all. Errors of LevelsOf.
 Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
   int level = 0;
   if (auto* pick = std::get_if<PickQuery>(&open.question)) {
-    const Result<int> drawn = LevelOf(pick->frame, levels);
+    const Result<LevelMap> drawn = LevelsOf(pick->frame, levels);
     if (!drawn.ok()) return drawn.status();
-    level = *drawn;
+    level = drawn->levels.front();
     pick->frame = AtLevel(pick->frame, levels.levels.front().geometry, levels.levels[std::size_t(level)].geometry);
   }
   open.entry = LevelName(open.entry, level);

@@ -21,7 +21,6 @@ namespace slabstream {
 
 // What datasets may take of a coordinator's memory; the rest is for a volume that is being read, and for pictures. `memory_bytes` 0: no
 // limit.
-inline std::uint64_t DatasetShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? UINT64_MAX : memory_bytes / 4 * 3; }
 
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
@@ -37,9 +36,17 @@ struct DatasetMachine::State {
   // A dataset that a request needs.
   struct Use {
     std::shared_ptr<const FrameRequest> request;
-    std::string entry;              // of the table that it waits for: the dataset, or the level of it that it draws
-    CheckId check = 0;              // at its files, which must be over before a frame begins; 0: none
-    std::optional<DatasetId> kept;  // its frame has begun with these voxels
+    // Of the table: what it waits for. The dataset, or the levels of it that it draws, finest first.
+    struct Entry {
+      std::string name;
+      CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
+    };
+    std::vector<Entry> entries;
+    std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
+    std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
+
+    bool begun() const { return !kept.empty(); }
+    bool WaitsFor(const std::string& name) const { return std::ranges::find(entries, name, &Entry::name) != entries.end(); }
   };
   // An order that waits for a file check. kList: for the one of the folders and those of the datasets.
   struct OpenOrder {

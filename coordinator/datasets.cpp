@@ -99,7 +99,7 @@ LoadId DatasetTable::BeginLoad(const std::string& name, Time now) {
   entry.state = DatasetState::kLoading;
   entry.since = now;
   entry.error.clear();
-  entry.percent = 0;
+  entry.read = {};
   return entry.load = ++last_load_;
 }
 
@@ -208,6 +208,7 @@ std::vector<DatasetStatus> DatasetTable::Report(Time now) const {
     if (entry.levels != nullptr) {
       status.description = entry.levels->levels.front();
       status.range = entry.levels->overview->range;
+      status.levels = entry.levels->levels;
       for (const auto& [level, of_level] : levels_) status.memory_bytes += DatasetOfLevel(level) == name ? of_level.bytes : 0;
     } else if (entry.summary) {
       status.description = entry.summary->description;

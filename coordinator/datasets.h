@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "common/base/read_share.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
@@ -42,7 +43,7 @@ class DatasetTable {
     DatasetState state = DatasetState::kUnloaded;
     Time since;                                    // in this state
     LoadId load = 0;                               // the last one begun; 0: none
-    int percent = 0;                               // kLoading only: of its samples that have been read, as far as is known
+    ReadShare read;                                // kLoading only: of its samples, as far as is known
     DatasetId id = 0;                              // kReady only
     std::shared_ptr<const VolumeSummary> summary;  // kReady only
     std::shared_ptr<const VolumeLevels> levels;    // kReady only, of a dataset with several: it has neither an id nor a summary

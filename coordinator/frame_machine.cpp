@@ -36,29 +36,60 @@ void FrameMachine::State::On(const OccupiedCounted& event) {
 // A request that has ended is not in the queue any more.
 void FrameMachine::State::On(const Planned& event) {
   planning.erase(event.plan);
-  const Result<int> fit = event.frame.ok() ? FramesThatFitWorkers((*event.frame)->plan, *(*event.frame)->asked.resolved->summary)
-                                           : Result<int>(event.frame.status());
+  const Status fit = event.frame.ok() ? (*event.frame)->fit.status() : event.frame.status();
   const auto asked = [&](const OpenRequest& request) {
     const auto* const ask = request.plan<PlanAsked>();
     return ask != nullptr && ask->plan == event.plan ? ask : nullptr;
   };
   if (fit.ok()) {
     return queue.ForEach([&](OpenRequest& request) {
-      if (const PlanAsked* ask = asked(request)) request.dataset()->plan = PlanMade{*event.frame, *fit, ask->version};
+      if (const PlanAsked* ask = asked(request)) request.dataset()->plan = PlanMade{*event.frame, ask->version};
     });
   }
-  const StatusCode code = fit.status().code();
-  const bool bad = code == StatusCode::kInvalidArgument;
-  const bool too_large = event.frame.ok() && code == StatusCode::kResourceExhausted;
-  const RefusedAs as = bad ? &RefusedRequests::bad_request : too_large ? &RefusedRequests::too_large : nullptr;
   const auto is_it = [&](const OpenRequest& request) { return asked(request) != nullptr && asked(request)->version == roster.version(); };
-  for (const OpenRequest& request : queue.Extract(is_it)) FailRequest(request, fit.status(), as);
+  if (event.frame.ok()) {
+    bool lowered = false;
+    queue.ForEach([&](OpenRequest& request) { lowered |= is_it(request) && Lower(request, **event.frame); });
+    if (lowered) return;
+  }
+  const bool bad = fit.code() == StatusCode::kInvalidArgument;
+  const RefusedAs as = event.frame.ok() ? &RefusedRequests::too_large : bad ? &RefusedRequests::bad_request : nullptr;
+  for (const OpenRequest& request : queue.Extract(is_it)) {
+    FailRequest(request, event.frame.ok() ? WhyTooLarge(request, **event.frame) : fit, as);
+  }
 }
 
-Result<int> FrameMachine::State::FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const {
+// The frame does not fit. If the request allows that, it seeks the level that does.
+bool FrameMachine::State::Lower(OpenRequest& request, const PlannedFrame& planned) {
+  if (request.submit.frame.detail != 0 || request.dataset()->levels == nullptr || !planned.level_that_fits) return false;
+  const int level = *planned.level_that_fits;
+  request.lowered =
+      fmt::format("level {} is drawn instead of level {}: {}", level, request.dataset()->drawn.front(), planned.fit.status().message());
+  FrameRequest coarser = request.submit.frame;
+  coarser.level = std::to_string(level);
+  actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
+  request.use = ++last_use;
+  request.state = OpenRequest::AwaitsDataset{};
+  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{request.use, std::make_shared<const FrameRequest>(std::move(coarser))});
+  return true;
+}
+
+// In one line: what is needed, the limit, and what would fit.
+Status FrameMachine::State::WhyTooLarge(const OpenRequest& request, const PlannedFrame& planned) {
+  const Status& status = planned.fit.status();
+  const bool has_levels = request.dataset()->levels != nullptr;
+  std::string way_out = has_levels ? "; no coarser level fits" : "";
+  if (planned.level_that_fits) {
+    way_out = has_levels ? fmt::format("; --level {} would fit, and --detail auto chooses such a level", *planned.level_that_fits)
+                         : "; the volume has no coarser levels, which would fit: slabstream convert makes them";
+  }
+  return {status.code(), status.message() + way_out};
+}
+
+std::vector<WorkerLimit> FrameMachine::State::WorkerLimits() const {
   std::vector<WorkerLimit> workers;
   for (const Member& member : roster.members()) workers.push_back({member.id, member.description.memory_bytes});
-  return FramesThatFit(plan, summary, workers);
+  return workers;
 }
 
 // Counts for the first request of each client, then for the next ones in turn. Those behind them wait, so that no grid is dropped before it
@@ -111,7 +142,13 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
                   .resolved = request.dataset()->resolved,
                   .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
-                  .turn = team.turn};
+                  .turn = team.turn,
+                  .limits = WorkerLimits()};
+  if (const OpenRequest::HasDataset& dataset = *request.dataset(); dataset.levels != nullptr) {
+    ask.frame = std::make_shared<const FrameRequest>(request.submit.frame);
+    ask.levels = dataset.levels;
+    ask.level = dataset.drawn.front();
+  }
   for (const Member& member : roster.members()) {
     if (member.leaving) continue;
     const Register& worker = member.description;
@@ -254,7 +291,7 @@ void FrameMachine::State::BeginAttempts() {
     Status status = frame.BeginAttempt(roster.Refill(frame.roster()), HoldersOf(frame), now);
     if (status.ok()) {
       // The boxes of those that were lost may be too much for the others.
-      const Result<int> fit = FramesThatFitWorkers(frame.plan(), *frame.planned()->asked.resolved->summary);
+      const Result<int> fit = FramesThatFit(frame.plan(), *frame.planned()->asked.resolved->summary, WorkerLimits());
       if (fit.ok()) frame.SetFit(*fit);
       status = fit.status();
     }
@@ -284,7 +321,7 @@ bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
-  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->volume().dataset()});
+  actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->datasets()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
   SendClient(running.request().client, running.Progress());
   return true;

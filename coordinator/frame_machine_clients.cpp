@@ -18,8 +18,6 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& m
   OpenRequest request{.client = client, .submit = message, .arrived = now};
   if (Status names = CheckNames(policy); !names.ok()) return FailRequest(request, names, &RefusedRequests::bad_request);
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
-  request.uses_occupancy = NeedsOccupancy(policy);
-  request.needs_occupancy = request.uses_occupancy && !LeavesChoice(policy);
   request.use = ++last_use;
   queue.Push(std::move(request));
   actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, std::make_shared<const FrameRequest>(message.frame)});
@@ -34,11 +32,11 @@ void FrameMachine::State::On(const DatasetNews& event) {
     if (const auto* awaited = std::get_if<DatasetAwaited>(&news->second)) {
       const bool first = std::holds_alternative<OpenRequest::Submitted>(request.state);
       request.state = OpenRequest::AwaitsDataset{};  // DropPlans drops a plan that it had
-      if (first || awaited->percent > 0) SendQueued(request, awaited);
+      if (first || awaited->read.percent > 0) SendQueued(request, awaited);
     } else if (const auto* ended = std::get_if<DatasetLost>(&news->second)) {
       lost[request.use] = *ended;
     } else if (const auto& ready = std::get<DatasetReady>(news->second);
-               request.dataset() != nullptr && request.dataset()->volume().dataset() == ready.dataset) {
+               request.dataset() != nullptr && request.dataset()->DrawsFrom(ready)) {
       request.dataset()->seen = ready.seen;
     } else if (const Status suits = Resolve(request, ready); suits.ok()) {
       SendQueued(request, nullptr);
@@ -54,14 +52,23 @@ void FrameMachine::State::On(const DatasetNews& event) {
 // Errors as of ResolveRequest.
 Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
   const FrameRequest& asked = request.submit.frame;
-  if (!ready.finest && LevelNumber(asked.level).value_or(0) > 0) {
+  if (ready.levels == nullptr && LevelNumber(asked.level).value_or(0) > 0) {
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has level 0 alone", asked.level, asked.dataset));
   }
-  Result<ResolvedRequest> resolved = ResolveRequest(
-      ready.finest ? AtLevel(asked, *ready.finest, ready.summary->description.geometry) : asked, ready.dataset, ready.summary);
+  const VolumeGeometry& drawn = ready.summary->description.geometry;
+  const VolumeGeometry& finest = ready.levels == nullptr ? drawn : ready.levels->levels.front().geometry;
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(asked, finest, drawn), ready.dataset, ready.summary);
   if (!resolved.ok()) return resolved.status();
-  if (resolved->summary->stored) request.uses_occupancy = request.needs_occupancy = false;  // nobody counts what nobody holds
-  request.state = OpenRequest::HasDataset{std::make_shared<const ResolvedRequest>(*std::move(resolved)), ready.seen};
+  resolved->map = ready.map;
+  resolved->coarser = ready.coarser;
+  // Nobody counts what nobody holds, nor what is drawn from several levels.
+  const bool counted = !resolved->summary->stored && resolved->map == nullptr;
+  request.uses_occupancy = NeedsOccupancy(asked.policy) && counted;
+  request.needs_occupancy = request.uses_occupancy && !LeavesChoice(asked.policy);
+  request.state = OpenRequest::HasDataset{.resolved = std::make_shared<const ResolvedRequest>(*std::move(resolved)),
+                                          .seen = ready.seen,
+                                          .levels = ready.levels,
+                                          .drawn = ready.drawn};
   return Status::Ok();
 }
 
@@ -152,7 +159,8 @@ void FrameMachine::State::SendQueued(const OpenRequest& request, const DatasetAw
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
                                            .queue_position = queue.PositionOf(request.client, request.submit.request),
                                            .workers = std::uint32_t(roster.staying()),
-                                           .read_percent = loading ? std::uint32_t(awaited->percent) : 0});
+                                           .read_percent = loading ? std::uint32_t(awaited->read.percent) : 0,
+                                           .read_rate = loading ? awaited->read.bytes_per_second : 0});
 }
 
 void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {

@@ -122,7 +122,9 @@ struct FrameMachine::State {
   std::set<WorkerId> HoldersOf(const RunningFrame& frame) const;
   void DismissWorkers();
   Time EndOfWait(const OpenRequest& request) const;
-  Result<int> FramesThatFitWorkers(const FramePlan& plan, const VolumeSummary& summary) const;
+  std::vector<WorkerLimit> WorkerLimits() const;
+  bool Lower(OpenRequest& request, const PlannedFrame& planned);
+  static Status WhyTooLarge(const OpenRequest& request, const PlannedFrame& planned);
   void CountAhead();
   void PlanAhead();
   void DropPlans();

@@ -56,7 +56,7 @@ bool FramesInFlight::RunsFor(PeerToken client) const {
 // If f frames such as one fit, it takes at most the f-th part of the room.
 bool FramesInFlight::HasRoomFor(const PlanMade& plan) const {
   constexpr double kRounding = 1e-9;
-  double taken = 1.0 / plan.fit;
+  double taken = 1.0 / *plan.frame->fit;
   for (const RunningFrame& frame : frames_) taken += 1.0 / frame.fit();
   return frames_.empty() || taken <= plan.frame->plan.turn.teams + kRounding;
 }

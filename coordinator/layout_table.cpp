@@ -41,6 +41,7 @@ std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volu
 
 LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
   Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target, !counted && NeedsOccupancy(AskFor(*request.policy))};
+  if (request.map != nullptr) key.map = *request.map;
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
   return key;
@@ -93,6 +94,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                            .policy = &policy,
                            .slots = request.slots,
                            .box_bytes_target = request.box_bytes_target,
+                           .map = request.map.get(),
+                           .coarser = request.coarser,
                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                            .stop = request.stop};
   const bool rebalance = present != nullptr && policy.dynamic_balance;
@@ -116,6 +119,15 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
     entry.seconds.clear();
   }
   return entry.layout;
+}
+
+bool LayoutTable::HasMade(const Request& request) {
+  Key key = KeyOf(request, true);
+  const std::unique_lock lock(mutex_, std::try_to_lock);
+  return lock && std::ranges::any_of(entries_, [&](const Entry& entry) {
+           key.box_bytes_target = entry.key.box_bytes_target;
+           return entry.key == key;
+         });
 }
 
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {

@@ -44,11 +44,17 @@ class LayoutTable {
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it, or begins without it
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
+    // As in ResolvedRequest.
+    std::shared_ptr<const LevelMap> map = {};
+    std::span<const CoarserVolume> coarser = {};
     std::stop_token stop = {};  // told to stop, Find returns soon
   };
   // The layout to plan the frame with; null: it was stopped.
   std::shared_ptr<const Layout> Find(const Request& request);
-  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots and box_bytes_target alone. Does not wait
+  // Whether FindMade may find one, for some box_bytes_target.
+  bool HasMade(const Request& request);
+  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone. Does not
+  // wait
   // for other threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
@@ -66,6 +72,7 @@ class LayoutTable {
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
     bool by_bricks = false;  // the policy needs occupied voxels, but they were not counted yet
+    LevelMap map = {};       // of one level: the whole volume
     friend bool operator==(const Key&, const Key&) = default;
   };
   // Combining moves no box, so policies that differ in that alone share a layout.

@@ -23,7 +23,10 @@
 
 #include "common/base/bytes.h"
 #include "common/base/log.h"
+#include "common/base/read_share.h"
 #include "common/base/status.h"
+#include "common/planning/levels.h"
+#include "common/planning/resolved_request.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/peer_token.h"
 
@@ -51,7 +54,7 @@ struct SeekDataset {
 };
 struct KeepDataset {
   UseId use = 0;
-  DatasetId dataset = 0;
+  std::vector<DatasetId> datasets;  // not empty
 };
 struct LeaveDataset {
   UseId use = 0;
@@ -71,12 +74,17 @@ using ToDatasets = std::variant<SeekDataset, KeepDataset, LeaveDataset, ForgetCl
 // ---- from DatasetMachine to FrameMachine
 struct DatasetAwaited {
   bool loading = false;  // else it is not known yet whether there is such a dataset
-  int percent = 0;       // of its samples that have been read, as far as is known
+  ReadShare read;        // of its samples, as far as is known
 };
 struct DatasetReady {
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
-  std::optional<VolumeGeometry> finest = {};  // of a dataset with several levels: the voxels are those of one of them (AtLevel)
+  // Of a dataset with several levels; null: it has one. The voxels are those of the finest one that is drawn (AtLevel).
+  std::shared_ptr<const VolumeLevels> levels = nullptr;
+  std::vector<int> drawn = {0};  // numbers of levels, finest first
+  // If there are several of these: which parts, and those beside the finest one (ResolvedRequest).
+  std::shared_ptr<const LevelMap> map = {};
+  std::vector<CoarserVolume> coarser = {};
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

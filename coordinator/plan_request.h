@@ -8,7 +8,10 @@
 #include <vector>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/frame_window.h"
 #include "common/planning/hosted_worker.h"
+#include "common/planning/levels.h"
+#include "common/planning/worker_memory.h"
 #include "common/stats/prediction.h"
 #include "common/stats/report.h"
 #include "common/volume/occupancy_grid.h"
@@ -27,7 +30,12 @@ struct PlanRequest {
   Roster roster;  // of the frame's team, with a worker in it
   Turn turn;
   std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
-  std::stop_token stop = {};               // told to stop: nobody wants the plan any more
+  std::vector<WorkerLimit> limits = {};    // of all of them, and of those that are leaving
+  // Of a dataset with several levels: what the client asked for, and the level that `resolved` is of. Null: it has one.
+  std::shared_ptr<const FrameRequest> frame = nullptr;
+  std::shared_ptr<const VolumeLevels> levels = nullptr;
+  int level = 0;
+  std::stop_token stop = {};  // told to stop: nobody wants the plan any more
 };
 
 struct PlannedFrame {
@@ -37,6 +45,9 @@ struct PlannedFrame {
   std::optional<FramePrediction> prediction = {};
   double render_scale = 1;  // used for the prediction (PolicyTable)
   FramePlan plan = {};
+  Result<int> fit = kMostInWindow;  // FramesThatFit
+  // If it does not fit: the finest of the coarser levels that does. Of a dataset that has one level: that slabstream convert would make.
+  std::optional<int> level_that_fits = {};
 
   bool teaches() const { return asked.occupied != nullptr || prediction; }  // render times help to plan coming frames
 };

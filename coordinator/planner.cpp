@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/guarded.h"
+#include "common/planning/levels.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/worker_memory.h"
 
@@ -19,6 +20,52 @@ std::int64_t BoxTarget(const FrameSetup& setup, std::span<const HostedWorker> wo
   return target;
 }
 
+// Whether the frame fits if it is drawn from this level. Nobody may have loaded it, so it counts as one that is read in parts.
+bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const VolumeLevels& levels, const PlanRequest& request) {
+  constexpr Index3 kSomeBlock = {32, 32, 32};
+  auto summary = std::make_shared<VolumeSummary>(UnreadSummary(level, *levels.overview));
+  summary->stored = StoredAt{.source = {}, .block = {{0, 0, 0}, kSomeBlock}};
+  const Result<ResolvedRequest> resolved =
+      ResolveRequest(AtLevel(frame, levels.levels.front().geometry, level.geometry), request.resolved->volume.dataset(), summary);
+  if (!resolved.ok()) return false;
+  Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  if (!setup.ok()) return false;
+  const std::size_t slots = request.roster.slots.size();
+  const ResolvedPolicy policy =
+      resolved->policy ? *resolved->policy : ResolvePolicy(FirstPolicy(resolved->frame.policy, slots), level.geometry);
+  auto layout = std::make_shared<const Layout>(MakeLayout({.summary = summary.get(),
+                                                           .volume = &resolved->volume,
+                                                           .policy = &policy,
+                                                           .slots = std::uint32_t(slots),
+                                                           .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                           .stop = request.stop}));
+  const Result<FramePlan> plan = PlanFrame(*std::move(setup), policy, request.roster, std::move(layout), request.turn);
+  return plan.ok() && FramesThatFit(*plan, *summary, request.limits).ok();
+}
+
+// The levels that slabstream convert would make of a volume that has one.
+VolumeLevels LevelsToMake(const std::shared_ptr<const VolumeSummary>& summary) {
+  constexpr std::size_t kMost = 8;
+  VolumeLevels levels{.levels = {summary->description}, .overview = summary};
+  for (VolumeDescription next = summary->description; levels.levels.size() < kMost; levels.levels.push_back(next)) {
+    VolumeGeometry& geometry = next.geometry;
+    geometry.size = (geometry.size + Uniform(1)) / 2;
+    geometry.spacing = 2.0 * geometry.spacing;
+  }
+  return levels;
+}
+
+// The finest of the levels that are coarser than what the request draws and that fit.
+std::optional<int> LevelThatFits(const PlanRequest& request) {
+  if (request.resolved->summary->layers().any() || !request.resolved->summary->cells.empty()) return std::nullopt;  // they have none
+  const VolumeLevels levels = request.levels != nullptr ? *request.levels : LevelsToMake(request.resolved->summary);
+  const FrameRequest& frame = request.levels != nullptr ? *request.frame : request.resolved->frame;
+  for (std::size_t level = std::size_t(request.level) + 1; level < levels.levels.size(); ++level) {
+    if (FitsAt(levels.levels[level], frame, levels, request)) return int(level);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const PlannedFrame>> Planner::Plan(const PlanRequest& request) {
@@ -30,14 +77,17 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
+  LayoutTable::Request wanted{.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
+  if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
-  std::shared_ptr<const Layout> layout = layouts_.FindMade({.policy = &*resolved.policy,
-                                                            .volume = &resolved.volume,
-                                                            .slots = std::uint32_t(slots),
-                                                            .box_bytes_target = BoxTarget(*setup, request.workers)});
+  wanted.box_bytes_target = BoxTarget(*setup, request.workers);
+  std::shared_ptr<const Layout> layout = layouts_.FindMade(wanted);
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
-  return WithLayout({.asked = request, .policy = *resolved.policy}, *std::move(setup), std::move(layout));
+  Result<PlannedFrame> planned = WithLayout({.asked = request, .policy = *resolved.policy}, *std::move(setup), std::move(layout));
+  if (!planned.ok()) return planned.status();
+  if (!planned->fit.ok()) return std::nullopt;  // Plan looks for a level that fits
+  return std::make_shared<const PlannedFrame>(*std::move(planned));
 } catch (const std::exception&) {
   return std::nullopt;  // Plan meets the same and says what it is
 }
@@ -49,8 +99,9 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   PlannedFrame planned{.asked = request};
   const MachineModel machine = ServiceMachine(request.workers, surroundings_);
   const std::size_t slots = request.roster.slots.size();
-  if (setup->stored && LeavesChoice(resolved.frame.policy, machine, slots)) {
-    // Nothing is known of the work in voxels that nobody has read.
+  const bool unknown = setup->stored || resolved.map != nullptr;
+  if (unknown && LeavesChoice(resolved.frame.policy, machine, slots)) {
+    // Nothing is known of the work in voxels that nobody has read, or that are drawn from several levels.
     planned.policy = ResolvePolicy(FirstPolicy(resolved.frame.policy, slots), setup->description.geometry);
   } else if (LeavesChoice(resolved.frame.policy, machine, slots)) {
     ChosenPolicy chosen = policies_.Find(request, machine, layouts_);
@@ -67,17 +118,23 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
                                                         .occupied = planned.asked.occupied,
                                                         .slots = std::uint32_t(slots),
                                                         .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                        .map = resolved.map,
+                                                        .coarser = resolved.coarser,
                                                         .stop = request.stop});
   if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
-  return WithLayout(std::move(planned), *std::move(setup), std::move(layout));
+  Result<PlannedFrame> with_layout = WithLayout(std::move(planned), *std::move(setup), std::move(layout));
+  if (!with_layout.ok()) return with_layout.status();
+  if (!with_layout->fit.ok()) with_layout->level_that_fits = LevelThatFits(request);
+  return std::make_shared<const PlannedFrame>(*std::move(with_layout));
 }
 
-Result<std::shared_ptr<const PlannedFrame>> Planner::WithLayout(PlannedFrame planned, FrameSetup setup,
-                                                                std::shared_ptr<const Layout> layout) {
-  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, planned.asked.roster, std::move(layout), planned.asked.turn);
+Result<PlannedFrame> Planner::WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout) {
+  const PlanRequest& asked = planned.asked;
+  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn);
   if (!plan.ok()) return plan.status();
   planned.plan = *std::move(plan);
-  return std::make_shared<const PlannedFrame>(std::move(planned));
+  planned.fit = FramesThatFit(planned.plan, *asked.resolved->summary, asked.limits);
+  return planned;
 }
 
 void Planner::Learn(const FrameMeasured& measured) {

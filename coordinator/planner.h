@@ -37,8 +37,8 @@ class Planner {
 
  private:
   Result<std::shared_ptr<const PlannedFrame>> TryPlan(const PlanRequest& request);
-  static Result<std::shared_ptr<const PlannedFrame>> WithLayout(PlannedFrame planned, FrameSetup setup,
-                                                                std::shared_ptr<const Layout> layout);
+  // Plan and fit.
+  static Result<PlannedFrame> WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout);
 
   const ServiceSurroundings surroundings_;
   LayoutTable layouts_;

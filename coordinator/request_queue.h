@@ -5,11 +5,13 @@
 // What a frame costs is known only when it ends (Settle). Until then it counts as much as the client's frame before it.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <map>
 #include <memory>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -28,8 +30,7 @@ struct PlanAsked {
   std::uint64_t version = 0;
 };
 struct PlanMade {
-  std::shared_ptr<const PlannedFrame> frame;
-  int fit = 1;  // such frames fit the workers' memory at a time (FramesThatFit), >= 1
+  std::shared_ptr<const PlannedFrame> frame;  // which fits
   std::uint64_t version = 0;
 };
 
@@ -37,7 +38,9 @@ struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
   Time arrived;
-  UseId use = 0;                 // of its dataset
+  UseId use = 0;             // of its dataset
+  std::string lowered = {};  // FrameStatistics::lowered
+  // Once it has its dataset.
   bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
   bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
 
@@ -46,8 +49,20 @@ struct OpenRequest {
   struct HasDataset {
     std::shared_ptr<const ResolvedRequest> resolved;  // never null
     bool seen = false;                                // DatasetReady::seen: its frame may begin
+    std::shared_ptr<const VolumeLevels> levels;       // DatasetReady::levels and drawn
+    std::vector<int> drawn = {0};
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
+    // The voxels that its frame is drawn from: the volume first.
+    std::vector<DatasetId> datasets() const {
+      std::vector<DatasetId> all = {volume().dataset()};
+      for (const CoarserVolume& level : resolved->coarser) all.push_back(level.dataset);
+      return all;
+    }
+    bool DrawsFrom(const DatasetReady& ready) const {
+      return volume().dataset() == ready.dataset &&
+             std::ranges::equal(resolved->coarser, ready.coarser, {}, &CoarserVolume::dataset, &CoarserVolume::dataset);
+    }
   };
   std::variant<Submitted, AwaitsDataset, HasDataset> state = {};
 

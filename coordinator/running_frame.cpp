@@ -30,7 +30,7 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
     : id_(id),
       request_(std::move(request)),
       planned_(request_.plan<PlanMade>()->frame),
-      fit_(request_.plan<PlanMade>()->fit),
+      fit_(*request_.plan<PlanMade>()->frame->fit),
       plan_(planned_->plan),
       roster_(planned_->asked.roster),
       limits_(limits),
@@ -354,7 +354,17 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = planned_->prediction};
+                             .predicted = planned_->prediction,
+                             .levels = {},
+                             .lowered = request_.lowered};
+  for (const int level : request_.dataset()->drawn) statistics.levels.push_back({.level = std::uint32_t(level)});
+  for (const GroupPlan& group : plan_.groups) {
+    for (const Placement& placement : group.placements) {
+      LevelUse& use = statistics.levels[placement.level];
+      ++use.boxes;
+      use.voxels += std::uint64_t(VoxelsOf(placement.at(), plan_.setup).voxel_count());
+    }
+  }
   const auto append = [&](const std::vector<RankReport>& reports) {
     std::copy_n(reports.begin(), std::min(reports.size(), kMaxReports - statistics.reports.size()), std::back_inserter(statistics.reports));
   };

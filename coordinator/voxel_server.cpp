@@ -132,10 +132,11 @@ void VoxelServer::Run(const std::stop_token& stop) {
     Wait(sockets, &read_->wakeup(), std::chrono::minutes(1));
     for (const std::string& user : TakeUnwanted()) socket_.EndConnections(user);
     for (ReadDone& done : read_->TakeAll()) {
-      --reading_;
-      Reply(done.asked.identity, done.asked.request, std::move(done.answer));
+      const DatasetId dataset = done.asked->request.dataset;
+      --reads_.at(dataset).begun;
+      Reply(done.asked->identity, done.asked->request, std::move(done.answer));
+      ReadNext(dataset);
     }
-    ReadNext();
     while (!stop.stop_requested()) {
       const std::optional<Incoming> incoming = socket_.TryReceive();
       if (!incoming) break;
@@ -153,11 +154,14 @@ void VoxelServer::Answer(const Incoming& incoming) {
   const Samples samples = Find(request.dataset);
   if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
   if (samples.in_parts.source != nullptr) {
-    waiting_.push_back({incoming.identity, request, samples.in_parts});
-    return ReadNext();
+    std::deque<Asked>& waiting = reads_[request.dataset].waiting;
+    const auto is_same = [&](const Asked& asked) { return asked.identity == incoming.identity && asked.request == request; };
+    if (std::ranges::none_of(waiting, is_same)) waiting.push_back({incoming.identity, request, samples.in_parts});
+    return ReadNext(request.dataset);
   }
   Reply(incoming.identity, request, Guarded("chunk request", [&]() -> Result<std::pair<Chunk, Bytes>> {
           Chunk chunk{.epoch = epoch_, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
+          if (samples.read_from != nullptr) chunk.stored_bytes = samples.read_from->TakeStoredBytes();
           Result<Bytes> cut = IsCellChunk(request.chunk)
                                   ? CutCells(samples, request, chunk)
                                   : Cut(samples, request.box, PartOfChunk(request.box, samples.types(), request.chunk));
@@ -167,25 +171,30 @@ void VoxelServer::Answer(const Incoming& incoming) {
         }));
 }
 
-void VoxelServer::ReadNext() {
-  while (!waiting_.empty() && reading_ < kReadAtOnce) {
-    Asked asked = std::move(waiting_.front());
-    waiting_.pop_front();
-    ++reading_;
-    const auto [source, level] = asked.from;
-    const ChunkRequest request = asked.request;
-    const ChunkPart part = PartOfChunk(request.box, asked.from.description().type, request.chunk);
-    ReadPart(source, level, request.box, part.begin, part.bytes,
-             [inbox = read_, codec = codec_, epoch = epoch_, asked = std::move(asked)](Result<Bytes> samples) {
+void VoxelServer::ReadNext(DatasetId dataset) {
+  Reads& reads = reads_.at(dataset);
+  while (!reads.waiting.empty() && reads.begun < kReadAtOnce) {
+    const auto asked = std::make_shared<const Asked>(std::move(reads.waiting.front()));
+    reads.waiting.pop_front();
+    ++reads.begun;
+    const ChunkRequest& request = asked->request;
+    // Of zeros, also where there is no layer: g++ 12 says of any other that it may be read before it is set.
+    const SampleTypes types(asked->from.description().type, LayerTypes());
+    const ChunkPart part = PartOfChunk(request.box, types, request.chunk);
+    ReadPart(asked->from.source, asked->from.level, request.box, part.begin, part.bytes,
+             [inbox = read_, codec = codec_, epoch = epoch_, asked](Result<Bytes> samples) {
+               const ChunkRequest& of = asked->request;
                auto answer = Guarded("a chunk of voxels", [&]() -> Result<std::pair<Chunk, Bytes>> {
                  if (!samples.ok()) return samples.status();
-                 Chunk chunk{.epoch = epoch, .dataset = asked.request.dataset, .box = asked.request.box, .chunk = asked.request.chunk};
+                 Chunk chunk{.epoch = epoch, .dataset = of.dataset, .box = of.box, .chunk = of.chunk};
+                 chunk.stored_bytes = asked->from.source->TakeStoredBytes();
                  Bytes payload = PackChunk(*std::move(samples), codec, chunk);
                  return std::pair(chunk, std::move(payload));
                });
                inbox->Post({asked, std::move(answer)});
              });
   }
+  if (reads.waiting.empty() && reads.begun == 0) reads_.erase(dataset);
 }
 
 void VoxelServer::Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer) {

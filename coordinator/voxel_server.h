@@ -1,8 +1,8 @@
 // VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
 // volumes.
 //
-// Voxels of sources that are read in parts are read when they are asked for, kReadAtOnce chunks at a time; other requests do not wait for
-// them.
+// Voxels of sources that are read in parts are read when they are asked for, kReadAtOnce chunks of a dataset at a time; other requests do
+// not wait for them, so a store that does not answer holds up its own dataset alone.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
 // refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,
@@ -49,6 +49,7 @@ class VoxelServer {
       int level = 0;
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
+    std::shared_ptr<VolumeSource> read_from = nullptr;  // of `volume`, if chunks tell what was read of it
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().
@@ -97,7 +98,7 @@ class VoxelServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   // Of voxels that are read first: Reply follows when they are there.
-  void ReadNext();
+  void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
   // Those of the chunk that is asked for, whose cell_bytes it sets. InvalidArgument: there is no such chunk.
@@ -110,10 +111,14 @@ class VoxelServer {
     Samples::InParts from;
   };
   struct ReadDone {
-    Asked asked;
+    std::shared_ptr<const Asked> asked;
     Result<std::pair<Chunk, Bytes>> answer;
   };
-  static constexpr std::size_t kReadAtOnce = 32;  // chunks, which are in memory until they are sent
+  static constexpr std::size_t kReadAtOnce = 32;  // chunks of a dataset, which are in memory until they are sent
+  struct Reads {                                  // of a dataset
+    std::deque<Asked> waiting;                    // no two alike
+    std::size_t begun = 0;                        // and not ended
+  };
 
   const std::string endpoint_;
   const Epoch epoch_;
@@ -124,8 +129,7 @@ class VoxelServer {
   ChunkBuffers buffers_;                  // the thread's
   CellBytes cell_bytes_;                  // the thread's
   LimitedLog complaints_;                 // the thread's
-  std::deque<Asked> waiting_;             // the thread's; to be read
-  std::size_t reading_ = 0;               // the thread's
+  std::map<DatasetId, Reads> reads_;      // the thread's
   const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
   Socket socket_;                                                                          // the thread's
   std::jthread thread_;                                                                    // last member

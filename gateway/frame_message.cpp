@@ -4,6 +4,7 @@
 #include <array>
 #include <utility>
 
+#include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
 #include "client/request/picture_record.h"
 #include "client/request/slice_request.h"
@@ -67,7 +68,8 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                {"groups", statistics.groups},
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share},
-               {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
+               {"levels", LevelsJson(statistics)},
+               {"bytes", BytesJson(summary)},
                {"stages_ms", std::move(stages)},
                {"plan",
                 {{"renderer", statistics.renderer},
@@ -77,6 +79,7 @@ Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool ti
                  {"balance", statistics.balance},
                  {"combine", statistics.combine},
                  {"balance_by", statistics.balance_by}}}};
+  if (!statistics.lowered.empty()) json["lowered"] = statistics.lowered;
   if (timeline) json["timeline"] = TimelineJson(statistics);
   return json;
 }
@@ -125,6 +128,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
                     {"type", final ? "image/png" : "image/jpeg"},
                     {"size", {view.size.width, view.size.height}},
                     {"scale", view.scale},
+                    {"coarseness", view.coarseness},
                     {"bounds", area},
                     {"background", {Decimal(background.r), Decimal(background.g), Decimal(background.b), Decimal(background.a)}},
                     {"geometry", GeometryJson(view.panes.front())},

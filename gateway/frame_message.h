@@ -19,7 +19,8 @@ namespace slabstream {
 struct RenderedView {
   std::uint64_t seq = 0;
   double scale = 1;
-  ImageSize size;  // of the whole picture
+  double coarseness = 1;  // of what is shown: 1 if a smaller one would change nothing
+  ImageSize size;         // of the whole picture
   LocalImage image;
   PictureFormat format;
   PictureKey key;

@@ -48,6 +48,7 @@ void Metrics::CountFrame(const FrameStatistics& statistics, Duration latency) {
   const std::lock_guard lock(mutex_);
   ++frames_;
   bytes_["voxels"] += summary.voxel_bytes;
+  bytes_["stores"] += summary.stored_bytes;
   bytes_["images"] += summary.image_bytes;
   for (const RankReport& report : statistics.reports) {
     ++voxel_reports_;
@@ -101,7 +102,8 @@ std::string Metrics::Text(const ServiceNews& news) const {
   for (const auto& [type, count] : pictures_) out.Line(count, fmt::format("type=\"{}\"", type));
   out.Family("gateway_answers_total", "counter", "Questions about volumes that the service answered.");
   for (const auto& [question, count] : answers_) out.Line(count, fmt::format("question=\"{}\"", question));
-  out.Family("gateway_bytes_total", "counter", "Bytes by plane: voxels to workers, images between them, pictures to the web.");
+  out.Family("gateway_bytes_total", "counter",
+             "Bytes by plane: voxels to workers, what was read from stores for them, images between workers, pictures to the web.");
   for (const auto& [plane, bytes] : bytes_) out.Line(bytes, fmt::format("plane=\"{}\"", plane));
   out.Single("gateway_rendered_boxes_total", "counter", "Boxes that workers rendered for this gateway.", voxel_reports_);
   out.Single("gateway_cached_boxes_total", "counter", "Those whose voxels the worker had already.", voxel_hits_);

@@ -48,8 +48,9 @@ void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, c
   const auto encode = [request = *render](const ServiceLink::Rendered& rendered) {
     const Picture& picture = rendered.pictures.front();
     const FrameRequest made = AsMade(request.frame, picture.statistics);
-    const PictureNotes notes{
-        .geometry = picture.geometry, .key = rendered.key, .record = RecordText(made.dataset, made, request.format, picture.geometry)};
+    const PictureNotes notes{.geometry = picture.geometry,
+                             .key = rendered.key,
+                             .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return PngFile(picture.image, picture.size, request.format, notes);
   };
   MakePng({render->frame}, render->format.annotations, encode, std::move(reply), gone);

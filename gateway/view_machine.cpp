@@ -13,6 +13,8 @@ constexpr Duration kQuick = milliseconds(30), kSlow = milliseconds(200);
 constexpr int kBestQuality = 92, kLeastQuality = 50;
 // Pictures become small above the first, and large again below the second, which small ones would else lead to at once.
 constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(50);
+// Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
+constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
 Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
 
@@ -43,11 +45,16 @@ ViewMachine::Actions ViewMachine::OnView(std::uint64_t seq, Time now) {
   return actions;
 }
 
-ViewMachine::Actions ViewMachine::OnRendered(Time now) {
+ViewMachine::Actions ViewMachine::OnRendered(bool finest, Time now) {
   if (!rendering_) return {};
-  render_time_ = Smoothed(render_time_, now - rendering_since_);
+  const Duration time = now - rendering_since_;
+  render_time_ = Smoothed(render_time_, time);
   rendered_ = std::exchange(rendering_, std::nullopt);
-  to_be_shown_ = !rendered_->for_still;
+  if (!rendered_->for_still && time > kCoarserAbove) coarseness_ = std::min(2 * coarseness_, kMostCoarseness);
+  if (!rendered_->for_still && time < kFinerBelow) coarseness_ = std::max(coarseness_ / 2, 1.0);
+  still_coarseness_ = time < kFinerBelow ? 1 : rendered_->coarseness / 2;
+  if (finest) rendered_->coarseness = 1;
+  to_be_shown_ = !rendered_->for_still || !rendered_->as_asked();  // the lossless one is encoded only once
   return Next(now);
 }
 
@@ -120,8 +127,8 @@ void ViewMachine::Encode(Time now, Actions& actions) {
     actions.push_back({.kind = ViewActionKind::kEncode, .quality = Quality()});
     return;
   }
-  const bool same_in_full = rendered_->seq == latest_ && rendered_->scale == 1;
-  if (out_ != Out::kEmpty || !same_in_full || final_seq_ == latest_) return;
+  const bool as_asked = rendered_->seq == latest_ && rendered_->as_asked();
+  if (out_ != Out::kEmpty || !as_asked || final_seq_ == latest_) return;
   if (now < latest_since_ + kStillAfter) return WakeAt(latest_since_ + kStillAfter);
   final_seq_ = latest_;
   outgoing_final_ = true;
@@ -145,18 +152,18 @@ bool ViewMachine::MayRender(Time now) {
 
 void ViewMachine::Render(Time now, Actions& actions) {
   if (latest_ == 0 || refused_ || unavailable_ || rendering_) return;
-  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1};
+  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1, .coarseness = coarseness_};
   if (IsRenderedOrRenders(latest_)) {
-    const bool still_needs_it = rendered_->scale != 1 && !to_be_shown_;
+    const bool still_needs_it = !rendered_->as_asked() && !to_be_shown_;
     if (!still_needs_it) return;
     if (now < latest_since_ + kStillAfter) return WakeAt(latest_since_ + kStillAfter);
-    next = {.seq = latest_, .scale = 1, .for_still = true};
+    next = {.seq = latest_, .coarseness = std::max(still_coarseness_, 1.0), .for_still = true};
   } else if (!MayRender(now)) {
     return;
   }
   rendering_ = next;
   rendering_since_ = now;
-  actions.push_back({.kind = ViewActionKind::kRender, .seq = next.seq, .scale = next.scale});
+  actions.push_back({.kind = ViewActionKind::kRender, .seq = next.seq, .scale = next.scale, .coarseness = next.coarseness});
 }
 
 void ViewMachine::WakeAt(Time time) { wake_ = wake_ ? std::min(*wake_, time) : time; }

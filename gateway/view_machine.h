@@ -8,7 +8,10 @@
 //   no sooner than the page is ready for its picture: so what is shown is as new as can be, and no frame is rendered for nothing.
 // - A frame that renders is finished although newer views have come, else a picture that always moves would never be seen. A lossless
 //   picture is given up for a newer view.
-// - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size if that was small.
+// - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly.
+// - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size and of the level
+// that
+//   the view asks for. If rendering takes long, pictures of levels between these come before it.
 #pragma once
 
 #include <cstdint>
@@ -20,9 +23,10 @@
 namespace slabstream {
 
 inline constexpr Duration kStillAfter = std::chrono::milliseconds(150);
+inline constexpr double kFirstCoarseness = 4, kMostCoarseness = 16;  // powers of two: a level has about half as many voxels along an axis
 
 enum class ViewActionKind : std::uint8_t {
-  kRender,        // view `seq` at `scale`; answer by OnRendered, OnRefused or OnUnavailable
+  kRender,        // view `seq` at `scale` and `coarseness`; answer by OnRendered, OnRefused or OnUnavailable
   kCancelRender,  // the frame that renders; no answer
   kEncode,        // the picture that was rendered last, `final` or with `quality`; answer by OnEncoded
   kCancelEncode,  // no answer
@@ -33,6 +37,7 @@ struct ViewAction {
   ViewActionKind kind = ViewActionKind::kRender;
   std::uint64_t seq = 0;    // kRender
   double scale = 1;         // kRender: of width and height
+  double coarseness = 1;    // kRender: factor of the view's `detail`, [1, kMostCoarseness]
   bool final = false;       // kEncode: lossless
   int quality = 0;          // kEncode: of JPEG, if not final
   std::uint64_t frame = 0;  // kSend
@@ -45,9 +50,9 @@ class ViewMachine {
 
   // `seq` rises from view to view; one that does not is ignored.
   Actions OnView(std::uint64_t seq, Time now);
-  Actions OnRendered(Time now);
-  Actions OnRefused(Time now);      // the view cannot be rendered: it is done with
-  Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
+  Actions OnRendered(bool finest, Time now);  // finest: with less coarseness the picture would be the same
+  Actions OnRefused(Time now);                // the view cannot be rendered: it is done with
+  Actions OnUnavailable(Time now);            // the service is gone: the view waits for OnServiceBack
   Actions OnServiceBack(Time now);
   Actions OnEncoded(Time now);
   Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
@@ -64,7 +69,9 @@ class ViewMachine {
   struct Picture {
     std::uint64_t seq = 0;
     double scale = 1;
-    bool for_still = false;  // in full size, to be shown lossless only
+    double coarseness = 1;
+    bool for_still = false;  // the view stands still
+    bool as_asked() const { return scale == 1 && coarseness == 1; }
   };
   enum class Out : std::uint8_t { kEmpty, kEncoding, kEncoded };
 
@@ -93,6 +100,8 @@ class ViewMachine {
   std::uint64_t frames_ = 0;
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
   bool small_ = false;                     // pictures while moving have half the size
+  double coarseness_ = kFirstCoarseness;   // of pictures while moving
+  double still_coarseness_ = 1;            // of the next picture of a view that stands still
   std::optional<Time> wake_;
 };
 

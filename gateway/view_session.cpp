@@ -13,6 +13,7 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
+constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
 std::string TextOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
@@ -23,6 +24,10 @@ std::string_view NameOf(FramePhase phase) {
     case FramePhase::kRunning: break;
   }
   return "running";
+}
+
+bool AllFinest(const FrameStatistics& statistics) {
+  return std::ranges::all_of(statistics.levels, [](const LevelUse& use) { return use.level == 0; });
 }
 
 int Scaled(int pixels, double scale) { return std::max(1, int(double(pixels) * scale + 0.5)); }
@@ -101,7 +106,7 @@ void ViewSession::SendError(std::uint64_t seq, const Status& status) {
 void ViewSession::Do(const ViewMachine::Actions& actions) {
   for (const ViewAction& action : actions) {
     switch (action.kind) {
-      case ViewActionKind::kRender: Render(action.seq, action.scale); break;
+      case ViewActionKind::kRender: Render(action.seq, action.scale, action.coarseness); break;
       case ViewActionKind::kCancelRender:
         if (rendering_) link_->Cancel(rendering_->ticket);
         rendering_.reset();
@@ -129,7 +134,7 @@ void ViewSession::SetTimer() {
   });
 }
 
-void ViewSession::Render(std::uint64_t seq, double scale) {
+void ViewSession::Render(std::uint64_t seq, double scale, double coarseness) {
   const std::uint64_t order = ++orders_;
   Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
   if (!job.ok()) {
@@ -143,10 +148,16 @@ void ViewSession::Render(std::uint64_t seq, double scale) {
     });
     return;
   }
-  for (FrameRequest& frame : job->frames) frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
+  for (FrameRequest& frame : job->frames) {
+    frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
+    if (coarseness > 1) frame.detail = std::min((frame.detail == 0 ? 1 : frame.detail) * coarseness, kMostDetail);
+  }
+  // A level that the view names is drawn, however coarse pictures may be.
+  const bool names_level = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return LevelNumber(frame.level).has_value(); });
   Rendering rendering{.order = order, .ticket = 0, .view = {}, .size = job->frames.front().size};
   rendering.view.seq = seq;
   rendering.view.scale = scale;
+  rendering.view.coarseness = names_level ? 1 : coarseness;
   rendering.view.format = std::move(job->format);
   rendering.view.timeline = view_->timeline;
   const auto self = shared_from_this();
@@ -189,11 +200,13 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
   view.key = std::move(rendered->key);
   view.seq = rendering.view.seq;
   view.scale = rendering.view.scale;
+  const bool finest = rendering.view.coarseness == 1 || AllFinest(view.statistics);
+  view.coarseness = finest ? 1 : rendering.view.coarseness;
   view.format = std::move(rendering.view.format);
   view.timeline = rendering.view.timeline;
   around_.metrics.CountFrame(view.statistics, view.latency);
   rendered_ = std::make_shared<const RenderedView>(std::move(view));
-  Do(machine_.OnRendered(MonotonicNow()));
+  Do(machine_.OnRendered(finest, MonotonicNow()));
 }
 
 void ViewSession::Encode(bool final, int quality) {

@@ -44,7 +44,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
  private:
   void Handle(ViewMessage view);
   void Do(const ViewMachine::Actions& actions);
-  void Render(std::uint64_t seq, double scale);
+  void Render(std::uint64_t seq, double scale, double coarseness);
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void Encode(bool final, int quality);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string>
 
 #include "common/base/check.h"
 #include "common/volume/box_assembly.h"
@@ -10,14 +11,17 @@
 namespace slabstream {
 namespace {
 
-// Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings; where parts are filled, at those that
-// are filled together.
+// Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings, or at parts of one. So each piece is
+// one chunk. `filled`: some parts are filled; then the blocks are those that are filled together.
 std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types, bool filled) {
   Index3 block = stored.block.end, end;
   for (const Box& box : boxes) end = Max(end, box.end);
   if (filled) block = BlocksTogether(block, end, types.bytes_per_voxel(), kChunkBytes);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
+  }
+  for (const Axis axis : {Axis::kZ, Axis::kY, Axis::kX}) {
+    while (CountIn(block) * types.bytes_per_voxel() > kChunkBytes && block[axis] > 1) block[axis] = (block[axis] + 1) / 2;
   }
   std::vector<Box> pieces;
   for (const Box& box : boxes) {
@@ -93,10 +97,10 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
     at_hand.push_back(other.key.box);
   }
   BoxAssembly assembly = Assemble(padded.key.box, at_hand, MostMissing(padded.key.box));
-  OpenBox open{padded.key, {}, padded.filled};
+  OpenBox open{padded.key, {}, padded.stored_at != nullptr, padded.filled};
   for (const BoxAssembly::Part& part : assembly.copied) {
     HeldBox& source = *sources[part.source];
-    for (const Box& box : Without({part.box}, source.filled)) open.copies.push_back({source.key, box});
+    for (const Box& box : Without(Without({part.box}, source.filled), padded.filled)) open.copies.push_back({source.key, box});
     for (const FilledBox& hole : source.filled) {
       if (const Box box = Intersection(hole.box, part.box); !box.empty()) assembly.missing.push_back(box);
     }
@@ -152,9 +156,11 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
   std::uint64_t begun_bytes = BegunBytes();
   bool first = true;
   for (const std::vector<Generation>& boxes : by_client) {
-    std::uint64_t in_flight_bytes = 0;  // of this client
+    std::uint64_t in_flight_bytes = 0, in_flight = 0;  // of this client
     for (const auto& [name, request] : in_flight_) {
-      if (std::ranges::find(boxes, name.first) != boxes.end()) in_flight_bytes += request.bytes;
+      if (std::ranges::find(boxes, name.first) == boxes.end()) continue;
+      in_flight_bytes += request.bytes;
+      ++in_flight;
     }
     bool has_credit = true;
     for (const Generation generation : boxes) {
@@ -169,15 +175,17 @@ void BoxFetcher::RequestChunks(std::span<const std::vector<Generation>> by_clien
         const std::uint32_t bytes = padded.BytesOf(chunk);
         if (!in_flight_.empty() && in_flight_bytes_ + bytes > config_.credit_bytes) return;
         if (padded.stored_at != nullptr && in_flight_.size() >= kMostRequests) return;
-        has_credit = in_flight_bytes == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        has_credit = in_flight == 0 || in_flight_bytes + bytes <= config_.credit_bytes / std::uint64_t(clients);
+        if (padded.stored_at != nullptr) has_credit = has_credit && in_flight <= kMostRequests / std::uint64_t(clients);
         if (!has_credit) break;
         padded.missing.pop_back();
         in_flight_[{generation, chunk}] = {bytes, now + config_.chunk_timeout, false};
         in_flight_bytes_ += bytes;
         in_flight_bytes += bytes;
+        ++in_flight;
         if (!padded.requested) padded.report.begin = now;
         padded.requested = true;
-        actions.push_back(SendChunkRequest{{epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
+        actions.push_back(SendChunkRequest{padded.key, {epoch, worker, padded.key.dataset, chunk.box, chunk.chunk}, padded.stored_at});
       }
     }
   }
@@ -205,6 +213,7 @@ void BoxFetcher::OnChunk(const Chunk& chunk, Bytes payload, WorkerActions& actio
     return;
   }
   request.storing = true;
+  padded->report.stored_bytes += chunk.stored_bytes;
   actions.push_back(StoreChunk{padded->key, chunk, std::move(payload)});
 }
 
@@ -223,7 +232,7 @@ void BoxFetcher::OnRefused(const ChunkRefused& refused) {
 void BoxFetcher::OnStored(const ChunkStored& stored, Time now) {
   const ChunkPlace place{stored.box, stored.chunk};
   const auto request = in_flight_.find({stored.padded.generation, place});
-  if (request == in_flight_.end() || !request->second.storing) return;
+  if (request == in_flight_.end()) return;
   if (!stored.status.ok()) {
     HeldBox* padded = Find(stored.padded.generation);
     Retry(stored.padded.generation, place, stored.status);
@@ -243,6 +252,7 @@ void BoxFetcher::OnStored(const ChunkStored& stored, Time now) {
       padded->chunk_count += count - 1;
     }
     padded->report.voxel_bytes += bytes;
+    padded->report.stored_bytes += stored.stored_bytes;
     padded->report.end = now;
     if (padded->is_complete()) RetireCovered(*padded);
   }
@@ -255,7 +265,10 @@ void BoxFetcher::ExpireRequests(Time now) {
   }
   const auto waited = std::chrono::duration_cast<std::chrono::milliseconds>(config_.chunk_timeout).count();
   for (const auto& [generation, chunk] : expired) {
-    Retry(generation, chunk, Status::Unavailable(fmt::format("chunk {} of a padded box did not arrive within {} ms", chunk.chunk, waited)));
+    const HeldBox* const padded = Find(generation);
+    const std::string from = padded == nullptr || padded->stored_at == nullptr ? "" : padded->stored_at->source + ": ";
+    Retry(generation, chunk,
+          Status::Unavailable(fmt::format("{}chunk {} of a padded box did not arrive within {} ms", from, chunk.chunk, waited)));
   }
 }
 

@@ -39,7 +39,8 @@ class BoxFetcher {
   // What was received for a padded box since the last report.
   struct FetchReport {
     std::uint64_t voxel_bytes = 0;
-    Time begin, end;  // first request, last chunk stored; meaningful if voxel_bytes > 0
+    std::uint64_t stored_bytes = 0;  // Chunk::stored_bytes
+    Time begin, end;                 // first request, last chunk stored; meaningful if voxel_bytes > 0
   };
 
   explicit BoxFetcher(const WorkerConfig& config) : config_(config) {}

@@ -158,7 +158,7 @@ Executor::~Executor() {
 void Executor::Perform(const OpenBox& action) {
   std::vector<StoredBox::Copy> copies;
   for (const OpenBox::Copy& copy : action.copies) copies.push_back({BoxOf(copy.from), copy.box});
-  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies), action.filled));
+  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies), action.stored, action.filled));
 }
 
 void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }
@@ -198,7 +198,7 @@ RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const 
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;
-    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.box, *action.setup, hidden, control, report);
+    Result<LocalImage> rendered = renderer->Render(lease.data(), action.placement.at(), *action.setup, hidden, control, report);
     if (!rendered.ok()) return rendered.status();
     image = std::move(*rendered);
     report.image_bounds = image.bounds;

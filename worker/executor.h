@@ -81,6 +81,8 @@ class Executor {
   // A task could not even report its failure. The outbox was notified; the worker can only leave.
   bool broken() const { return broken_; }
   PeerMemory& peer_memory() { return peer_memory_; }
+  // A padded box that is open.
+  std::shared_ptr<StoredBox> BoxOf(const BoxKey& key) const;
   // For reports that leave without a PartialImage: adds the bytes and times of their ranks' messages.
   void AddSent(const GroupKey& key, std::vector<RankReport>& reports) { sent_.MoveInto(key, reports); }
 
@@ -92,8 +94,7 @@ class Executor {
   template <class Work>
   bool TrySend(const char* task, const GroupKey& key, Work&& work);
   void Break();
-  // The entries of the tables, which exist.
-  std::shared_ptr<StoredBox> BoxOf(const BoxKey& key) const;
+  // The entry of the table, which exists.
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
   void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.

@@ -19,8 +19,10 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
     }
     turns_.Join(client);
   }
-  const Box voxels = PaddedBox(placement.box, *setup);
-  const BoxFetcher::Generation padded = boxes_.Acquire(setup->dataset, voxels, TypesOf(*setup), setup->stored, placement.filled, actions);
+  const Box voxels = PaddedBox(placement.at(), *setup);
+  const std::uint8_t level = placement.level;
+  const BoxFetcher::Generation padded =
+      boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
   waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
 }
 
@@ -145,6 +147,7 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   if (job.job.waited) {
     const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
     report.voxel_bytes = fetched.voxel_bytes;
+    report.stored_bytes = fetched.stored_bytes;
     if (fetched.voxel_bytes > 0) {
       AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
     }

@@ -121,7 +121,7 @@ struct WorkerService::Impl {
   bool stop_now = false;           // set by the machine
   LimitedLog complaints;           // about messages
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
-  StoredVoxels stored_voxels{[this](MessageReceived message) { outbox.Post(WorkerEvent(std::move(message))); }};
+  StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
   std::optional<Executor> executor;
   std::jthread thread;  // owns the sockets and the machine; last member: ends first
 };
@@ -274,7 +274,7 @@ void WorkerService::Impl::Perform(StopProcess& action) {
 }
 
 void WorkerService::Impl::Perform(SendChunkRequest& action) {
-  if (action.stored != nullptr && stored_voxels.Read(action.request, *action.stored)) return;
+  if (action.stored != nullptr && stored_voxels.Read(action, executor->BoxOf(action.padded), MonotonicNow())) return;
   if (voxels) Send(*voxels, action.request);
 }
 

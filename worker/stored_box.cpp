@@ -1,38 +1,18 @@
 #include "worker/stored_box.h"
 
 #include <algorithm>
-#include <limits>
 #include <span>
 #include <string>
 #include <utility>
 
+#include "common/base/check.h"
+
 namespace slabstream {
-namespace {
 
-void CopyVoxels(const BoxVoxels& from, Layer layer, const Box& box, BrickedVoxels& to) {
-  const BoxVoxels::Samples samples = from.samples();  // holds them
-  const VoxelBricks source =
-      layer == Layer::kVolume ? samples.view() : VoxelBricks(*(layer == Layer::kLabels ? from.layers().labels : from.layers().overlay));
-  const Index3 size = box.size();
-  std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
-  for (std::int32_t z = 0; z < size.z; ++z) {
-    const std::uint64_t begin = std::uint64_t(z) * slice.size();
-    source.Read(box, begin, slice);
-    to.Write(box, begin, slice);
-  }
+StoredBox::StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled)
+    : key_(key), stored_(stored), copies_(std::move(copies)), filled_(std::move(filled)) {
+  CHECK(stored_ || filled_.empty());
 }
-
-void Fill(const FilledBox& filled, BrickedVoxels& to) {
-  VisitScalarType(to.type(), [&]<class T>(const T*) {
-    const Index3 size = filled.box.size();
-    const float least = float(std::numeric_limits<T>::lowest()), most = float(std::numeric_limits<T>::max());
-    const std::vector<T> slice(std::size_t(size.x) * std::size_t(size.y), T(std::clamp(filled.sample, least, most)));
-    const std::span<const std::byte> bytes = std::as_bytes(std::span(slice));
-    for (std::int32_t z = 0; z < size.z; ++z) to.Write(filled.box, std::uint64_t(z) * bytes.size(), bytes);
-  });
-}
-
-}  // namespace
 
 Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
   const std::lock_guard lock(mutex_);
@@ -49,7 +29,7 @@ Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
   const ChunkPart part = PartOfChunk(chunk.box, key_.types, chunk.chunk);
   unpacked_.resize(chunk.raw_bytes);
   if (Status status = UnpackChunk(chunk, payload.span(), unpacked_); !status.ok()) return status;
-  Arriving(part.layer).Write(chunk.box, part.begin, unpacked_);
+  Write(part.layer, chunk.box, part.begin, unpacked_);
   return Status::Ok();
 }
 
@@ -59,19 +39,65 @@ BrickedVoxels& StoredBox::Arriving(Layer layer) {
   return *stored;
 }
 
+PaddedVoxels& StoredBox::ArrivingStored() {
+  if (!arriving_stored_) arriving_stored_ = MakePaddedVoxels(key_.box, key_.types.volume);
+  return *arriving_stored_;
+}
+
+std::optional<BoxRoom> StoredBox::RoomFor(const Box& box) {
+  CHECK(stored_ && key_.box.Contains(box));
+  const std::lock_guard lock(mutex_);
+  if (voxels_ != nullptr) return std::nullopt;
+  const PaddedVoxels& voxels = ArrivingStored();
+  return BoxRoom{voxels.At(box.begin), voxels.row, voxels.slice, true};
+}
+
+void StoredBox::Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples) {
+  if (!stored_ || layer != Layer::kVolume) return Arriving(layer).Write(box, begin, samples);
+  const PaddedVoxels& voxels = ArrivingStored();
+  const std::size_t sample_bytes = BytesPerSample(voxels.type), row_bytes = std::size_t(box.size().x) * sample_bytes;
+  while (!samples.empty()) {
+    const std::size_t row = begin / row_bytes, within = begin % row_bytes;
+    const auto y = std::int32_t(row % std::size_t(box.size().y)), z = std::int32_t(row / std::size_t(box.size().y));
+    const std::span<const std::byte> part = samples.first(std::min(row_bytes - within, samples.size()));
+    std::ranges::copy(part, voxels.At(box.begin + Index3{0, y, z}) + within);
+    samples = samples.subspan(part.size());
+    begin += part.size();
+  }
+}
+
+void StoredBox::CopyFrom(const BoxVoxels& from, Layer layer, const Box& box) {
+  const BoxVoxels::Samples samples = from.samples();  // holds them
+  const VoxelBricks source =
+      layer == Layer::kVolume ? samples.view() : VoxelBricks(*(layer == Layer::kLabels ? from.layers().labels : from.layers().overlay));
+  const Index3 size = box.size();
+  std::vector<std::byte> slice(std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(source.type()));
+  for (std::int32_t z = 0; z < size.z; ++z) {
+    const std::uint64_t begin = std::uint64_t(z) * slice.size();
+    source.Read(box, begin, slice);
+    Write(layer, box, begin, slice);
+  }
+}
+
 bool StoredBox::Assemble() {
   const std::lock_guard lock(mutex_);
   if (voxels_ != nullptr) return false;
   for (const Layer layer : kLayers) {
     if (!key_.types.Of(layer)) continue;
-    BrickedVoxels& to = Arriving(layer);
-    for (const Copy& copy : copies_) CopyVoxels(*copy.from->Assembled(), layer, copy.box, to);
+    if (!stored_ || layer != Layer::kVolume) Arriving(layer);
+    for (const Copy& copy : copies_) CopyFrom(*copy.from->Assembled(), layer, copy.box);
   }
-  for (const FilledBox& filled : filled_) Fill(filled, Arriving(Layer::kVolume));
-  filled_ = {};
-  voxels_ =
-      std::make_shared<BoxVoxels>(*std::move(arriving_[0]), BoxLayers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()});
+  BoxLayers layers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()};
+  if (stored_) {
+    for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
+    FillPadding(ArrivingStored());
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), std::move(layers));
+  } else {
+    voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_[0]), std::move(layers));
+  }
   arriving_ = {};
+  arriving_stored_.reset();
+  filled_ = {};
   cells_ = {};
   unpacked_ = {};
   return !std::exchange(copies_, {}).empty();

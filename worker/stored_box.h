@@ -8,12 +8,14 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "common/volume/filled_box.h"
 #include "common/wire/payload.h"
 #include "common/wire/voxel_messages.h"
+#include "data/sources/volume_source.h"
 #include "worker/arriving_cells.h"
 #include "worker/renderers/box_data.h"
 #include "worker/worker_machine.h"
@@ -27,9 +29,13 @@ class StoredBox {
     Box box;
   };
 
-  // `filled`: voxels that neither copies nor chunks bring.
-  StoredBox(const BoxKey& key, std::vector<Copy> copies, std::vector<FilledBox> filled = {})
-      : key_(key), copies_(std::move(copies)), filled_(std::move(filled)) {}
+  // `stored`: its voxels are read in parts, so that nothing is known of them (OpenBox). `filled`: of such a box: voxels that neither copies
+  // nor chunks bring.
+  StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled = {});
+
+  // Of a box of stored voxels: where those of `box`, which lies in this one, are to be; nullopt: all are there. Whoever writes there keeps
+  // this object.
+  std::optional<BoxRoom> RoomFor(const Box& box);
 
   // DataLoss: the chunk does not fit this padded box.
   Status Store(const Chunk& chunk, const Bytes& payload);
@@ -70,15 +76,21 @@ class StoredBox {
   };
 
   BrickedVoxels& Arriving(Layer layer);  // the layer's voxels; the first call makes room for them
+  PaddedVoxels& ArrivingStored();        // likewise
+  // Part of the samples of `box` of the layer, as BrickedVoxels::Write.
+  void Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
+  void CopyFrom(const BoxVoxels& from, Layer layer, const Box& box);
   std::shared_ptr<BoxVoxels> Assembled();
   BoxData& DataFor(ClientId client);
   void Return(BoxData& data);
 
   const BoxKey key_;
+  const bool stored_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Copy> copies_;
   std::vector<FilledBox> filled_;
   std::array<std::optional<BrickedVoxels>, kLayers.size()> arriving_;  // by layer
+  std::optional<PaddedVoxels> arriving_stored_;                        // instead of the volume's, if stored_
   ArrivingCells cells_;
   std::vector<std::byte> unpacked_;    // a chunk's samples
   std::shared_ptr<BoxVoxels> voxels_;  // null: not all there

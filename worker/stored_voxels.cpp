@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
+#include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -11,10 +14,8 @@
 #include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/wire/payload.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
-#include "data/sources/read_part.h"
 
 namespace slabstream {
 namespace {
@@ -28,9 +29,7 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
   Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
   if (!source.ok()) return source;
   const SourceInfo& info = (*source)->info();
-  const Result<std::uint64_t> version = VersionOf(info.files);
-  if (!version.ok()) return version.status();
-  const bool same = *version == stored.version && std::size_t(stored.level) < info.levels.size() &&
+  const bool same = info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
                     info.levels[std::size_t(stored.level)].block == stored.block.end;
   return same ? source : Status::InvalidArgument(text->path + ": another one than the coordinator's");
 }
@@ -38,44 +37,70 @@ Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
 }  // namespace
 
 struct StoredVoxels::Shared {
-  using ChunkName = std::tuple<DatasetId, Box, std::uint32_t>;
-  struct Place {  // of a source and version
-    bool known = false;
-    std::shared_ptr<VolumeSource> source = nullptr;  // null: it is not seen from here
+  using Piece = std::tuple<std::uint64_t, Box, std::uint32_t>;  // generation of the padded box; box and number of the chunk
+  using PlaceName = std::pair<std::string, std::uint64_t>;      // a source, and its version
+  struct Place {
+    bool looking = false;                            // at it, just now
+    Time looked;                                     // the last time
+    Time used;                                       // likewise
+    std::shared_ptr<VolumeSource> source = nullptr;  // null: it is not seen from here, as far as is known
   };
 
   std::mutex mutex;  // guards what follows
-  std::function<void(MessageReceived)> deliver;
-  std::map<std::pair<std::string, std::uint64_t>, Place> places;
-  std::map<ChunkName, int> reading;  // how often each was asked for: two boxes may need the same voxels
+  std::function<void(WorkerEvent)> deliver;
+  std::map<PlaceName, Place> places;
+  std::set<Piece> reading;
   BackgroundTasks opening{kOpensAtOnce};
+
+  // The source at this place; null: it is not seen from here, or not known to be, and looked for if it is time. Called with the mutex.
+  std::shared_ptr<VolumeSource> SourceAt(const StoredAt& stored, Time now, const std::shared_ptr<Shared>& self) {
+    const auto [found, is_new] = places.try_emplace({stored.source, stored.version});
+    Place& place = found->second;
+    place.used = now;
+    if (place.source == nullptr && !place.looking && (is_new || now >= place.looked + kLookAgain)) {
+      place.looking = true;
+      place.looked = now;
+      Find(stored, self);
+    }
+    const std::shared_ptr<VolumeSource> source = place.source;
+    if (places.size() > kMostPlaces) {
+      places.erase(std::ranges::min_element(places, {}, [](const auto& each) { return each.second.used; }));
+    }
+    return source;
+  }
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
     opening.Post([self, stored] {
       Result<std::shared_ptr<VolumeSource>> source = Guarded("a source of voxels", [&] { return OpenSame(stored); });
       LogInfo(source.ok() ? "reads " + stored.source + " itself" : "asks the coordinator for voxels: " + source.status().message());
       const std::lock_guard lock(self->mutex);
-      self->places[{stored.source, stored.version}] = {true, source.ok() ? *std::move(source) : nullptr};
+      const auto place = self->places.find({stored.source, stored.version});
+      if (place == self->places.end()) return;  // dropped meanwhile
+      place->second.looking = false;
+      if (source.ok()) place->second.source = *std::move(source);
     });
   }
 
-  void Deliver(const ChunkRequest& request, Result<Bytes> samples) {
-    MessageReceived message;
-    const Status packed = Guarded("a chunk of voxels", [&] {
-      if (!samples.ok()) return samples.status();
-      Chunk chunk{.epoch = request.epoch, .dataset = request.dataset, .box = request.box, .chunk = request.chunk};
-      message.payload = PackChunk(*std::move(samples), Codec::kRaw, chunk);
-      message.message = chunk;
-      return Status::Ok();
-    });
-    if (!packed.ok()) message.message = ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, packed};
+  // A read from there has failed: the coordinator may see what is not seen from here any more.
+  void Lose(const PlaceName& name) {
     const std::lock_guard lock(mutex);
-    const auto asked = reading.extract({request.dataset, request.box, request.chunk});
-    for (int i = 0; deliver && i < asked.mapped(); ++i) deliver(message);
+    if (const auto place = places.find(name); place != places.end()) place->second.source = nullptr;
+  }
+
+  void End(const SendChunkRequest& wanted, VolumeSource& source, const Status& status) {
+    const ChunkRequest& request = wanted.request;
+    WorkerEvent event = ChunkStored{wanted.padded, request.box, request.chunk, {}, status.ok() ? source.TakeStoredBytes() : 0};
+    if (status.code() == StatusCode::kUnavailable) Lose({wanted.stored->source, wanted.stored->version});
+    if (!status.ok()) {
+      event = MessageReceived{ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, status}, {}};
+    }
+    const std::lock_guard lock(mutex);
+    reading.erase({wanted.padded.generation, request.box, request.chunk});
+    if (deliver) deliver(std::move(event));
   }
 };
 
-StoredVoxels::StoredVoxels(std::function<void(MessageReceived)> deliver) : shared_(std::make_shared<Shared>()) {
+StoredVoxels::StoredVoxels(std::function<void(WorkerEvent)> deliver) : shared_(std::make_shared<Shared>()) {
   shared_->deliver = std::move(deliver);
 }
 
@@ -84,19 +109,27 @@ StoredVoxels::~StoredVoxels() {
   shared_->deliver = nullptr;
 }
 
-bool StoredVoxels::Read(const ChunkRequest& request, const StoredAt& stored) {
+bool StoredVoxels::Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now) {
+  const ChunkRequest& request = wanted.request;
+  const StoredAt& stored = *wanted.stored;
+  if (request.chunk != 0) return false;  // not all samples of its box: BoxFetcher asks for none like that
   std::shared_ptr<VolumeSource> source;
   {
     const std::lock_guard lock(shared_->mutex);
-    const auto [place, is_new] = shared_->places.try_emplace({stored.source, stored.version});
-    if (is_new) shared_->Find(stored, shared_);
-    if (place->second.source == nullptr) return false;
-    if (++shared_->reading[{request.dataset, request.box, request.chunk}] > 1) return true;
-    source = place->second.source;
+    source = shared_->SourceAt(stored, now, shared_);
+    if (source == nullptr) return false;
+    if (!shared_->reading.insert({wanted.padded.generation, request.box, request.chunk}).second) return true;
   }
-  const ChunkPart part = PartOfChunk(request.box, source->info().levels[std::size_t(stored.level)].description.type, request.chunk);
-  ReadPart(source, stored.level, request.box, part.begin, part.bytes,
-           [shared = shared_, request](Result<Bytes> samples) { shared->Deliver(request, std::move(samples)); });
+  const auto end = [shared = shared_, wanted, padded, source](const Status& status) { shared->End(wanted, *source, status); };
+  const Status begun = Guarded("voxels of a box", [&] {
+    if (const std::optional<BoxRoom> room = padded->RoomFor(request.box)) {
+      source->Read(stored.level, request.box, *room, {}, end);
+    } else {
+      end(Status::Ok());
+    }
+    return Status::Ok();
+  });
+  if (!begun.ok()) end(begun);  // no memory
   return true;
 }
 

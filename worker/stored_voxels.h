@@ -1,29 +1,35 @@
 // StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds
-// out by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked.
+// out by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked. A place that is
+// not seen is looked at again after kLookAgain, as is one that cannot be read any more; the last kMostPlaces stay open.
 //
 // One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
 #pragma once
 
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 
-#include "common/volume/stored_at.h"
-#include "common/wire/any_message.h"
+#include "common/base/time.h"
+#include "worker/stored_box.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
 
 class StoredVoxels {
  public:
+  static constexpr Duration kLookAgain = std::chrono::seconds(10);
+  static constexpr std::size_t kMostPlaces = 16;  // sources in one version each
+
   // `deliver`: called on any thread, never once this is destroyed.
-  explicit StoredVoxels(std::function<void(MessageReceived)> deliver);
+  explicit StoredVoxels(std::function<void(WorkerEvent)> deliver);
   ~StoredVoxels();
   StoredVoxels(const StoredVoxels&) = delete;
   StoredVoxels& operator=(const StoredVoxels&) = delete;
 
-  // Begins to read the chunk, unless that is under way: a Chunk or ChunkRefused will come for each call. False: the coordinator must be
-  // asked.
-  bool Read(const ChunkRequest& request, const StoredAt& stored);
+  // Begins to read a piece of stored voxels into the padded box, unless that is under way: ChunkStored or ChunkRefused will come. False:
+  // the coordinator must be asked.
+  bool Read(const SendChunkRequest& wanted, const std::shared_ptr<StoredBox>& padded, Time now);
 
  private:
   struct Shared;  // with reads that outlive this

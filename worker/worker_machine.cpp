@@ -276,7 +276,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
     if (!run.failure().ok()) break;
     const Placement& placement = run.placement(rank);
     // Voxels that are read in parts are not read for a box outside the picture.
-    const bool outside = setup->stored && ReachOf(placement.box, *setup).empty();
+    const bool outside = StoredOf(*setup, placement.level) && ReachOf(placement.box, *setup).empty();
     if (outside || HidesBox(*hidden, placement.box, *setup)) {
       run.LeaveOut(rank, {.worker = worker, .group = key.group, .rank = rank, .box = placement.id}, actions);
       ++rendered_ranks;

@@ -114,6 +114,7 @@ struct ChunkStored {
   Box box;                  // as in the chunk
   std::uint32_t chunk = 0;  // of that box
   Status status;
+  std::uint64_t stored_bytes = 0;  // VolumeSource::TakeStoredBytes, of voxels that this worker has read itself
 };
 struct RenderDone {
   GroupKey key;
@@ -163,8 +164,10 @@ using WorkerEvent = std::variant<MessageReceived, ImageUnreadable, ChunkStored, 
 struct SendControl {
   WorkerToCoordinator message;
 };
-// To the coordinator, unless the executor reads the chunk itself.
+// To the coordinator, unless this worker reads the voxels itself, straight to where the padded box stores them; then only ChunkStored
+// comes.
 struct SendChunkRequest {
+  BoxKey padded;
   ChunkRequest request;
   std::shared_ptr<const StoredAt> stored = nullptr;  // where the voxels are; null: the coordinator holds them
 };
@@ -180,7 +183,8 @@ struct OpenBox {
   };
   BoxKey padded;
   std::vector<Copy> copies;
-  std::vector<FilledBox> filled = {};  // voxels of the volume that neither copies nor chunks bring
+  bool stored = false;                 // the voxels are read in parts: nothing is known of them
+  std::vector<FilledBox> filled = {};  // of such a box: voxels that neither copies nor chunks bring
 };
 struct StoreChunk {
   BoxKey padded;

@@ -148,6 +148,25 @@ void DeclareTransfer(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunTransfer);
 }
 
+// X0:X1,Y0:Y1,Z0:Z1 in voxels; a missing end is the volume's, which 0 stands for.
+Result<Box> ParseVoxelBox(const std::string& option, const std::string& text) {
+  Box box;
+  const std::vector<std::string_view> axes = Split(text, ',');
+  const auto refuse = [&] { return Status::InvalidArgument(fmt::format("{} '{}' is not X0:X1,Y0:Y1,Z0:Z1", option, text)); };
+  if (axes.size() != 3) return refuse();
+  for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
+    const std::vector<std::string_view> ends = Split(axes[std::size_t(Number(axis))], ':');
+    if (ends.size() != 2) return refuse();
+    for (const bool high : {false, true}) {
+      if (ends[high ? 1 : 0].empty()) continue;
+      const Result<int> bound = ParseInteger(option, ends[high ? 1 : 0], high ? 1 : 0, kMaxVolumeSide);
+      if (!bound.ok()) return bound.status();
+      (high ? box.end : box.begin)[axis] = *bound;
+    }
+  }
+  return box;
+}
+
 void DeclareConvert(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("convert", "Write a volume in another format, or with samples of another type");
   auto options = std::make_shared<ConvertOptions>();
@@ -164,6 +183,10 @@ void DeclareConvert(const CommandLine& line) {
           "; every value must fit. Raw samples in SOURCE have this type too, unless SOURCE says ?type=...")
       ->type_name("TYPE")
       ->default_str("the type of SOURCE, or the smallest that holds its values");
+  AddInteger(*sub, "--level", options->level, 0, kMaxLevels - 1, "Convert this level of SOURCE; 0 is the finest one");
+  AddParsed(*sub, "--box", options->box, ParseVoxelBox, "Convert these voxels of the level alone: from each first one to before the second")
+      ->type_name("X0:X1,Y0:Y1,Z0:Z1")
+      ->default_str("all");
   AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
       ->type_name("SIZE")
       ->default_str("none; 1G for what is not read as a whole");

@@ -7,12 +7,16 @@
 #include <vector>
 
 #include "client/cli/commands.h"
+#include "client/cli/convert_source.h"
 #include "client/cli/convert_to_zarr.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
+#include "data/open/any_volume.h"
+#include "data/survey/survey.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -39,6 +43,16 @@ std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const Loade
   return stored && FileSamples::Of(*loaded.volume, stored).ok() ? stored : std::nullopt;
 }
 
+// A box of a level, or the whole volume.
+Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source, ProgressBar& bar) {
+  if (!options.converts_part()) return ReadInputVolume(source);
+  const Result<SourceToConvert> part = OpenToConvert(options, source, {}, bar);
+  if (!part.ok()) return part.status();
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(*part->source, 0, source.options.progress);
+  if (!volume.ok()) return AsInput(volume.status());
+  return LoadedVolume{.info = FileInfoOf(part->source->info()), .volume = *std::move(volume)};
+}
+
 }  // namespace
 
 Status RunConvert(const ConvertOptions& options) {
@@ -53,7 +67,9 @@ Status RunConvert(const ConvertOptions& options) {
     if (options.type && !needs_type) return Status::InvalidArgument("--type: an OME-Zarr keeps the type of SOURCE");
     return ConvertToZarr(options, *source);
   }
-  if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+  if (!options.converts_part()) {
+    if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+  }
   const VolumeFormat* const to = FindWritableFormat(options.output);
   if (to == nullptr) {
     return Status::InvalidArgument(fmt::format("OUTPUT '{}' must end in one of {}, .zarr", options.output, WritableEndings()));
@@ -62,8 +78,10 @@ Status RunConvert(const ConvertOptions& options) {
   if (Status status = CheckCanWrite("OUTPUT", options.output); !status.ok()) return status;
 
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source->path);
-  const Result<LoadedVolume> loaded = ReadInputVolume(*source);
+  ReadProgress reading([&](const ReadShare& read) { bar.Show(0.01 * read.percent, Describe(read, source->path)); });
+  bar.Show(0, Describe(ReadShare{}, source->path));
+  source->options.progress = &reading;
+  const Result<LoadedVolume> loaded = Read(options, *source, bar);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
   if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;

@@ -12,13 +12,14 @@
 #include <utility>
 #include <vector>
 
+#include "client/cli/convert_source.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
-#include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 
 namespace slabstream {
@@ -36,23 +37,6 @@ Shares Share(std::uint64_t memory, std::uint64_t volume_bytes) {
   return {{.under_way_bytes = memory / 8, .cache_bytes = memory / 8}, memory - std::min(memory, taken)};
 }
 
-// Read in parts if its format allows that, else as a whole.
-Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, const ReadContext::Limits& limits) {
-  if (FindSourceFormat(source.path, source.options) != nullptr) {
-    Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
-    if (!opened.ok()) return AsInput(opened.status());
-    return opened;
-  }
-  if (Status status = CheckInputVolume(source); !status.ok()) return status;
-  Result<std::vector<std::string>> files = CheckVolumeHeaders(source.path, source.options);
-  if (!files.ok()) return AsInput(files.status());
-  const Result<LoadedVolume> loaded = ReadInputVolume(source);
-  if (!loaded.ok()) return loaded.status();
-  const VolumeFileInfo& info = loaded->info;
-  return MakeMemorySource(loaded->volume,
-                          {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)});
-}
-
 }  // namespace
 
 bool NamesZarr(const std::string& output) {
@@ -65,11 +49,11 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   constexpr std::uint64_t kUsual = std::uint64_t{1} << 30;
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsual;
   ProgressBar bar(options.progress, 1);
-  bar.Show(0, "reading " + source.path);
-  const Result<std::shared_ptr<VolumeSource>> opened = Open(source, Share(memory, 0).reading);
+  bar.Show(0, Describe(ReadShare{}, source.path));
+  const Result<SourceToConvert> opened = OpenToConvert(options, source, Share(memory, 0).reading, bar);
   if (!opened.ok()) return opened.status();
-  const VolumeDescription& volume = (*opened)->info().levels[0].description;
-  const bool whole = FindSourceFormat(source.path, source.options) == nullptr && options.memory > 0;
+  const VolumeDescription& volume = opened->source->info().levels[0].description;
+  const std::uint64_t held = options.memory > 0 ? opened->memory : 0;
 
   Wakeup wakeup;
   const InterruptGuard guard(wakeup);
@@ -87,9 +71,10 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
     bar.Show(0.01 * its, fmt::format("writing {}: {} % of {}, {} a second", options.output, its, MemoryText(now.all_bytes),
                                      MemoryText(std::uint64_t(rate))));
   };
-  const Status status = WriteOmeZarr(**opened, options.output,
+  const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
-                                      .memory = Share(memory, whole ? std::uint64_t(volume.voxel_bytes()) : 0).writing,
+                                      .slices = opened->slices,
+                                      .memory = Share(memory, held).writing,
                                       .source = options.source,
                                       .stop = stop.get_token(),
                                       .progress = progress});

@@ -13,6 +13,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/progress_display.h"
 #include "client/report/picture_warnings.h"
+#include "common/cli/program.h"
 
 namespace slabstream {
 namespace {
@@ -73,7 +74,7 @@ class FrameLoop {
     if (found == open_.end()) return Status::Ok();
     const std::size_t index = found->second;
     if (const auto* progress = std::get_if<FrameProgress>(&event.what)) {
-      display_.Show(int(index), *progress);
+      display_.Show(int(index), *progress, jobs_[index].source);
       return Status::Ok();
     }
     if (const auto* failure = std::get_if<Status>(&event.what)) {
@@ -86,6 +87,8 @@ class FrameLoop {
     open_.erase(found);
     display_.FrameDone(int(index));
     failed_in_a_row_ = 0;
+    const std::string& lowered = picture.statistics.lowered;
+    if (!lowered.empty() && !std::exchange(told_lowered_, true)) PrintWarning(lowered);
     std::vector<RankReport> reports = std::exchange(picture.statistics.reports, {});  // many, which the sink does not need
     FrameRecord& record = records_[index];
     record = {jobs_[index].output, picture.latency, picture.statistics, IsEmpty(picture.image)};
@@ -154,6 +157,7 @@ class FrameLoop {
   ProgressDisplay display_;
   std::map<std::size_t, FrameRecord> records_;             // of pictures, by the job's index
   int failed_in_a_row_ = 0;                                // frames since the last picture
+  bool told_lowered_ = false;                              // once; it is much the same of all frames
   std::size_t next_ = 0;                                   // of jobs_: the first that has not been requested yet
   std::map<RequestId, std::size_t> open_;                  // to the job's index
   std::map<std::size_t, std::optional<Picture>> waiting_;  // to be put, by the job's index; nullopt: it has failed

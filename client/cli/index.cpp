@@ -17,6 +17,7 @@
 #include "coordinator/catalogue.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/unchanged_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 
@@ -48,8 +49,7 @@ Status RunIndex(const IndexingOptions& options) {
   if (FindSourceFormat(source->path, source->options) == nullptr) {
     if (Status status = CheckInputVolume(*source); !status.ok()) return status;
     return Status::InvalidArgument(
-        fmt::format("SOURCE '{}' is read as a whole, so it needs no index; `slabstream convert` writes an OME-Zarr, "
-                    "which is read in parts",
+        fmt::format("SOURCE '{}' can have no index: its format cannot be read in parts; `slabstream convert` writes an OME-Zarr, which can",
                     options.source));
   }
   const std::uint64_t memory = options.memory > 0 ? options.memory : kUsualMemory;

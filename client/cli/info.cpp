@@ -1,5 +1,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -21,6 +22,8 @@
 #include "client/cli/input_volume.h"
 #include "client/cli/mesh_info.h"
 #include "client/cli/picture_info.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/progress_display.h"
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
@@ -44,20 +47,20 @@ struct VolumeFacts {
   std::optional<OpenedSource> parts = {};        // none: it was read as a whole
 };
 
-// What is kept about a source that is read in parts.
+// Of a source that can have an index.
 struct IndexFacts {
   std::string path;
-  IndexFile::Facts file;
-  bool usable = false;     // else it is of other files, or damaged; the log says so
-  double read = 0;         // share of the bricks that it knows
-  double may_show = 0;     // share of the bricks of level 0 that can be visible
-  std::size_t bricks = 0;  // of level 0
+  std::optional<IndexFile::Facts> file;  // none: it has none
+  bool usable = false;                   // else it is of other files, or damaged; the log says so
+  double read = 0;                       // share of the bricks that it knows
+  double may_show = 0;                   // share of the bricks of level 0 that can be visible
+  std::size_t bricks = 0;                // of level 0
 };
 
 std::optional<IndexFacts> IndexFactsOf(const std::string& source, const OpenedSource& opened, const TransferFunction& transfer) {
   const Result<IndexFile> file = IndexFileOf(source);
-  if (!file.ok() || !file->facts()) return std::nullopt;
-  IndexFacts facts{.path = file->path(), .file = *file->facts(), .usable = opened.index != nullptr};
+  if (!file.ok()) return std::nullopt;
+  IndexFacts facts{.path = file->path(), .file = file->facts(), .usable = opened.index != nullptr};
   if (!facts.usable) return facts;
   facts.read = ShareRead(*opened.index);
   const VolumeSummary finest = UnreadSummary(opened.source->info().levels.front().description, *opened.survey.summary);
@@ -75,9 +78,10 @@ std::string TimeText(std::chrono::system_clock::time_point time) {
 }
 
 std::string IndexText(const std::optional<IndexFacts>& index, const std::string& transfer) {
-  if (!index) return "index        none; `slabstream index` makes one, and pictures then read less\n";
+  if (!index) return "";
+  if (!index->file) return "index        none; `slabstream index` makes one, and pictures then read less\n";
   const std::string which =
-      fmt::format("index        {}, {:.1f} KiB, of {}", index->path, double(index->file.bytes) / 1024, TimeText(index->file.written));
+      fmt::format("index        {}, {:.1f} KiB, of {}", index->path, double(index->file->bytes) / 1024, TimeText(index->file->written));
   if (!index->usable) return which + ": not used\n";
   std::string text = fmt::format("{}\n  {:.3g} % of {} bricks of level 0 can be visible under transfer function '{}'\n", which,
                                  100 * index->may_show, index->bricks, transfer);
@@ -86,9 +90,9 @@ std::string IndexText(const std::optional<IndexFacts>& index, const std::string&
 }
 
 nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
-  if (!index) return nullptr;
+  if (!index || !index->file) return nullptr;
   nlohmann::ordered_json json = {
-      {"path", index->path}, {"bytes", index->file.bytes}, {"written", TimeText(index->file.written)}, {"usable", index->usable}};
+      {"path", index->path}, {"bytes", index->file->bytes}, {"written", TimeText(index->file->written)}, {"usable", index->usable}};
   if (index->usable) {
     json["read"] = index->read;
     json["visible"] = index->may_show;
@@ -98,12 +102,15 @@ nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
 
 // Of a volume with several levels, or a large one, what a survey of it tells; of any other one, what all voxels tell.
 Result<VolumeFacts> FactsOf(const std::string& source) {
-  Result<std::optional<OpenedSource>> opened = OpenInParts({source, ""}, std::uint64_t(kExactBytes));
-  if (!opened.ok()) return AsInput(opened.status());
-  if (*opened) return VolumeFacts{FileInfoOf((*opened)->source->info()), (*opened)->survey.summary, *std::move(opened)};
-  const Result<LoadedVolume> loaded = ReadInputVolume(source);
-  if (!loaded.ok()) return loaded.status();
-  return VolumeFacts{loaded->info, std::make_shared<const VolumeSummary>(Summarize(*loaded->volume))};
+  ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
+  const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
+  Result<ReadableSource> read = ReadSource({source, ""}, std::uint64_t(kExactBytes), tell);
+  if (!read.ok()) return AsInput(read.status());
+  if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
+    return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};
+  }
+  const LoadedSource& loaded = std::get<LoadedSource>(*read);
+  return VolumeFacts{loaded.file, std::make_shared<const VolumeSummary>(Summarize(*loaded.volume))};
 }
 
 std::uint64_t CountedVoxels(const VolumeSummary& summary) {
@@ -209,14 +216,16 @@ std::string PartsText(const SourceInfo& info) {
     text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
                         spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
   }
-  if (!info.channels.empty()) {
-    text += fmt::format("channels     {}:", info.channels.size());
-    for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
-    text += '\n';
-  }
   if (info.times > 1) text += fmt::format("times        {}\n", info.times);
   if (info.window) text += fmt::format("window       {:g} ... {:g}, which the file asks for\n", info.window->min, info.window->max);
   return text;
+}
+
+std::string ChannelsText(const VolumeFileInfo& info) {
+  if (info.channels.empty()) return "";
+  std::string text = fmt::format("channels     {}:", info.channels.size());
+  for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
+  return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
 }
 
 std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy) {
@@ -232,10 +241,11 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
   text += OrientationText(facts);
   if (facts.parts) text += PartsText(facts.parts->source->info());
+  text += ChannelsText(info);
   text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
-  if (facts.parts) text += IndexText(index, transfer);
+  text += IndexText(index, transfer);
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
 }
 
@@ -309,7 +319,6 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
                               {"voxel_bytes", level.description.voxel_bytes()},
                               {"block", SizeJson(level.block)}});
   }
-  json["channels"] = info.channels;
   json["times"] = info.times;
   if (info.window) json["window"] = RangeJson(*info.window);
   json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
@@ -335,6 +344,8 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
                                  {"type", NameOf(d.type)},
                                  {"file_type", info.file_type},
                                  {"labels", info.labels},
+                                 {"channels", info.channels},
+                                 {"channel", info.channel},
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                  {"spacing", VectorJson(d.geometry.spacing)},

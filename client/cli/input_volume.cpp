@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <optional>
+
+#include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 
@@ -24,16 +27,21 @@ Status CheckInputHeaders(const std::string& source) {
   return AsInput(CheckAnyVolumeHeaders(parsed->path, parsed->options).status());
 }
 
-bool CanBeReadInParts(const std::string& source) {
+bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes) {
   const Result<SourceText> parsed = ParseSourceText(source);
-  return parsed.ok() && FindSourceFormat(parsed->path, parsed->options) != nullptr;
+  if (!parsed.ok()) return false;
+  if (FindSourceFormat(parsed->path, parsed->options) != nullptr) return true;
+  const Result<std::optional<SourceInfo>> stream = DescribeStream(parsed->path, parsed->options);
+  return stream.ok() && *stream && std::uint64_t((*stream)->levels.front().description.voxel_bytes()) > most_bytes;
 }
 
 Status AsInput(const Status& status) { return status.code() == StatusCode::kDataLoss ? Status::InvalidArgument(status.message()) : status; }
 
-Result<LoadedVolume> ReadInputVolume(const std::string& source) {
-  const Result<SourceText> parsed = ParseSourceText(source);
+Result<LoadedVolume> ReadInputVolume(const std::string& source, const TellRead& tell) {
+  Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
+  ReadProgress progress(tell);
+  parsed->options.progress = &progress;
   return ReadInputVolume(*parsed);
 }
 

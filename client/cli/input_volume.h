@@ -1,6 +1,7 @@
 // Volume files that the user names on the command line: every error in them is bad input.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "common/base/status.h"
@@ -18,14 +19,14 @@ Status CheckInputVolume(const SourceText& source);
 // Reads the headers as well, and checks all that can be checked without the samples: whether there is such a time, for example.
 Status CheckInputHeaders(const std::string& source);
 
-// Whether it may be larger than the memory (data/sources).
-bool CanBeReadInParts(const std::string& source);
+// Whether it may be larger than the memory (data/sources), or is a compressed stream of more than `most_bytes` (data/brick_store).
+bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes);
 
 // A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
 Status AsInput(const Status& status);
 
 // ReadVolume with such failures.
-Result<LoadedVolume> ReadInputVolume(const std::string& source);
+Result<LoadedVolume> ReadInputVolume(const std::string& source, const TellRead& tell = {});
 Result<LoadedVolume> ReadInputVolume(const SourceText& source);
 
 }  // namespace slabstream

@@ -88,9 +88,13 @@ struct ConvertOptions {
   std::string source;  // a path, with options for reading it or without
   std::string output;
   std::optional<SampleType> type;  // of the samples in `output`
+  int level = 0;                   // of `source`
+  Box box = {};                    // in voxels of that level; an end of 0: to the last one
   std::uint64_t memory = 0;        // bytes, limit of this process; 0: none
   OmeZarrVersion zarr_version = OmeZarrVersion::k05;
   bool progress = false;
+
+  bool converts_part() const { return level != 0 || box != Box{}; }
 };
 
 struct IndexingOptions {

@@ -69,6 +69,8 @@ std::string RecordLines(const PictureRecord& record, const std::string& output) 
   AddLines("", record.json["picture"], text);
   text += "geometry\n";
   AddLines("", record.json["geometry"], text);
+  if (record.json.contains("levels")) text += "drawn from\n";
+  AddLines("levels", record.json.value("levels", Json::array()), text);
   text += "command\n  " + CommandText(record, output) + "\n";
   if (OwnTransfer(record.request.transfer) != nullptr) text += fmt::format("  {} is what --json prints as color_map\n", kColorMapFile);
   if (OverlayTransfer(record) != nullptr) text += fmt::format("  {} is what --json prints as overlay_map\n", kOverlayMapFile);

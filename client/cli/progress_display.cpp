@@ -2,14 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "common/base/printable.h"
+#include "data/volume_io/read_options.h"
+
 namespace slabstream {
 
 ProgressDisplay::ProgressDisplay(bool wanted, int frame_count, const std::string& label)
     : bar_(wanted, frame_count), label_(label.empty() ? "" : label + ": "), frame_count_(frame_count) {}
 
-void ProgressDisplay::Show(int frame, const FrameProgress& progress) {
+void ProgressDisplay::Show(int frame, const FrameProgress& progress, const std::string& source) {
   const double part = progress.group_count == 0 ? 0 : double(progress.groups_done) / progress.group_count;
-  bar_.Show(frames_done_ + part, fmt::format("{}frame {} of {}: {}", label_, frame + 1, frame_count_, Describe(progress)));
+  bar_.Show(frames_done_ + part, fmt::format("{}frame {} of {}: {}", label_, frame + 1, frame_count_, Describe(progress, source)));
 }
 
 void ProgressDisplay::FrameDone(int frame) {
@@ -17,15 +22,22 @@ void ProgressDisplay::FrameDone(int frame) {
   bar_.Show(frames_done_, fmt::format("{}frame {} of {}: done", label_, frame + 1, frame_count_));
 }
 
-std::string Describe(const FrameProgress& progress) {
+std::string Describe(const FrameProgress& progress, const std::string& source) {
   switch (progress.phase) {
     case FramePhase::kQueued: return fmt::format("queued, {} before it", progress.queue_position);
-    case FramePhase::kLoading: return "loading the volume";
+    case FramePhase::kLoading: return Describe(ReadShare{int(progress.read_percent), progress.read_rate}, source);
     case FramePhase::kRunning: break;
   }
   std::string text = fmt::format("{} of {} groups, {} workers", progress.groups_done, progress.group_count, progress.workers);
   if (progress.attempt > 1) text += fmt::format(", attempt {}", progress.attempt);
   return text;
+}
+
+std::string Describe(const ReadShare& read, const std::string& source) {
+  const Result<SourceText> text = ParseSourceText(source);
+  const std::string name = std::filesystem::path(text.ok() ? text->path : source).filename().string();
+  const std::string reading = "reading " + (name.empty() ? "the volume" : Printable(name));
+  return read.percent == 0 ? reading : fmt::format("{}: {} % ({} MiB/s)", reading, read.percent, read.bytes_per_second >> 20);
 }
 
 }  // namespace slabstream

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "client/cli/cores.h"
@@ -12,14 +13,15 @@
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"
+#include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files) {
-  Result<LoadedVolume> loaded = ReadInputVolume(path);
+Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files, const TellRead& tell) {
+  Result<LoadedVolume> loaded = ReadInputVolume(path, tell);
   if (!loaded.ok()) return loaded.status();
   Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
@@ -33,6 +35,14 @@ Result<MemoryShares> SharesOf(const ConnectionOptions& connection) {
   if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
   shares->worker = kIdleMemoryBytes + (shares->worker * workers - kIdleMemoryBytes) / workers;
   return shares;
+}
+
+// Bytes of a volume that the coordinator holds, if it could also be read in parts.
+Result<std::uint64_t> MostHeld(const ConnectionOptions& connection) {
+  if (connection.local_memory == 0) return std::uint64_t(kExactBytes);
+  const Result<MemoryShares> shares = SharesOf(connection);
+  if (!shares.ok()) return shares.status();
+  return std::min(std::uint64_t(kExactBytes), DatasetShare(shares->coordinator));
 }
 
 // Before anything is read.
@@ -73,14 +83,16 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     return opened;
   }
   if (Status limited = LimitLocalMemory(connection); !limited.ok()) return limited;
+  const Result<std::uint64_t> most_held = MostHeld(connection);
+  if (!most_held.ok()) return most_held.status();
   std::vector<DataSource> files;
   for (const std::string& source : sources) {
     if (Status status = CheckInputVolume(source); !status.ok()) return status;
-    if (CanBeReadInParts(source) && !layers.any()) {
+    if (!layers.any() && CanBeReadInParts(source, *most_held)) {
       if (Status status = CheckInputHeaders(source); !status.ok()) return status;
       files.emplace_back(source, "");
     } else {
-      files.emplace_back([source, layers] { return LoadInput(source, layers); });
+      files.emplace_back(DataLoader([source, layers](const TellRead& tell) { return LoadInput(source, layers, tell); }));
     }
   }
   if (layers.any()) {

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
 
 namespace slabstream {
@@ -41,10 +42,12 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
                {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
                {"attempts", frame.statistics.attempts},
                {"workers", frame.statistics.workers},
-               {"bytes", {{"voxels", summary.voxel_bytes}, {"images", summary.image_bytes}}},
+               {"levels", LevelsJson(frame.statistics)},
+               {"bytes", BytesJson(summary)},
                {"stages_ms", stages},
                {"imbalance", summary.imbalance},
                {"idle_share", summary.idle_share}};
+  if (!frame.statistics.lowered.empty()) json["lowered"] = frame.statistics.lowered;
   if (frame.statistics.predicted) AddPrediction(json, *frame.statistics.predicted, frame, summary);
   return json;
 }
@@ -55,19 +58,20 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
   Json json = {{"source", options.source},
                {"renderer", frames.empty() ? options.request.renderer : frames.back().statistics.renderer},
                {"size", {options.request.size.width, options.request.size.height}}};
-  std::uint64_t voxel_bytes = 0, image_bytes = 0;
+  FrameSummary all;
   Json list = Json::array();
   for (const FrameRecord& frame : frames) {
     const FrameSummary summary = Summarize(frame.statistics);
-    voxel_bytes += summary.voxel_bytes;
-    image_bytes += summary.image_bytes;
+    all.voxel_bytes += summary.voxel_bytes;
+    all.stored_bytes += summary.stored_bytes;
+    all.image_bytes += summary.image_bytes;
     list.push_back(FrameJson(frame, summary));
   }
   const FrameStatistics last = frames.empty() ? FrameStatistics() : frames.back().statistics;
   json["plan"] = {{"workers", last.workers},       {"groups", last.groups},  {"decomposition", last.decomposition},
                   {"balance_by", last.balance_by}, {"axis", last.axis},      {"assignment", last.assignment},
                   {"balance", last.balance},       {"combine", last.combine}};
-  json["bytes"] = {{"voxels", voxel_bytes}, {"images", image_bytes}};
+  json["bytes"] = BytesJson(all);
   json["frames"] = std::move(list);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }

@@ -19,6 +19,15 @@ std::string LayersText(const DatasetStatus& dataset) {
   return text.empty() ? "-" : text;
 }
 
+std::vector<VolumeDescription> LevelsOf(const DatasetStatus& dataset) {
+  return dataset.levels.empty() ? std::vector{dataset.description} : dataset.levels;
+}
+
+nlohmann::ordered_json LevelJson(const VolumeDescription& level) {
+  const auto& [size, spacing, unused] = level.geometry;
+  return {{"size", {size.x, size.y, size.z}}, {"spacing", {spacing.x, spacing.y, spacing.z}}, {"voxel_bytes", level.voxel_bytes()}};
+}
+
 }  // namespace
 
 std::string_view NameOf(DatasetState state) {
@@ -48,6 +57,8 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
     entry["memory_bytes"] = dataset.memory_bytes;
     entry["layers"] = {{"labels", dataset.labels}, {"overlay", dataset.overlay}};
     entry["cells"] = dataset.cells;
+    entry["levels"] = nlohmann::ordered_json::array();
+    for (const VolumeDescription& level : LevelsOf(dataset)) entry["levels"].push_back(LevelJson(level));
     entry["range"] = {{"min", dataset.range.min}, {"max", dataset.range.max}};
   }
   if (dataset.state == DatasetState::kFailed) entry["error"] = dataset.error;
@@ -56,18 +67,19 @@ nlohmann::ordered_json DatasetJson(const DatasetStatus& dataset) {
 }
 
 std::string DatasetTableText(const std::vector<DatasetStatus>& datasets) {
-  constexpr std::size_t kColumns = 8;
+  constexpr std::size_t kColumns = 9;
   using Row = std::array<std::string, kColumns>;
-  std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "MEMORY", "LAYERS"}};
+  std::vector<Row> rows = {{"NAME", "STATE", "FOR", "SIZE", "TYPE", "SPACING", "LEVELS", "MEMORY", "LAYERS"}};
   for (const DatasetStatus& dataset : datasets) {
-    Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-"};
+    Row row = {Printable(dataset.name), std::string(NameOf(dataset.state)), AgeText(dataset.since_ms), "-", "-", "-", "-", "-", "-"};
     if (dataset.state == DatasetState::kReady) {
       const auto& [size, spacing, unused] = dataset.description.geometry;
       row[3] = fmt::format("{} x {} x {}", size.x, size.y, size.z);
       row[4] = NameOf(dataset.description.type);
       row[5] = fmt::format("{:.4g} x {:.4g} x {:.4g}", spacing.x, spacing.y, spacing.z);
-      row[6] = MemoryText(dataset.memory_bytes);
-      row[7] = LayersText(dataset);
+      row[6] = fmt::format("{}", LevelsOf(dataset).size());
+      row[7] = MemoryText(dataset.memory_bytes);
+      row[8] = LayersText(dataset);
     }
     rows.push_back(std::move(row));
   }

@@ -35,6 +35,7 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
     for (std::size_t stage = 0; stage < report.stage_ns.size(); ++stage) summary.stage_ns[stage] += report.stage_ns[stage];
     summary.voxel_bytes += report.voxel_bytes;
     summary.image_bytes += report.image_bytes;
+    summary.stored_bytes += report.stored_bytes;
     summary.finish_ns += PictureNs(report);
     render_ns[report.worker] += report.stage_ns[std::size_t(Stage::kRender)];
     for (const Span& span : report.spans) {

@@ -32,7 +32,9 @@ std::string StatusText(const StatusReply& reply) {
     text += fmt::format("  {} {}", dataset.name, NameOf(dataset.state));
     const Index3& size = dataset.description.geometry.size;
     if (dataset.state == DatasetState::kReady) {
-      text += fmt::format(" {} x {} x {}, {}", size.x, size.y, size.z, MemoryText(dataset.memory_bytes));
+      text += fmt::format(" {} x {} x {}, ", size.x, size.y, size.z);
+      if (!dataset.levels.empty()) text += fmt::format("{} levels, ", dataset.levels.size());
+      text += MemoryText(dataset.memory_bytes);
     }
     if (dataset.state == DatasetState::kFailed) text += fmt::format(": {}", dataset.error);
     text += '\n';

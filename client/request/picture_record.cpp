@@ -141,7 +141,7 @@ FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
 }
 
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
-                       const LayerFiles& layers) {
+                       const LayerFiles& layers, const std::vector<LevelUse>& levels) {
   Json made = Json::parse(RequestToJson(request));
   made.erase("dataset");  // the source says it
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
@@ -151,6 +151,9 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
                {"geometry", GeometryJson(geometry)}};
   if (!layers.labels.empty()) json["layers"]["labels"] = LabelText(layers);
   if (!layers.overlay.empty()) json["layers"]["overlay"] = layers.overlay;
+  if (std::ranges::any_of(levels, [](const LevelUse& use) { return use.level > 0; })) {
+    for (const LevelUse& use : levels) json["levels"].push_back(use.level);
+  }
   return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
@@ -166,7 +169,8 @@ Result<PictureRecord> ParseRecord(std::string_view text) {
                 {"layers", [&](const JsonValue& v) { ReadLayerFiles(v, record.layers); }},
                 {"request", [&](const JsonValue&) { request = (*json)["request"].dump(); }},
                 {"picture", [&](const JsonValue& v) { ReadFormat(v, record.format); }},
-                {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }}});
+                {"geometry", [](const JsonValue& v) { (void)v.At("pixel_size"); }},
+                {"levels", [](const JsonValue& v) { v.Each([](const JsonValue& level) { (void)level.Integer(0, kMaxLevels - 1); }); }}});
   for (const char* field : {"program", "source", "request", "picture", "geometry"}) (void)value.At(field);
   if (mistake) return Status::InvalidArgument(*mistake);
   Result<FrameRequest> parsed = RequestFromJson(request, "volume");

@@ -4,7 +4,8 @@
 //    "layers": {"labels", "overlay"},                                     likewise, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
 //    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend"},
-//    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"}}
+//    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"},
+//    "levels": [2]}                                                       that the picture was drawn from, if not from level 0 alone
 //
 // It names no host, no time and no place of the service, so the same picture has the same record wherever and whenever it is made.
 #pragma once
@@ -40,7 +41,7 @@ FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics);
 
 // ASCII, one line.
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
-                       const LayerFiles& layers = {});
+                       const LayerFiles& layers = {}, const std::vector<LevelUse>& levels = {});
 // InvalidArgument, one line: what is wrong with the text.
 Result<PictureRecord> ParseRecord(std::string_view text);
 

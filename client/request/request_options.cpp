@@ -201,10 +201,16 @@ struct OptionReader {
     return ParseChoice(shown, text, std::vector<std::string_view>(option.choices.begin(), option.choices.end()));
   }
 
-  void Read(const std::string& text, double& value) { Take(value, ParseNumber(shown, text, *option.range)); }
+  // A number may be left to the service: 0 stands for that.
+  bool IsLeft(const std::string& text) const { return text == kAutomatic && option.value.ends_with("|auto"); }
+
+  void Read(const std::string& text, double& value) {
+    if (IsLeft(text)) return void(value = 0);
+    Take(value, ParseNumber(shown, text, *option.range));
+  }
   void Read(const std::string& text, float& value) { Take(value, ParseNumber(shown, text, *option.range)); }
   void Read(const std::string& text, int& value) {
-    if (text == kAutomatic && text == option.standard) return void(value = 0);
+    if (IsLeft(text)) return void(value = 0);
     Take(value, ParseInteger(shown, text, int(option.range->min), int(option.range->max)));
   }
   void Read(const std::string& text, bool& value) {

@@ -136,7 +136,7 @@ class TreeGrower {
 
   Axis ChooseAxis(const Box& box) const {
     Axis best = options_.axes.front();
-    if (box.size()[best] >= options_.first_axis_down_to) return best;
+    if (box.size()[best] >= std::max(2, options_.first_axis_down_to)) return best;  // one slice cannot be cut
     for (const Axis axis : options_.axes) {
       if (box.size()[axis] > box.size()[best]) best = axis;
     }

@@ -13,6 +13,7 @@
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
 #include "common/view/sheet_grid.h"
+#include "common/volume/grid_map.h"
 #include "common/volume/layers.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/summary.h"
@@ -23,12 +24,21 @@ class RendererKind;  // common/renderers/renderer_kind.h
 
 using DatasetId = std::uint64_t;  // a volume under a name: the same in every coordinator's life, another one for other voxels. 0: none
 
+// A coarser level of a frame's volume, from which some of the boxes are drawn.
+struct CoarserLevel {
+  DatasetId dataset = 0;
+  VolumeDescription description;        // of the same part of the world, type and mapping as the frame's volume
+  std::optional<StoredAt> stored = {};  // as in the setup
+  friend bool operator==(const CoarserLevel&, const CoarserLevel&) = default;
+};
+
 struct FrameSetup {
   DatasetId dataset = 0;
   VolumeDescription description;
   LayerTypes layers;                        // that the dataset has
   ValueRange range;                         // data values that the classification table is made for
   std::optional<StoredAt> stored = {};      // none: the coordinator holds the voxels
+  std::vector<CoarserLevel> coarser = {};   // finest first
   const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
   std::vector<double> parameters;           // one value for each of renderer->parameters()
   PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers
@@ -77,7 +87,39 @@ FrameArea ProjectBox(const Box& box, const FrameSetup& setup, std::int32_t befor
 // Pixels of the frame that samples of `box` can lie in, for any voxels.
 PixelBounds ReachOf(const Box& box, const FrameSetup& setup);
 
-// Voxels that a worker must hold to render `box`: the box and its halo, cut to the volume.
-inline Box PaddedBox(const Box& box, const FrameSetup& setup) { return Grown(box, setup.halo, setup.description.geometry.bounds()); }
+// A box of the frame, in voxels of the setup's volume, and the level that it is drawn from. 0: that volume; n: setup.coarser[n - 1].
+struct LevelBox {
+  LevelBox(const Box& b, std::uint8_t l = 0) : box(b), level(l) {}  // NOLINT(google-explicit-constructor): most boxes are of level 0
+  Box box;
+  std::uint8_t level = 0;
+};
+
+inline const VolumeGeometry& GeometryOf(const FrameSetup& setup, std::uint8_t level) {
+  return level == 0 ? setup.description.geometry : setup.coarser[level - std::size_t{1}].description.geometry;
+}
+inline DatasetId DatasetOf(const FrameSetup& setup, std::uint8_t level) {
+  return level == 0 ? setup.dataset : setup.coarser[level - std::size_t{1}].dataset;
+}
+inline const std::optional<StoredAt>& StoredOf(const FrameSetup& setup, std::uint8_t level) {
+  return level == 0 ? setup.stored : setup.coarser[level - std::size_t{1}].stored;
+}
+// Whether voxels of any level are read in parts.
+inline bool ReadsInParts(const FrameSetup& setup) {
+  return setup.stored || std::ranges::any_of(setup.coarser, [](const CoarserLevel& level) { return level.stored.has_value(); });
+}
+
+// From the frame's voxels to those of a level.
+inline GridMap MapTo(const FrameSetup& setup, std::uint8_t level) {
+  return MapBetween(setup.description.geometry, GeometryOf(setup, level));
+}
+
+// The voxels of its level that cover `at`.
+inline Box VoxelsOf(const LevelBox& at, const FrameSetup& setup) {
+  return at.level == 0 ? at.box : CoveringVoxels(at.box, MapTo(setup, at.level), GeometryOf(setup, at.level).size);
+}
+// Voxels of its level that a worker must hold to render `at`: with their halo, cut to the volume.
+inline Box PaddedBox(const LevelBox& at, const FrameSetup& setup) {
+  return Grown(VoxelsOf(at, setup), setup.halo, GeometryOf(setup, at.level).bounds());
+}
 
 }  // namespace slabstream

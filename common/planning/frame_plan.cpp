@@ -21,6 +21,9 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   setup.layers = summary.layers();
   setup.range = summary.range;
   setup.stored = summary.stored;
+  for (const CoarserVolume& level : resolved.coarser) {
+    setup.coarser.push_back({level.dataset, level.summary->description, level.summary->stored});
+  }
   SetRenderer(*resolved.volume.renderer(), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
   const VolumeGeometry& geometry = summary.description.geometry;

@@ -27,9 +27,12 @@ using WorkerId = std::uint32_t;  // unique within one coordinator's life, never 
 // One rank of a group: which box, and who renders it. After the loss of a worker, another one may hold several ranks of a group.
 struct Placement {
   BoxId id = 0;
-  Box box;
+  Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
-  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read
+  std::uint8_t level = 0;              // that it is drawn from: LevelBox
+  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read; only at level 0
+
+  LevelBox at() const { return {box, level}; }
   friend bool operator==(const Placement&, const Placement&) = default;
 };
 

@@ -10,6 +10,7 @@
 #include "common/planning/clipped_cells.h"
 #include "common/planning/cost_estimator.h"
 #include "common/planning/layer_bricks.h"
+#include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
 #include "common/planning/unread_parts.h"
 #include "common/renderers/renderer_kind.h"
@@ -157,6 +158,55 @@ struct LayoutMaker::State {
     return best ? *std::move(best) : MakePartition(policy, MostGroups(request, policy), fields.Of(BalanceBy::kVoxels));
   }
 
+  // The geometry of a level of the map, and where blocks of its source end.
+  const VolumeSummary& SummaryOf(std::uint8_t level) const {
+    return level == 0 ? *request.summary : *request.coarser[level - std::size_t{1}].summary;
+  }
+  GridMap MapToLevel(std::uint8_t level) const {
+    return MapBetween(request.summary->description.geometry, SummaryOf(level).description.geometry);
+  }
+  Box PaddedBoxOf(const LevelBox& at) const {
+    const VolumeGeometry& geometry = SummaryOf(at.level).description.geometry;
+    return Grown(CoveringVoxels(at.box, MapToLevel(at.level), geometry.size), request.volume->renderer()->reach(), geometry.bounds());
+  }
+
+  Layout MakeByLevels(const ResolvedPolicy& policy) {
+    const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
+    LevelPartition made =
+        DivideByLevels({.map = request.map,
+                        .size = request.summary->description.geometry.size,
+                        .least_boxes = int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes)),
+                        .most_bytes = request.box_bytes_target,
+                        .bytes_of = [&](const LevelBox& at) { return PaddedBoxOf(at).voxel_count() * sample_bytes; },
+                        .blocks_of =
+                            [&](std::uint8_t level) {
+                              Index3 voxels;
+                              const std::optional<StoredAt>& stored = SummaryOf(level).stored;
+                              const GridMap map = MapToLevel(level);
+                              for (const Axis axis : kAxes)
+                                voxels[axis] = stored ? std::int32_t(stored->block.end[axis] / map.scale[axis] + 0.5) : 0;
+                              return voxels;
+                            }});
+    std::vector<BrickVisibility> visible;
+    for (std::size_t level = 0; level <= request.coarser.size(); ++level) {
+      const VolumeSummary& summary = SummaryOf(std::uint8_t(level));
+      const BrickRangeList& bricks = summary.indexed == nullptr ? summary.bricks : *summary.indexed;
+      visible.emplace_back(summary, bricks, request.volume->renderer()->DrawnTable(request.volume->transfer(), summary));
+    }
+    const auto shows = [&](const Box& box, BoxId id) {
+      const LevelBox at(box, made.levels[id]);
+      return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(at.box) && visible[at.level].AnyVisible(PaddedBoxOf(at));
+    };
+    Layout layout = Share(std::move(made.partition), policy, shows, [&](const Box& box, BoxId id) {
+      return double(PaddedBoxOf({box, made.levels[id]}).voxel_count());
+    });
+    layout.levels = std::move(made.levels);
+    for (std::size_t box = 0; box < layout.levels.size(); ++box) {
+      if (layout.owners[box] == kNoSlot) layout.levels[box] = 0;
+    }
+    return layout;
+  }
+
   bool stopped() const { return request.stop.stop_requested(); }
 
   bool BoxesFit(const Partition& partition) {
@@ -186,27 +236,36 @@ struct LayoutMaker::State {
   // An index says which boxes are rendered, and what of them is read. It does not say where they are: boxes are those that would be
   // made without it.
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
-    std::vector<BoxId> shown;
-    std::vector<double> box_costs;
     const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
     const std::optional<UnreadParts> unread = FindUnread();
-    Layout layout{std::move(partition), {}};
-    const std::span<const Box> boxes = layout.partition.boxes();
-    if (unread) layout.filled.resize(boxes.size());
-    for (BoxId box = 0; box < boxes.size(); ++box) {
-      if (!fields.Shows(boxes[box]) || (unread && !unread->Shows(boxes[box]))) continue;
-      shown.push_back(box);
-      if (unread) {
-        const Box padded = Grown(boxes[box], request.volume->renderer()->reach(), layout.partition.bounds());
-        layout.filled[box] = unread->Of(padded);
-        std::int64_t read = padded.voxel_count();
-        for (const FilledBox& part : layout.filled[box]) read -= part.box.voxel_count();
-        box_costs.push_back(double(read));
-      } else {
-        box_costs.push_back(by_cost ? MeanSeconds(boxes[box]) : 1);
-      }
+    std::vector<std::vector<FilledBox>> filled(unread ? partition.boxes().size() : 0);
+    const auto shows = [&](const Box& box, BoxId) { return fields.Shows(box) && (!unread || unread->Shows(box)); };
+    const auto cost_of = [&](const Box& box, BoxId id) {
+      if (!unread) return by_cost ? MeanSeconds(box) : 1;
+      const Box padded = PaddedBoxOf({box, 0});
+      filled[id] = unread->Of(padded);
+      std::int64_t read = padded.voxel_count();
+      for (const FilledBox& part : filled[id]) read -= part.box.voxel_count();
+      return double(read);
+    };
+    Layout layout = Share(std::move(partition), policy, shows, cost_of);
+    layout.filled = std::move(filled);
+    return layout;
+  }
+
+  // Gives boxes that show something to slots. Asks for the cost of each of them once.
+  template <class Shows, class CostOf>
+  Layout Share(Partition partition, const ResolvedPolicy& policy, Shows&& shows, CostOf&& cost_of) {
+    std::vector<BoxId> shown;
+    std::vector<double> box_costs;
+    for (BoxId id = 0; id < partition.boxes().size(); ++id) {
+      const Box& box = partition.boxes()[id];
+      if (!shows(box, id)) continue;
+      shown.push_back(id);
+      box_costs.push_back(cost_of(box, id));
     }
-    layout.owners.assign(boxes.size(), kNoSlot);
+    Layout layout{std::move(partition), {}};
+    layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
     const std::vector<std::uint32_t> owners = policy.assignment->assign({box_costs, request.slots});
     for (std::size_t i = 0; i < shown.size(); ++i) layout.owners[shown[i]] = owners[i];
     return layout;
@@ -300,6 +359,7 @@ int LayoutMaker::FewestGroups(const ResolvedPolicy& policy) {
 }
 
 Layout LayoutMaker::Make(const ResolvedPolicy& policy) {
+  if (state_->request.map != nullptr) return state_->MakeByLevels(policy);
   if (state_->request.summary->stored) return state_->Assign(state_->MakeStoredPartition(policy), policy);
   const BalanceBy metric = policy.balance_by;
   const int groups = FewestGroups(policy);

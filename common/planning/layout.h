@@ -1,5 +1,5 @@
 // Layout: where the boxes of a volume are, and which slot owns each. It depends on the volume, the transfer function and the policy, not on
-// the view; as long as a layout stays, no voxel moves.
+// the view; as long as a layout stays, no voxel moves. A picture that is drawn from several levels has a layout of its own.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include "common/decomposition/work_field.h"
 #include "common/planning/classified_volume.h"
 #include "common/planning/resolved_policy.h"
+#include "common/planning/resolved_request.h"
 #include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
@@ -22,8 +23,9 @@ inline constexpr std::uint32_t kNoSlot = std::numeric_limits<std::uint32_t>::max
 
 struct Layout {
   Partition partition;
-  std::vector<std::uint32_t> owners;  // by box: its slot, or kNoSlot
-  // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box.
+  std::vector<std::uint32_t> owners;      // by box: its slot, or kNoSlot
+  std::vector<std::uint8_t> levels = {};  // by box: that it is drawn from (LevelBox); empty: all from 0
+  // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
   friend bool operator==(const Layout&, const Layout&) = default;
 };
@@ -44,6 +46,9 @@ struct LayoutRequest {
   const ResolvedPolicy* policy = nullptr;
   std::uint32_t slots = 1;  // >= 1
   std::int64_t box_bytes_target = kBoxBytesTarget;
+  // As in ResolvedRequest; null: one level.
+  const LevelMap* map = nullptr;
+  std::span<const CoarserVolume> coarser = {};
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
   std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped

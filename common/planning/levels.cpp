@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,6 +12,8 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/resolved_request.h"
+#include "common/renderers/renderer_kind.h"
+#include "common/volume/grid_map.h"
 
 namespace slabstream {
 namespace {
@@ -25,32 +28,135 @@ double CoarseSpacing(const VolumeGeometry& finest, const VolumeGeometry& level) 
   return spacing;
 }
 
-// Physical width of the pixels that show the nearest point of the volume.
-double LeastPixel(const Camera& camera, const VolumeGeometry& geometry) {
-  if (camera.projection != Projection::kPerspective) return camera.PixelSizeAt(camera.target_depth);
-  double nearest = std::numeric_limits<double>::infinity();
-  const Vec3 low = {-0.5, -0.5, -0.5}, high = ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5};
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 p = {(corner & 1) != 0 ? high.x : low.x, (corner & 2) != 0 ? high.y : low.y, (corner & 4) != 0 ? high.z : low.z};
-    const auto& row = camera.depth_row;
-    nearest = std::min(nearest, row[0] * p.x + row[1] * p.y + row[2] * p.z + row[3]);
-  }
-  return camera.PixelSizeAt(std::max(nearest, 1e-6 * camera.target_depth));
+// The coarsest of the first `count` levels whose coarse voxels are at most so wide.
+int CoarsestFor(double width, const VolumeLevels& levels, int count) {
+  const VolumeGeometry& finest = levels.levels.front().geometry;
+  int level = 0;
+  for (int next = 1; next < count && CoarseSpacing(finest, levels.levels[std::size_t(next)].geometry) <= width; ++next) level = next;
+  return level;
 }
 
-// From positions along the voxels' axes of one geometry to those of another one: data-space coordinate -> data-space coordinate.
-double Moved(double position, Axis axis, const VolumeGeometry& from, const VolumeGeometry& to) {
-  const auto origin = [&](const VolumeGeometry& geometry) { return geometry.orientation.FromWorld(geometry.orientation.origin)[axis]; };
-  return (origin(from) + from.spacing[axis] * position - origin(to)) / to.spacing[axis];
+// Corner 0 ... 7 of a box of voxels, in the camera's grid. `map`: to that grid.
+Vec3 CornerOf(const Box& box, int corner, const GridMap& map) {
+  Vec3 p;
+  for (const Axis axis : kAxes) p[axis] = map.To(((corner >> Number(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5, axis);
+  return p;
+}
+
+// Of the nearest point of the box; orthographic: of all points.
+double NearestDepth(const Box& box, const GridMap& map, const Camera& camera) {
+  if (camera.projection != Projection::kPerspective) return camera.target_depth;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int corner = 0; corner < 8; ++corner) nearest = std::min(nearest, camera.Project(CornerOf(box, corner, map)).depth);
+  return std::max(nearest, 1e-6 * camera.target_depth);
+}
+
+// Whether the picture may show something of the box, in perspective. `setup`: of the overview's grid, and `map` to it.
+bool InPicture(const Box& box, const GridMap& map, const FrameSetup& setup) {
+  constexpr double kSlack = 1;  // pixels
+  const Camera& camera = setup.camera;
+  if (!setup.clip.MayKeep(CoveringVoxels(box, map, setup.description.geometry.size))) return false;
+  FrameArea area;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Camera::ImagePoint at = camera.Project(CornerOf(box, corner, map));
+    area.Add({at.x, at.y, at.x, at.y});
+  }
+  return area.x_end > -kSlack && area.y_end > -kSlack && area.x_begin < camera.width + kSlack && area.y_begin < camera.height + kSlack;
+}
+
+// A map without levels yet: at most 16 zones along an axis, none of less than 32 voxels.
+LevelMap ZonesOf(const Index3& size) {
+  LevelMap map{.levels = {}};
+  for (const Axis axis : kAxes) {
+    map.side[axis] = std::max(32, std::int32_t(std::bit_ceil(std::uint32_t(size[axis] + 15) / 16)));
+    map.counts[axis] = (size[axis] - 1) / map.side[axis] + 1;
+  }
+  return map;
+}
+
+// Calls function(width of the pixels that show its nearest point) for each zone of `map`, over `grid`; 0: it is not in the picture.
+template <class Function>
+void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetup& setup, Function&& function) {
+  const GridMap to_camera = MapBetween(grid, setup.description.geometry);
+  map.ForEachZone([&](const Index3& zone) {
+    const Box box = map.BoxOf(zone, grid.size);
+    function(InPicture(box, to_camera, setup) ? setup.camera.PixelSizeAt(NearestDepth(box, to_camera, setup.camera)) : 0);
+  });
+}
+
+// The width of the least pixel that shows something of the volume; 0: none does.
+double LeastWidth(const VolumeGeometry& grid, const FrameSetup& setup) {
+  double least = 0;
+  VisitZones(ZonesOf(grid.size), grid, setup, [&](double width) {
+    if (width > 0) least = least == 0 ? width : std::min(least, width);
+  });
+  return least;
+}
+
+// Zones that touch at a side are of levels next to each other: the coarser one gives way.
+void Even(LevelMap& map) {
+  for (bool changed = true; std::exchange(changed, false);) {
+    map.ForEachZone([&](const Index3& zone) {
+      std::uint8_t& level = map.of_zone[NumberIn(map.counts, zone)];
+      if (level == LevelMap::kOutside) return;
+      for (const Axis axis : kAxes) {
+        for (const int step : {-1, 1}) {
+          Index3 beside = zone;
+          beside[axis] += step;
+          if (beside[axis] < 0 || beside[axis] == map.counts[axis] || level <= map.Of(beside) + 1) continue;
+          level = std::uint8_t(map.Of(beside) + 1);
+          changed = true;
+        }
+      }
+    });
+  }
+}
+
+// The map of a picture whose finest level is `first`.
+LevelMap MapOf(double detail, const VolumeLevels& levels, int first, const FrameSetup& setup) {
+  const VolumeDescription& grid = levels.levels[std::size_t(first)];
+  LevelMap map = ZonesOf(grid.geometry.size);
+  int end = first;
+  const auto fits = [&](const VolumeDescription& level) {
+    return level.type == grid.type && level.mapping == grid.mapping && CanStandIn(level.geometry, grid.geometry);
+  };
+  for (; end < int(levels.levels.size()) && fits(levels.levels[std::size_t(end)]); ++end) map.levels.push_back(end);
+  VisitZones(map, grid.geometry, setup, [&](double width) {
+    const int level = CoarsestFor(detail * width, levels, end);
+    map.of_zone.push_back(width > 0 ? std::uint8_t(std::max(level - first, 0)) : LevelMap::kOutside);
+  });
+  Even(map);
+  return map;
+}
+
+// Only levels that a zone is drawn from.
+LevelMap WithoutUnused(LevelMap map) {
+  std::vector<std::uint8_t> number(map.levels.size(), LevelMap::kOutside);  // by present number
+  for (const std::uint8_t level : map.of_zone) {
+    if (level != LevelMap::kOutside) number[level] = 0;
+  }
+  std::vector<int> used;
+  for (std::size_t level = 0; level < number.size(); ++level) {
+    if (number[level] == LevelMap::kOutside) continue;
+    number[level] = std::uint8_t(used.size());
+    used.push_back(map.levels[level]);
+  }
+  map.levels = std::move(used);
+  if (map.levels.size() == 1) return {.levels = map.levels};
+  for (std::uint8_t& level : map.of_zone) {
+    if (level != LevelMap::kOutside) level = number[level];
+  }
+  return map;
 }
 
 void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& level) {
   if (box.unit == ClipUnit::kWorld) return;
+  const GridMap map = MapBetween(finest, level);
   for (const Axis axis : kAxes) {
     for (double* const bound : {&box.low[axis], &box.high[axis]}) {
       if (std::abs(*bound) == kMaxWorldCoordinate) continue;
       const double voxels = box.unit == ClipUnit::kPercent ? *bound / 100 * finest.size[axis] : *bound;
-      *bound = Moved(voxels - 0.5, axis, finest, level) + 0.5;
+      *bound = map.To(voxels - 0.5, axis) + 0.5;
     }
   }
   box.unit = ClipUnit::kVoxels;
@@ -74,13 +180,14 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels) {
   return summary;
 }
 
-Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels) {
+Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels) {
   const int count = int(levels.levels.size());
   const VolumeGeometry& finest = levels.levels.front().geometry;
   // Coarser levels have other indices.
-  if (const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest); !clip.ok()) return clip.status();
+  const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
+  if (!clip.ok()) return clip.status();
   if (const std::optional<int> level = LevelNumber(request.level)) {
-    if (*level < count) return *level;
+    if (*level < count) return LevelMap{.levels = {*level}};
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
   const VolumeGeometry& overview = levels.overview->description.geometry;
@@ -88,10 +195,18 @@ Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels) {
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
-  const double most = request.detail * LeastPixel(setup->camera, overview);
-  int level = 0;
-  for (int next = 1; next < count && CoarseSpacing(finest, levels.levels[std::size_t(next)].geometry) <= most; ++next) level = next;
-  return level;
+  const Camera& camera = setup->camera;
+  const double detail = request.detail == 0 ? 1 : request.detail;
+  const auto whole = [&] {
+    return LevelMap{.levels = {CoarsestFor(detail * camera.PixelSizeAt(NearestDepth(overview.bounds(), {}, camera)), levels, count)}};
+  };
+  const bool mixes =
+      camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();
+  if (!mixes) return whole();
+
+  const double least = LeastWidth(finest, *setup);
+  if (least == 0) return whole();
+  return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
 }
 
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level) {
@@ -102,8 +217,10 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
     if (!view.eye && view.distance == 0) {
       view.distance = BoundingRadius(finest) / std::sin(view.fov_degrees * (std::numbers::pi / 360));
     }
-  } else if (!view.fit) {
-    view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
+  } else {
+    const Vec3 centre = level.orientation.FromWorld(level.ToWorld(level.centre()) - finest.orientation.origin) / finest.spacing;
+    view.distance = MakeCamera(view, request.size, finest).Project(centre).depth;
+    if (!view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);

@@ -1,4 +1,4 @@
-// Levels: which level of a dataset a request draws, and what the request says in terms of that level.
+// Levels: which levels of a dataset a request draws, and what the request says in terms of one of them.
 //
 // Positions in the world are the same at all levels. What a request says in voxels, in percent of the volume or in terms of its bounding
 // sphere means the finest level. So a picture shows the same part of the world at the same scale, whichever level it is drawn from.
@@ -11,6 +11,7 @@
 
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
+#include "common/planning/level_map.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -24,10 +25,15 @@ struct VolumeLevels {
 // Of the dataset, without bricks.
 VolumeSummary StatisticsOf(const VolumeLevels& levels);
 
-// The coarsest level whose voxels are at most request.detail pixels wide wherever the picture shows the volume, or the one that
-// request.level names. Counts are those axes along which a level has coarser voxels than the finest one. Errors of ResolveRequest and
-// MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
-Result<int> LevelOf(const FrameRequest& request, const VolumeLevels& levels);
+// The coarsest level whose voxels are at most request.detail pixels wide (0: as 1) wherever the picture shows the volume, or the one that
+// request.level names. Counts are those axes along which a level has coarser voxels than the finest one.
+//
+// In perspective, far parts need coarser voxels than near ones. If the renderer has Ability::kLevels, each zone of a regular grid is drawn
+// from the coarsest level that suits its nearest point. A request with isosurfaces is drawn from one level: two levels do not agree on
+// where a surface meets their border.
+//
+// Errors of ResolveRequest and MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
+Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels);
 
 // The request that shows of `level` what `request` shows of `finest`. `level` describes the same part of the world.
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level);

@@ -106,8 +106,9 @@ void PlaceBoxes(FramePlan& plan) {
   for (const BoxId id : VisibilityOrder(plan.layout->partition, plan.setup.camera)) {
     if (plan.layout->owners[id] == kNoSlot) continue;
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
-    Placement& placement = plan.groups.back().placements.emplace_back(Placement{id, plan.layout->partition.boxes()[id]});
-    if (!plan.layout->filled.empty()) placement.filled = plan.layout->filled[id];
+    const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];
+    plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0, level});
+    if (!plan.layout->filled.empty()) plan.groups.back().placements.back().filled = plan.layout->filled[id];
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }

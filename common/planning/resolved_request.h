@@ -6,20 +6,31 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
 #include "common/planning/classified_volume.h"
+#include "common/planning/level_map.h"
 #include "common/planning/resolved_policy.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
+
+// A level of the dataset that parts of the picture are drawn from.
+struct CoarserVolume {
+  DatasetId dataset = 0;
+  std::shared_ptr<const VolumeSummary> summary;  // never null
+};
 
 struct ResolvedRequest {
   FrameRequest frame;                            // with the name of its renderer and a settled policy (SettledPolicy)
   ClassifiedVolume volume;                       // how it shows the dataset, whatever its view
   std::shared_ptr<const VolumeSummary> summary;  // of the dataset; never null
   std::optional<ResolvedPolicy> policy;          // none: a choice is left (LeavesChoice)
+  // If the picture is drawn from several levels: which one each part, and those beside the summary's, finest first. Null: there are none.
+  std::shared_ptr<const LevelMap> map = {};
+  std::vector<CoarserVolume> coarser = {};
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the

@@ -47,13 +47,15 @@ std::uint64_t BytesOfCells(const Box& padded, const VolumeSummary& summary) {
   return kBytesACell * cells;
 }
 
-// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of` tells what a padded box takes.
+// By worker with a part in the plan: the voxels of the group that needs most of them, if `bytes_of(padded box, level)` tells what one
+// takes.
 template <class BytesOf>
 std::map<WorkerId, std::uint64_t> MostVoxels(const FramePlan& plan, BytesOf&& bytes_of) {
   std::map<WorkerId, std::uint64_t> most = {{plan.display, 0}};
   for (const GroupPlan& group : plan.groups) {
     std::map<WorkerId, std::uint64_t> bytes;
-    for (const Placement& placement : group.placements) bytes[placement.worker] += bytes_of(PaddedBox(placement.box, plan.setup));
+    for (const Placement& placement : group.placements)
+      bytes[placement.worker] += bytes_of(PaddedBox(placement.at(), plan.setup), placement.level);
     for (const auto& [worker, of_group] : bytes) most[worker] = std::max(most[worker], of_group);
   }
   return most;
@@ -105,7 +107,7 @@ std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
-  const std::uint64_t taken = kIdleMemoryBytes + (setup.stored ? SourceBytes(limit) : 0) + images;
+  const std::uint64_t taken = kIdleMemoryBytes + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + images;
   const std::uint64_t box = std::max(kLeast, (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel));
   return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
@@ -117,18 +119,21 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
-  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, [&](const Box& padded) {
-    return kDerivedPerVoxel * std::uint64_t(padded.voxel_count()) * summary.types().bytes_per_voxel() + BytesOfCells(padded, summary);
-  });
+  const auto at_most = [&](const Box& padded, std::uint8_t level) {
+    const std::uint64_t bytes = kDerivedPerVoxel * std::uint64_t(padded.voxel_count()) * summary.types().bytes_per_voxel();
+    return bytes + (level == 0 ? BytesOfCells(padded, summary) : 0);
+  };
+  std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, at_most);
   const auto needs = [&](const WorkerLimit& limit) {
-    return kIdleMemoryBytes + (plan.setup.stored ? SourceBytes(limit.bytes) : 0) + voxels.at(limit.worker) + images;
+    return kIdleMemoryBytes + (ReadsInParts(plan.setup) ? SourceBytes(limit.bytes) : 0) + voxels.at(limit.worker) + images;
   };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(
       workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit) + (kEnough - 1) * images <= limit.bytes; });
   if (all_fit) return int(kEnough);
   // Only now it matters how much of the volume is empty, which takes longer to find out.
-  voxels = MostVoxels(plan, [&](const Box& padded) { return VoxelBytes(padded, summary); });
+  voxels = MostVoxels(
+      plan, [&](const Box& padded, std::uint8_t level) { return level == 0 ? VoxelBytes(padded, summary) : at_most(padded, level); });
 
   std::uint64_t fit = kEnough;
   for (const WorkerLimit& limit : workers) {

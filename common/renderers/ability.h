@@ -18,11 +18,12 @@ enum class Ability : std::uint8_t {
   kLights = 6,           // lights surfaces (Shading)
   kDepthShading = 7,     // lights them by ShadingModel::kDepthGradient, too
   kTransfer = 8,         // shows values by the transfer function
+  kLevels = 9,           // draws boxes of one picture from several levels of the dataset
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 9> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",  "overlay",
-                                                                  "cells",       "lights",      "depth-shading",    "transfer"};
+inline constexpr std::array<std::string_view, 10> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",   "overlay",
+                                                                   "cells",       "lights",      "depth-shading",    "transfer", "levels"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

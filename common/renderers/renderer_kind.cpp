@@ -52,7 +52,8 @@ std::vector<std::string_view> RendererKind::AbilityNames() const {
 }
 
 Status RendererKind::SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const {
-  setup.camera = MakeSupersampledCamera(view, size, setup.description.geometry);
+  const VolumeGeometry& farthest = GeometryOf(setup, std::uint8_t(setup.coarser.size()));
+  setup.camera = MakeCamera(view, size, setup.description.geometry, Least(farthest.spacing));
   return Status::Ok();
 }
 

@@ -75,7 +75,8 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   look.frame = {orientation.FromWorld(rolled.right), orientation.FromWorld(rolled.up), orientation.FromWorld(rolled.forward)};
   if (view.look_at) look.target = orientation.FromWorld(target - centre);
   if (view.projection != Projection::kPerspective) {
-    look.distance = 2 * radius + Dot(look.frame.forward, look.target);  // the eye plane stands 2 R before the volume's centre
+    // The eye plane stands 2 R before the volume's centre, or as far before it as before that of another level.
+    look.distance = (view.distance != 0 ? view.distance : 2 * radius) + Dot(look.frame.forward, look.target);
   } else if (view.eye) {
     look.distance = Length(target - *view.eye);
   } else {
@@ -151,7 +152,7 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
                   view.eye ? "eye" : "distance: the eye", look.distance, least));
 }
 
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled) {
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, double farthest_voxel) {
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const double radius = BoundingRadius(geometry);
@@ -165,9 +166,10 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
 
   // Supersampling by the farthest point that the bounding sphere can have, so that it does not change while the view turns.
   const double pixel_width = (perspective ? distance + Length(target) + radius : 1.0) / scale;
-  const double voxel_width = Least(spacing);
   int supersample = 1;
-  while (supersampled && supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * voxel_width * supersample) supersample *= 2;
+  if (farthest_voxel > 0) {
+    while (supersample < kMaxSupersample && pixel_width > kMaxVoxelsPerPixel * farthest_voxel * supersample) supersample *= 2;
+  }
   scale *= supersample;
 
   Camera camera;

@@ -103,10 +103,11 @@ struct Camera {
 // shorter side of the picture at zoom 1. The eye's distance stays. `fit` is off afterwards.
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius);
 
-// `view` and `size` valid, and CheckView is ok. Not `supersampled`: supersample is 1.
-Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, bool supersampled = false);
+// `view` and `size` valid, and CheckView is ok. `farthest_voxel`: the width of voxels where the volume is farthest from the eye, for
+// supersampling; 0: supersample is 1.
+Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry, double farthest_voxel = 0);
 inline Camera MakeSupersampledCamera(const ViewParameters& view, ImageSize size, const VolumeGeometry& geometry) {
-  return MakeCamera(view, size, geometry, true);
+  return MakeCamera(view, size, geometry, Least(geometry.spacing));
 }
 
 }  // namespace slabstream

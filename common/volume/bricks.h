@@ -2,7 +2,7 @@
 // samples of a box brick by brick. If all samples of a brick are equal it keeps one row of them, so empty space takes hardly any memory:
 // most of a segmented scan, and the surroundings of many simulations.
 //
-// VoxelBricks reads bricks of either kind of storage, VoxelBlock or BrickedVoxels.
+// VoxelBricks reads bricks of any kind of storage: BrickedVoxels, or one array, such as that of a VoxelBlock.
 #pragma once
 
 #include <cstddef>
@@ -92,7 +92,11 @@ class BrickedVoxels {
 class VoxelBricks {
  public:
   VoxelBricks(const VoxelBlock& block)  // NOLINT(google-explicit-constructor): a block is read brick by brick too
-      : grid_(block.box), type_(block.type), block_(&block) {}
+      : VoxelBricks(block.box, block.type, block.bytes.data(), block.box.size().x,
+                    std::ptrdiff_t{block.box.size().x} * block.box.size().y) {}
+  // `first`: the sample of the box's first voxel. `row`, `slice`: samples from a voxel to the next along y and z.
+  VoxelBricks(const Box& box, ScalarType type, const std::byte* first, std::ptrdiff_t row, std::ptrdiff_t slice)
+      : grid_(box), type_(type), first_(first), row_(row), slice_(slice) {}
   VoxelBricks(const BrickedVoxels& bricks)  // NOLINT(google-explicit-constructor)
       : grid_(bricks.grid()), type_(bricks.type()), bricks_(&bricks) {}
 
@@ -106,14 +110,15 @@ class VoxelBricks {
   template <class T>
   BrickView<T> View(const Index3& brick) const {
     if (bricks_ != nullptr) return bricks_->View<T>(brick);
-    const Index3 begin = grid_.BoxOf(brick).begin, size = grid_.box.size();
-    return {block_->samples<T>() + block_->Offset(begin), begin, size.x, std::ptrdiff_t{size.x} * size.y};
+    const Index3 begin = grid_.BoxOf(brick).begin, offset = begin - grid_.box.begin;
+    return {reinterpret_cast<const T*>(first_) + offset.z * slice_ + offset.y * row_ + offset.x, begin, row_, slice_};
   }
 
  private:
   BrickGrid grid_;
   ScalarType type_;
-  const VoxelBlock* block_ = nullptr;
+  const std::byte* first_ = nullptr;
+  std::ptrdiff_t row_ = 0, slice_ = 0;
   const BrickedVoxels* bricks_ = nullptr;
 };
 

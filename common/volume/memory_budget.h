@@ -50,6 +50,9 @@ struct MemoryShares {
 // A third for the coordinator, the rest for `workers` >= 1 workers in equal parts. InvalidArgument: less than kLeastMemoryBytes for one.
 Result<MemoryShares> ShareMemory(std::uint64_t bytes, int workers);
 
+// Of a coordinator's limit: for the voxels of datasets. 0: there is no limit.
+inline constexpr std::uint64_t DatasetShare(std::uint64_t limit) { return limit == 0 ? UINT64_MAX : limit / 4 * 3; }
+
 // Without --memory a service takes three quarters of its machine. A coordinator or a worker that is started by itself takes what
 // ShareMemory would give it beside one of the other kind, but at least kLeastMemoryBytes.
 std::uint64_t DefaultServiceMemory();

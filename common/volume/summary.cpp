@@ -224,6 +224,14 @@ ValueRange AnyValue(const VolumeDescription& description) {
   return VisitScalarType(description.type, [&]<class T>(const T*) { return AnyValueOf<T>(description.mapping); });
 }
 
+VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
+  VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
+  summary.non_finite = surveyed.non_finite;
+  summary.brick_counts = CubesOver(description.geometry.size, kBrick);
+  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
+  return summary;
+}
+
 ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples) {
   return ToDataValues(StoredRange<float>{samples.min, samples.max}, description.mapping, kNoFiniteValue);
 }

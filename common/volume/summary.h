@@ -71,6 +71,9 @@ struct VolumeSummary {
 // The range of all values that samples of this type can stand for: of a brick of which nothing is known.
 ValueRange AnyValue(const VolumeDescription& description);
 
+// What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and bricks of any value.
+VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+
 // Of data values, from one of stored samples: kNoFiniteValue stays what it is.
 ValueRange DataRange(const VolumeDescription& description, const ValueRange& samples);
 

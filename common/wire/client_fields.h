@@ -31,6 +31,7 @@ void Fields(auto& io, Is<FrameProgress> auto& m) {
   io.Any(m.attempt, &P::attempt, &P::set_attempt);
   io.Any(m.workers, &P::workers, &P::set_workers);
   io.Range("read_percent", m.read_percent, &P::read_percent, &P::set_read_percent, 0, 100);
+  io.Any(m.read_rate, &P::read_rate, &P::set_read_rate);
 }
 
 void Fields(auto& io, Is<FramePrediction> auto& m) {
@@ -41,6 +42,13 @@ void Fields(auto& io, Is<FramePrediction> auto& m) {
   io.Between("finish_seconds", m.finish_seconds, &P::finish_seconds, &P::set_finish_seconds, 0, kMost);
   io.Between("latency_seconds", m.latency_seconds, &P::latency_seconds, &P::set_latency_seconds, 0, kMost);
   io.Between("imbalance", m.imbalance, &P::imbalance, &P::set_imbalance, 1, kMost);
+}
+
+void Fields(auto& io, Is<LevelUse> auto& m) {
+  using P = v1::LevelUse;
+  io.Range("level", m.level, &P::level, &P::set_level, 0, kMaxLevels - 1);
+  io.Any(m.boxes, &P::boxes, &P::set_boxes);
+  io.Any(m.voxels, &P::voxels, &P::set_voxels);
 }
 
 void Fields(auto& io, Is<FrameStatistics> auto& m) {
@@ -62,6 +70,8 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Any(m.display, &P::display, &P::set_display);
   io.Message("grid", m.grid, &P::grid, &P::mutable_grid);
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
+  io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
+  io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
 }
 
 void Fields(auto& io, Is<PictureGeometry> auto& m) {
@@ -154,6 +164,7 @@ void Fields(auto& io, Is<DatasetStatus> auto& m) {
     io.Range("labels", m.labels, &P::labels, &P::set_labels, 0, kMaxLabels);
     io.Any(m.overlay, &P::overlay, &P::set_overlay);
     io.Any(m.cells, &P::cells, &P::set_cells);
+    io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
   }
   if (m.state == DatasetState::kFailed) io.Text("error", m.error, &P::error, &P::mutable_error, 0, kMaxTextBytes);
   io.Any(m.since_ms, &P::since_ms, &P::set_since_ms);

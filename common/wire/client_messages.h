@@ -60,7 +60,16 @@ struct FrameProgress {
   std::uint32_t attempt = 0;  // above 1: workers were lost
   std::uint32_t workers = 0;
   std::uint32_t read_percent = 0;  // kLoading: of the dataset's samples, as far as is known; [0, 100]
+  std::uint64_t read_rate = 0;     // kLoading: bytes of samples a second; 0: not known
   friend bool operator==(const FrameProgress&, const FrameProgress&) = default;
+};
+
+// A level that a picture was drawn from.
+struct LevelUse {
+  std::uint32_t level = 0;   // [0, kMaxLevels); 0 is the finest
+  std::uint32_t boxes = 0;   // of the plan; those that turn out to be hidden or outside the picture are not read
+  std::uint64_t voxels = 0;  // in these boxes
+  friend bool operator==(const LevelUse&, const LevelUse&) = default;
 };
 
 // What the frame's plan was and what it cost; reports of all groups.
@@ -74,6 +83,8 @@ struct FrameStatistics {
   std::uint32_t display = 0;                                                  // worker
   PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
   std::optional<FramePrediction> predicted;                                   // if the policy left a choice
+  std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
+  std::string lowered;  // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
@@ -136,14 +147,15 @@ enum class DatasetState : std::uint8_t { kUnloaded = 1, kLoading = 2, kReady = 3
 struct DatasetStatus {
   std::string name;
   DatasetState state = DatasetState::kUnloaded;
-  VolumeDescription description;   // kReady only
-  ValueRange range;                // kReady only
-  std::string error;               // kFailed only
-  std::uint64_t memory_bytes = 0;  // kReady only: what its voxels take of the coordinator's memory
-  std::uint64_t since_ms = 0;      // how long it has been in this state
-  std::uint32_t labels = 0;        // kReady only: different ones of its label volume; 0 if there is none
-  bool overlay = false;            // kReady only: there is one
-  std::uint64_t cells = 0;         // kReady only: tetrahedra of an unstructured grid; 0: it is a volume
+  VolumeDescription description;               // kReady only
+  ValueRange range;                            // kReady only
+  std::string error;                           // kFailed only
+  std::uint64_t memory_bytes = 0;              // kReady only: what its voxels take of the coordinator's memory
+  std::uint64_t since_ms = 0;                  // how long it has been in this state
+  std::uint32_t labels = 0;                    // kReady only: different ones of its label volume; 0 if there is none
+  bool overlay = false;                        // kReady only: there is one
+  std::uint64_t cells = 0;                     // kReady only: tetrahedra of an unstructured grid; 0: it is a volume
+  std::vector<VolumeDescription> levels = {};  // kReady only: of each level, finest first; at most kMaxLevels; empty: there is one
   friend bool operator==(const DatasetStatus&, const DatasetStatus&) = default;
 };
 

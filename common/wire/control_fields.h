@@ -101,7 +101,9 @@ inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker&
   for (std::size_t i = 0; i < group.placements.size(); ++i) {
     const auto placement = check.In("placements", i);
     check.That(volume.Contains(group.placements[i].box), "box", "not inside the volume");
-    check.That(setup.stored || group.placements[i].filled.empty(), "filled", "of voxels that the coordinator holds");
+    check.That(group.placements[i].level <= setup.coarser.size(), "level", "not one of the setup");
+    check.That(group.placements[i].filled.empty() || (setup.stored && group.placements[i].level == 0), "filled",
+               "of a coarser level, or of voxels that the coordinator holds");
   }
   if (group.schedule.ranks != group.placements.size()) {
     check.Fail("schedule.ranks",

@@ -116,6 +116,14 @@ void Fields(auto& io, Is<StoredAt> auto& m) {
   io.Check([&](Checker& check) { check.That(m.block.begin == Index3{} && !m.block.empty(), "block", "does not begin at 0, or is empty"); });
 }
 
+v1::CoarserLevel ProtoOf(const CoarserLevel&);
+void Fields(auto& io, Is<CoarserLevel> auto& m) {
+  using P = v1::CoarserLevel;
+  io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
+  io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Optional("stored", m.stored, &P::has_stored, &P::stored, &P::mutable_stored);
+}
+
 void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets and the clip region
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
@@ -123,6 +131,7 @@ void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its pa
   io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Message("range", m.range, &P::range, &P::mutable_range);
   io.Optional("stored", m.stored, &P::has_stored, &P::stored, &P::mutable_stored);
+  io.Messages("coarser", m.coarser, &P::coarser, &P::mutable_coarser, kMaxLevels - 1);
   io.Message("camera", m.camera, &P::camera, &P::mutable_camera);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
   io.Optional("labels", m.looks.labels, &P::has_labels, &P::labels, &P::mutable_labels);
@@ -177,6 +186,18 @@ inline void CheckClip(const FrameSetup& setup, Checker& check) {
   }
 }
 
+inline void CheckCoarser(const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("coarser");
+  check.That(setup.renderer->Can(Ability::kLevels), "", "not expected by this renderer");
+  for (std::size_t i = 0; i < setup.coarser.size(); ++i) {
+    const auto level = check.In("", i);
+    const VolumeDescription& description = setup.coarser[i].description;
+    check.That(description.type == setup.description.type && description.mapping == setup.description.mapping, "description",
+               "of other values than the volume");
+    check.That(CanStandIn(description.geometry, setup.description.geometry), "description", "not of the same part of the world");
+  }
+}
+
 inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   ReadRenderer(in, out, check);  // sets the halo, too
   ReadFields(in, out, check);
@@ -197,6 +218,7 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
     }
     if (check.ok()) CheckClip(out, check);
   }
+  if (check.ok() && !out.coarser.empty()) CheckCoarser(out, check);
   if (out.looks.labels) check.That(out.layers.labels.has_value(), "labels", "of a dataset without labels");
   if (out.looks.overlay) check.That(out.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
   if (check.ok() && out.renderer->Can(Ability::kCells))
@@ -225,6 +247,7 @@ void Fields(auto& io, Is<Placement> auto& m) {
   io.Any(m.id, &P::id, &P::set_id);
   io.Message("box", m.box, &P::box, &P::mutable_box);
   io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
+  io.Range("level", m.level, &P::level, &P::set_level, 0, kMaxLevels - 1);
   io.Messages("filled", m.filled, &P::filled, &P::mutable_filled, kMaxFilled);
 }
 

@@ -244,6 +244,7 @@ void Fields(auto& io, Is<RankReport> auto& m) {
   io.Any(m.image_bytes, &P::image_bytes, &P::set_image_bytes);
   io.Message("image_bounds", m.image_bounds, &P::image_bounds, &P::mutable_image_bounds);
   io.Any(m.image_pixels, &P::image_pixels, &P::set_image_pixels);
+  io.Any(m.stored_bytes, &P::stored_bytes, &P::set_stored_bytes);
 }
 
 }  // namespace slabstream

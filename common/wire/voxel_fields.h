@@ -46,6 +46,7 @@ void Fields(auto& io, Is<Chunk> auto& m) {
   io.Range("encoded_bytes", m.encoded_bytes, &P::encoded_bytes, &P::set_encoded_bytes, least, m.raw_bytes);
   io.Any(m.digest, &P::digest, &P::set_digest);
   io.Any(m.cell_bytes, &P::cell_bytes, &P::set_cell_bytes);
+  io.Any(m.stored_bytes, &P::stored_bytes, &P::set_stored_bytes);
   io.Check([&](Checker& check) {
     if (!IsCellChunk(m.chunk)) {
       check.Range("cell_bytes", m.cell_bytes, 0, 0);

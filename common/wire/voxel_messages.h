@@ -87,6 +87,7 @@ struct Chunk {  // payload: the packed samples or cells
   std::uint32_t encoded_bytes = 0;  // length of the payload frame
   std::uint64_t digest = 0;         // XXH3-64 of the unpacked bytes
   std::uint64_t cell_bytes = 0;     // of a chunk of cells: of all cells of the box, [1, kMaxCellBytes]; else 0
+  std::uint64_t stored_bytes = 0;   // VolumeSource::TakeStoredBytes of whoever has read the dataset
   friend bool operator==(const Chunk&, const Chunk&) = default;
 };
 

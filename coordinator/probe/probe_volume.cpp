@@ -19,14 +19,16 @@ Vec3 DataPoint(const VolumeGeometry& geometry, const Vec3& at) {
   return geometry.orientation.FromWorld(at - geometry.orientation.origin) / geometry.spacing;
 }
 
-double ProbeVolume::StoredAt(const Index3& voxel) const { return SampleOf(voxels, voxel); }
+double ProbedVoxels::At(const Index3& voxel) const { return held_ ? SampleOf(*held_, voxel) : find_(voxel); }
+
+double ProbeVolume::StoredAt(const Index3& voxel) const { return voxels.At(voxel); }
 
 std::uint32_t ProbeVolume::LabelNumberAt(const Index3& voxel) const {
   return labels == nullptr ? 0 : std::uint32_t(SampleOf(VoxelBricks(*labels), voxel));
 }
 
 double ProbeVolume::Interpolated(const Vec3& p) const {
-  const Index3 last = voxels.box().end - Uniform(1);
+  const Index3 last = voxels.size() - Uniform(1);
   Index3 low, high;
   Vec3 t;
   for (int i = 0; i < 3; ++i) {

@@ -1,6 +1,10 @@
 // ProbeVolume: the voxels of a dataset and of its layers, one by one and between voxels. For few points: renderers read rows.
 #pragma once
 
+#include <functional>
+#include <optional>
+#include <utility>
+
 #include "common/volume/bricks.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
@@ -8,8 +12,26 @@
 
 namespace slabstream {
 
+// The stored samples of a whole volume: in memory, or found one by one.
+class ProbedVoxels {
+ public:
+  ProbedVoxels(const VoxelBricks& voxels)  // NOLINT(google-explicit-constructor): voxels in memory are probed, too
+      : size_(voxels.box().end), held_(voxels) {}
+  using Find = std::function<double(const Index3& voxel)>;  // of a voxel inside the volume
+  ProbedVoxels(const Index3& size, Find find) : size_(size), find_(std::move(find)) {}
+
+  const Index3& size() const { return size_; }
+  const VoxelBricks* held() const { return held_ ? &*held_ : nullptr; }  // null: not in memory
+  double At(const Index3& voxel) const;
+
+ private:
+  Index3 size_;
+  std::optional<VoxelBricks> held_;
+  Find find_;
+};
+
 struct ProbeVolume {
-  VoxelBricks voxels;                                         // of the whole volume
+  ProbedVoxels voxels;
   const BrickedVoxels *labels = nullptr, *overlay = nullptr;  // null: there is no such layer
 
   // Of a voxel inside the volume. Stored samples of a layer are numbers of labels and data values.

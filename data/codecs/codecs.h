@@ -21,6 +21,8 @@ SharedCodec ZstdCodec();
 SharedCodec BloscCodec();
 // A block of LZ4 behind the number of its decoded bytes (32 bits, little endian), as numcodecs writes it.
 SharedCodec Lz4Codec();
+// What LibLZF makes of bytes, as h5py writes it. It does not tell how many there are.
+SharedCodec LzfCodec();
 // Four bytes behind the others: their CRC-32C, little endian (RFC 3720). DataLoss unless it is theirs.
 SharedCodec Crc32cCodec();
 // Elements of so many bytes (1, 2, 4 or 8) in the other byte order.

@@ -9,8 +9,8 @@
 #include "common/base/parse_number.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
-#include "data/sources/chosen_channel.h"
 #include "data/sources/view_setups.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 
 namespace slabstream {
@@ -48,6 +48,7 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   for (const std::string& name : setups) pyramid.info.channels.push_back(setup_of(name).name);
   const Result<int> channel = ChosenChannel(file->path(), pyramid.info.channels, options);
   if (!channel.ok()) return channel.status();
+  pyramid.info.channel = *channel;
   const std::string& name = setups[std::size_t(*channel)];
   const ViewSetup setup = setup_of(name);
   const Vec3 spacing = setup.spacing.value_or(Vec3{1, 1, 1});

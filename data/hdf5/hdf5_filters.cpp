@@ -54,7 +54,6 @@ std::string_view KnownName(int id) {
     case H5Z_FILTER_SZIP: return "szip";
     case H5Z_FILTER_NBIT: return "nbit";
     case H5Z_FILTER_SCALEOFFSET: return "scaleoffset";
-    case kLzf: return "lzf";
     case kLz4: return "lz4";
     case kBitShuffle: return "bitshuffle";
     case kZfp: return "zfp";
@@ -74,13 +73,14 @@ Result<CodecChain> CodecsOf(const std::vector<Hdf5Filter>& filters, std::size_t 
         chain.push_back(ShuffleCodec(filter.values.empty() || filter.values[0] == 0 ? element_bytes : filter.values[0]));
         continue;
       case H5Z_FILTER_FLETCHER32: chain.push_back(std::make_shared<Fletcher32>()); continue;
+      case kLzf: chain.push_back(LzfCodec()); continue;
       case kBlosc: chain.push_back(BloscCodec()); continue;
       case kZstd: chain.push_back(ZstdCodec()); continue;
       default: break;
     }
     const std::string name(filter.name.empty() ? KnownName(filter.id) : filter.name);
     return Status::InvalidArgument(
-        fmt::format("{} is packed by the filter {}{}, which is not supported; supported: deflate, shuffle, fletcher32, blosc and zstd",
+        fmt::format("{} is packed by the filter {}{}, which is not supported; supported: deflate, shuffle, fletcher32, lzf, blosc and zstd",
                     named, filter.id, name.empty() ? "" : " (" + name + ")"));
   }
   return chain;

@@ -8,7 +8,7 @@
 #include "common/base/parse_number.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
-#include "data/sources/chosen_channel.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
 
@@ -81,6 +81,7 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   if (pyramid.info.channels.empty()) return Status::InvalidArgument(file->path() + ": not an Imaris volume: it has no channel");
   const Result<int> channel = ChosenChannel(file->path(), pyramid.info.channels, options);
   if (!channel.ok()) return channel.status();
+  pyramid.info.channel = *channel;
   pyramid.info.window = WindowOf(*file, *channel);
 
   const std::optional<Extent> extent = ExtentOf(*file);

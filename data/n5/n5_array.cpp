@@ -39,14 +39,14 @@ class HeaderReader {
   bool whole_ = true;
 };
 
-Result<CodecChain> CodecsOf(const zarr::Field& attributes, std::size_t element_bytes) {
+Result<CodecChain> CodecsOf(const metadata::Field& attributes, std::size_t element_bytes) {
   CodecChain chain;
   if (element_bytes > 1) chain.push_back(SwapBytesCodec(element_bytes));  // blocks are big endian
-  const zarr::Field compression = attributes["compression"], old = attributes["compressionType"];
-  const zarr::Field type = compression.given() ? compression["type"] : old;
+  const metadata::Field compression = attributes["compression"], old = attributes["compressionType"];
+  const metadata::Field type = compression.given() ? compression["type"] : old;
   const Result<std::string> name = type.Text();
   if (!name.ok()) return name.status();
-  const zarr::Field zlib = compression["useZlib"];
+  const metadata::Field zlib = compression["useZlib"];
   if (*name == "raw") return chain;
   if (*name == "gzip") {
     chain.push_back(zlib.given() && zlib.value() == true ? ZlibCodec() : GzipCodec());
@@ -94,7 +94,7 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
     std::string key = path_;
-    for (std::size_t axis = index.size(); axis-- > 0;) key = zarr::Join(key, std::to_string(index[axis]));
+    for (std::size_t axis = index.size(); axis-- > 0;) key = metadata::Join(key, std::to_string(index[axis]));
     // What does not shrink becomes a little longer.
     constexpr std::uint64_t kOverhead = 65536;
     auto decode = [self = shared_from_this(), what = store_->name() + "/" + key, done = std::move(done)](Result<Bytes> answer) {
@@ -157,13 +157,13 @@ Result<Block> ParseBlock(const Bytes& stored, const std::vector<std::uint64_t>& 
   return block;
 }
 
-Result<std::shared_ptr<ChunkedArray>> OpenArray(const std::shared_ptr<Store>& store, const std::string& path, const zarr::Field& attributes,
-                                                const SourceContext& context) {
+Result<std::shared_ptr<ChunkedArray>> OpenArray(const std::shared_ptr<Store>& store, const std::string& path,
+                                                const metadata::Field& attributes, const SourceContext& context) {
   const Result<std::vector<std::uint64_t>> size = attributes["dimensions"].Counts(0);
   if (!size.ok()) return size.status();
   const Result<std::vector<std::uint64_t>> block = attributes["blockSize"].Counts(size->size());
   if (!block.ok()) return block.status();
-  const zarr::Field type_field = attributes["dataType"];
+  const metadata::Field type_field = attributes["dataType"];
   const Result<std::string> type_name = type_field.Text();
   if (!type_name.ok()) return type_name.status();
   const std::optional<SampleType> type = SampleTypeNamed(*type_name);

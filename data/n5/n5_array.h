@@ -6,17 +6,17 @@
 #include <string>
 
 #include "common/base/status.h"
+#include "data/metadata/json_fields.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/source_format.h"
 #include "data/stores/store.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::n5 {
 
 // `attributes`: of the dataset at `path` of the store. InvalidArgument: they are wrong, or a type or compression is not supported, which
 // the message names. ResourceExhausted: blocks of more than kMostChunkBytes.
-Result<std::shared_ptr<ChunkedArray>> OpenArray(const std::shared_ptr<Store>& store, const std::string& path, const zarr::Field& attributes,
-                                                const SourceContext& context);
+Result<std::shared_ptr<ChunkedArray>> OpenArray(const std::shared_ptr<Store>& store, const std::string& path,
+                                                const metadata::Field& attributes, const SourceContext& context);
 
 // The elements of a stored block behind its header, still packed. `size`: along each axis of N5. DataLoss: damaged, or larger than `most`
 // along an axis.

@@ -1,6 +1,7 @@
 // What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), or datasets. Sources:
 // https://github.com/saalfeldlab/n5-viewer#metadata, https://github.com/bigdataviewer/bigdataviewer-core (N5ImageLoader)
 #include "data/n5/n5_pyramid.h"
+#include "data/volume_io/chosen_channel.h"
 
 #include <fmt/format.h>
 
@@ -15,7 +16,6 @@
 #include "common/base/parse_number.h"
 #include "common/base/printable.h"
 #include "data/n5/n5_array.h"
-#include "data/sources/chosen_channel.h"
 #include "data/sources/space_axes.h"
 #include "data/sources/view_setups.h"
 #include "data/volume_io/length_names.h"
@@ -24,9 +24,9 @@
 namespace slabstream::n5 {
 namespace {
 
-using zarr::Field;
-using zarr::Join;
-using zarr::Json;
+using metadata::Field;
+using metadata::Join;
+using metadata::Json;
 
 // Attributes of a group or a dataset; none is a group without any.
 struct Node {
@@ -111,7 +111,7 @@ std::optional<Spacing> SpacingOf(const Field& attributes) {
 Result<Node> Container::Read(const std::string& path) {
   const std::string key = Join(path, kAttributes);
   Node node{.path = path, .object = store_->name() + "/" + key};
-  Result<std::optional<Json>> json = zarr::ReadJson(*store_, key);
+  Result<std::optional<Json>> json = metadata::ReadJson(*store_, key);
   if (!json.ok()) return json.status();
   if (!json->has_value()) return node;
   node.attributes = **std::move(json);
@@ -216,6 +216,7 @@ Result<Pyramid> Container::Views() {
   pyramid->info.format = "BigDataViewer N5";
   pyramid->info.times = int(times.size());
   pyramid->info.channels = channels;
+  pyramid->info.channel = *channel;
   return pyramid;
 }
 

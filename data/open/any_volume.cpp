@@ -1,27 +1,20 @@
 #include "data/open/any_volume.h"
 
-#include <fmt/format.h>
-#include <sys/stat.h>
-#include <xxhash.h>
-
 #include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <memory>
-#include <system_error>
 #include <utility>
 
+#include "common/base/log.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
+#include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace {
-
-bool IsReadWhole(const std::string& path, const ReadOptions& options) {
-  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
-}
 
 // A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
@@ -44,20 +37,6 @@ const SourceContext& ProcessReadContext() {
 
 void SetReadMemory(std::uint64_t process_bytes) { process_memory = process_bytes; }
 
-Result<std::uint64_t> VersionOf(const std::vector<std::string>& files) {
-  std::string text;
-  for (const std::string& file : files) {
-    struct stat found {};
-    if (::stat(file.c_str(), &found) != 0) {
-      const int error = errno;
-      return Status(error == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable,
-                    file + ": " + std::generic_category().message(error));
-    }
-    text += fmt::format("{} {}.{} ", found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec);
-  }
-  return XXH3_64bits(text.data(), text.size());
-}
-
 VolumeFileInfo FileInfoOf(const SourceInfo& source) {
   const VolumeDescription& finest = source.levels.front().description;
   return {.description = finest,
@@ -65,27 +44,45 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .format = source.format,
           .stored_size = finest.geometry.size,
           .steps = StepsOf(finest.geometry.spacing),
-          .labels = source.labels};
+          .labels = source.labels,
+          .channels = source.channels,
+          .channel = source.channel};
+}
+
+void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info) {
+  if (const auto text = ShownChannelText(path, info.channels, info.channel, options)) LogWarning(*text);
+}
+
+bool IsReadWhole(const std::string& path, const ReadOptions& options) {
+  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
 }
 
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
-  if (IsReadWhole(path, options)) return ReadVolume(path, options);
+  if (IsReadWhole(path, options)) {
+    Result<LoadedVolume> loaded = ReadVolume(path, options);
+    if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
+    return loaded;
+  }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();
-  if (options.progress != nullptr) options.progress->Begin(100);
-  int told = 0;
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, [&](int percent) {
-    if (options.progress != nullptr) options.progress->Add(percent - std::exchange(told, percent));
-  });
+  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, options.progress);
   if (!volume.ok()) return volume.status();
-  return LoadedVolume{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  LoadedVolume loaded{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  WarnOfChannel(path, options, loaded.info);
+  return loaded;
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {
   if (IsReadWhole(path, options)) {
     Result<std::vector<std::string>> files = CheckVolumeHeaders(path, options);
-    const bool too_large = files.status().code() == StatusCode::kResourceExhausted;
-    if (!too_large || FindSourceFormat(path, options) == nullptr) return files;
+    if (files.status().code() != StatusCode::kResourceExhausted) return files;
+    // Too large to be held, but perhaps not to be read.
+    if (SliceStream::Recognises(path, options)) {
+      const Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(path, options, nullptr);
+      if (!stream.ok()) return stream.status();
+      return (*stream)->info().files;
+    }
+    if (FindSourceFormat(path, options) == nullptr) return files;
   }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();

@@ -19,16 +19,18 @@ namespace slabstream {
 const SourceContext& ProcessReadContext();
 void SetReadMemory(std::uint64_t process_bytes);
 
-// Of sizes and times of files: the same on every host that sees the same files. NotFound, Unavailable: one cannot be looked at.
-Result<std::uint64_t> VersionOf(const std::vector<std::string>& files);
-
 // Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
 VolumeFileInfo FileInfoOf(const SourceInfo& source);
 
-// ReadVolume, or the finest level of a source.
+// Logs a line if this is one of several channels, and the options do not say which.
+void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info);
+
+// ReadVolume, or the finest level of a source; and WarnOfChannel.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
-// CheckVolumeHeaders, or the files of a source, which it opens.
+// CheckVolumeHeaders, or the files of a source, which it opens, or of a compressed stream, which may be larger than the memory.
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});
+// Whether ReadVolume knows the path; else only a source can be it.
+bool IsReadWhole(const std::string& path, const ReadOptions& options);
 // CheckVolume, or whether a format of sources knows the path.
 Status CheckAnyVolume(const std::string& path, const ReadOptions& options = {});
 bool LooksLikeAnyVolume(const std::string& path);

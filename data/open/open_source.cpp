@@ -5,6 +5,7 @@
 
 #include "data/hdf5/hdf5_format.h"
 #include "data/n5/n5.h"
+#include "data/open/unchanged_source.h"
 #include "data/positional/positional_source.h"
 #include "data/precomputed/precomputed.h"
 #include "data/tiles/tiled_tiff.h"
@@ -32,7 +33,7 @@ Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const 
       return Status::InvalidArgument(path + ": " + std::string(format->name) + " takes no option " + std::string(option.name));
     }
   }
-  return format->open(path, options, context);
+  return OpenUnchanged(path, [&] { return format->open(path, options, context); });
 }
 
 }  // namespace slabstream

@@ -16,7 +16,8 @@ const std::vector<SourceFormat>& SourceFormats();
 // Null: no format knows the path.
 const SourceFormat* FindSourceFormat(const std::string& path, const ReadOptions& options = {});
 
-// Errors of SourceFormat::open; InvalidArgument also for an option that the format does not take, and NotFound if there is no such path.
+// Errors of SourceFormat::open and OpenUnchanged, which says what becomes of a source whose files change; InvalidArgument also for an
+// option that the format does not take, and NotFound if there is no such path.
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context);
 
 }  // namespace slabstream

@@ -9,6 +9,7 @@
 #include "common/base/printable.h"
 #include "data/positional/located_volume.h"
 #include "data/positional/stored_samples.h"
+#include "data/stores/read_threads.h"
 
 namespace slabstream {
 namespace {
@@ -61,12 +62,10 @@ class PositionalSource : public VolumeSource {
   const SourceInfo& info() const override { return info_; }
   Counts counts() const override { return {.stored_bytes = samples_->read_bytes()}; }
 
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     const VolumeDescription& description = info_.levels.front().description;
-    const std::size_t sample_bytes = BytesPerSample(description.type);
     CHECK(level == 0 && !box.empty() && description.geometry.bounds().Contains(box)) << "a box outside the volume";
-    CHECK(out.size() == std::size_t(box.voxel_count()) * sample_bytes) << out.size();
-    const TurnedBox turned{turn_, description.geometry.size, box, out.data()};
+    const TurnedBox turned{turn_, description.geometry.size, box, out};
     const std::vector<Box> parts = samples_->Parts(turned.Stored());
     const std::shared_ptr<Job> job(new Job{samples_, turned, std::move(stop), std::move(done), parts.size()});
     for (const Box& part : parts) {
@@ -88,7 +87,7 @@ class PositionalSource : public VolumeSource {
       job->EndPart();
     };
     try {
-      context->PostDecode([job, part, end] {
+      PostRead([job, part, end] {
         job->Run(part);
         end();
       });

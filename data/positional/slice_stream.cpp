@@ -1,61 +1,105 @@
 #include "data/positional/slice_stream.h"
 
 #include <algorithm>
+#include <array>
 #include <new>
 #include <utility>
 
+#include "common/base/check.h"
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
 #include "data/positional/turned_box.h"
 
 namespace slabstream {
 
-bool SliceStream::Recognises(const std::string& path) { return HasLocatedSamples(path, {}, Packing::kCompressed); }
+bool SliceStream::Recognises(const std::string& path, const ReadOptions& options) {
+  return HasLocatedSamples(path, options, Packing::kCompressed);
+}
 
-Result<SliceStream> SliceStream::Open(const std::string& path, const ReadOptions& options) {
+Result<std::shared_ptr<SliceStream>> SliceStream::Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   Result<LocatedVolume> volume = LocateVolume(path, options, Packing::kCompressed);
   if (!volume.ok()) return Printable(volume.status());
-  return SliceStream(path, *std::move(volume));
+  return std::shared_ptr<SliceStream>(new SliceStream(path, *std::move(volume), options.progress, context));
 }
+
+SliceStream::SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context)
+    : path_(std::move(path)),
+      volume_([&] {
+        Index3 slice = volume.header.size;
+        slice.z = 1;
+        const std::array<int, 3>& from = volume.turn.from;
+        volume.info.levels.front().block = {slice[from[0]], slice[from[1]], slice[from[2]]};
+        return std::move(volume);
+      }()),
+      context_(std::move(context)),
+      progress_(progress) {}
 
 Axis SliceStream::along() const { return kAxes[std::size_t(std::ranges::find(volume_.turn.from, 2) - volume_.turn.from.begin())]; }
 
-Status SliceStream::Read(std::int32_t slices, const Take& take, std::stop_token stop) const {
-  try {
-    return Printable(ReadAll(slices, take, stop));
-  } catch (const std::bad_alloc&) {
-    return Status::ResourceExhausted(path_ + ": its slices do not fit the memory");
-  }
+VolumeSource::Counts SliceStream::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
 }
 
-Status SliceStream::ReadAll(std::int32_t slices, const Take& take, const std::stop_token& stop) const {
-  const RawHeader& header = volume_.header;
-  const VolumeDescription& description = volume_.info.levels.front().description;
-  slices = std::clamp(slices, 1, header.size.z);
-  const auto slice_bytes = std::size_t(header.sample_bytes() / header.size.z),
-             kept_slice_bytes = std::size_t(description.voxel_bytes() / header.size.z);
-  if (Status status = CheckFitsMemory(slices * std::int64_t(slice_bytes + kept_slice_bytes), path_); !status.ok()) return status;
-  AlignedVector<std::byte> stored(std::size_t(slices) * slice_bytes), kept(std::size_t(slices) * kept_slice_bytes);
+void SliceStream::Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) {
+  const VolumeDescription& description = info().levels.front().description;
+  CHECK(level == 0 && !box.empty() && description.geometry.bounds().Contains(box)) << "a box outside the volume";
+  context_->PostDecode([this, box, out, stop = std::move(stop), done = std::move(done)] { done(ReadBox(box, out, stop)); });
+}
 
-  PayloadStream stream(volume_.payload, header.sample_bytes());
-  if (Status status = stream.Open(); !status.ok()) return status;
-  TurnedBox to{.turn = volume_.turn, .size = description.geometry.size, .box = {}, .out = kept.data()};
+Status SliceStream::ReadBox(const Box& box, const BoxRoom& out, const std::stop_token& stop) {
+  const std::lock_guard lock(mutex_);
+  Status status;
+  try {
+    status = Printable(ReadSlices(box, out, stop));
+  } catch (const std::bad_alloc&) {
+    status = Status::ResourceExhausted(path_ + ": its slices do not fit the memory");
+  }
+  if (!status.ok()) stream_.reset();  // the next read begins anew
+  return status;
+}
+
+Status SliceStream::Rewind() {
+  if (progress_ != nullptr && counted_ == 0) progress_->Begin(volume_.header.sample_bytes());
+  stream_ = std::make_unique<PayloadStream>(volume_.payload, volume_.header.sample_bytes());
+  next_ = 0;
+  return stream_->Open();
+}
+
+Status SliceStream::ReadSlices(const Box& box, const BoxRoom& out, const std::stop_token& stop) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;  // stays in a processor's cache between the two steps
+  const RawHeader& header = volume_.header;
+  const std::size_t slice_bytes = std::size_t(header.sample_bytes() / header.size.z), sample_bytes = BytesPerSample(header.type);
   const std::array<std::int64_t, 3> steps = {header.components, std::int64_t{header.components} * header.size.x,
                                              std::int64_t{header.components} * header.size.x * header.size.y};
-  // From the volume's end on, what is left beyond the last multiple comes first.
-  const bool from_end = volume_.turn.flipped[std::size_t(Number(along()))];
-  std::int32_t count = from_end && header.size.z % slices != 0 ? header.size.z % slices : slices;
-  for (std::int32_t z = 0; z < header.size.z; z += count, count = std::min(slices, header.size.z - z)) {
-    if (stop.stop_requested()) return Status::Cancelled(path_ + ": reading was cancelled");
-    const std::span bytes = std::span(stored).first(std::size_t(count) * slice_bytes);
-    if (Status status = stream.Read(bytes); !status.ok()) return status;
-    if (volume_.payload.big_endian) SwapByteOrder(header.type, bytes);
-    const Box part = {{0, 0, z}, {header.size.x, header.size.y, z + count}};
-    to.box = to.Turned(part);
-    to.Fill(part, header.type, stored.data() + std::size_t(volume_.channel) * BytesPerSample(header.type), steps);
-    if (Status status = take(to.box, std::span(kept).first(std::size_t(count) * kept_slice_bytes)); !status.ok()) return status;
+  const TurnedBox to{.turn = volume_.turn, .size = info().levels.front().description.geometry.size, .box = box, .out = out};
+  const Box wanted = to.Stored();
+  if (stream_ == nullptr || next_ > wanted.begin.z) {
+    if (Status status = Rewind(); !status.ok()) return status;
   }
-  return stream.Finish();
+  const auto at_once = std::int32_t(std::clamp<std::size_t>(kPiece / slice_bytes, 1, std::size_t(header.size.z)));
+  if (stored_.empty()) {
+    if (Status status = CheckFitsMemory(at_once * std::int64_t(slice_bytes), path_); !status.ok()) return status;
+    stored_.resize(std::size_t(at_once) * slice_bytes);
+  }
+  while (next_ < wanted.end.z) {
+    if (stop.stop_requested()) return Status::Cancelled(path_ + ": reading was cancelled");
+    const std::int32_t limit = next_ < wanted.begin.z ? wanted.begin.z : wanted.end.z;  // what lies in front of the box is passed over
+    const std::int32_t count = std::min(at_once, limit - next_);
+    const std::span bytes = std::span(stored_).first(std::size_t(count) * slice_bytes);
+    if (Status status = stream_->Read(bytes); !status.ok()) return status;
+    counts_.stored_bytes += bytes.size();
+    if (next_ >= wanted.begin.z) {
+      if (volume_.payload.big_endian) SwapByteOrder(header.type, bytes);
+      const Box part = {{wanted.begin.x, wanted.begin.y, next_}, {wanted.end.x, wanted.end.y, next_ + count}};
+      const auto first = std::size_t(wanted.begin.x * steps[0] + wanted.begin.y * steps[1] + volume_.channel);
+      to.Fill(part, header.type, stored_.data() + first * sample_bytes, steps);
+    }
+    next_ += count;
+    if (progress_ != nullptr && next_ > counted_)
+      progress_->Add(std::int64_t(next_ - std::exchange(counted_, next_)) * std::int64_t(slice_bytes));
+  }
+  return next_ == header.size.z ? stream_->Finish() : Status::Ok();
 }
 
 }  // namespace slabstream

@@ -1,46 +1,56 @@
 // SliceStream: a volume whose samples are one compressed stream (.nii.gz, gzip NRRD, compressed MetaImage, MRC in .gz), which can only be
-// read from its beginning. It is read once, some slices at a time, so that they can be written elsewhere and nobody holds all of them.
+// read from its beginning. As a source it gives any box, but what lies in front of a box is read, too: from the last slice that was read if
+// that lies in front of it, else from the beginning. So read boxes of whole slices in the order of the file (along(), from_end()): then the
+// stream is read once, and nobody holds all of it.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <span>
-#include <stop_token>
+#include <mutex>
 #include <string>
 
+#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
 #include "common/volume/box.h"
 #include "data/positional/located_volume.h"
+#include "data/sources/read_context.h"
+#include "data/sources/source_format.h"
 
 namespace slabstream {
 
-class SliceStream {
+class SliceStream : public VolumeSource {
  public:
   // Whether `path` is such a volume, by its header.
-  static bool Recognises(const std::string& path);
-  // Reads the header. Errors of LocateVolume.
-  static Result<SliceStream> Open(const std::string& path, const ReadOptions& options);
+  static bool Recognises(const std::string& path, const ReadOptions& options = {});
+  // Reads the header. options.progress, if any, must stay as long as this is read; it counts each slice once. Errors of LocateVolume.
+  static Result<std::shared_ptr<SliceStream>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context);
 
-  // Like a source of one level that has all samples.
-  const SourceInfo& info() const { return volume_.info; }
-  // Along which axis of the volume the slices of the file lie.
+  // Along which axis of the volume the slices of the file lie, and whether they begin at its end.
   Axis along() const;
+  bool from_end() const { return volume_.turn.flipped[std::size_t(Number(along()))]; }
 
-  // Some slices, as a box of the volume with its samples, x fastest, of the type that info() says. They are good until it returns.
-  using Take = std::function<Status(const Box& box, std::span<const std::byte> samples)>;
-  // Calls `take` for `slices` slices of the file at a time, until all are read or it fails, which ends this. Boxes lie at multiples of
-  // `slices` and cover the volume, from its beginning or from its end, as the file has them. Memory: those slices as they are stored and as
-  // they are kept. DataLoss: truncated or damaged, which may show only at the end. Cancelled; ResourceExhausted. Waits.
-  Status Read(std::int32_t slices, const Take& take, std::stop_token stop = {}) const;
+  // One level; its block is a slice.
+  const SourceInfo& info() const override { return volume_.info; }
+  // Memory: some slices as they are stored. DataLoss: truncated or damaged; damage may show only with the last slice.
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override;
+  Counts counts() const override;
 
  private:
-  SliceStream(std::string path, LocatedVolume volume) : path_(std::move(path)), volume_(std::move(volume)) {}
-  Status ReadAll(std::int32_t slices, const Take& take, const std::stop_token& stop) const;
+  SliceStream(std::string path, LocatedVolume volume, ReadProgress* progress, SourceContext context);
+  Status ReadBox(const Box& box, const BoxRoom& out, const std::stop_token& stop);
+  Status ReadSlices(const Box& box, const BoxRoom& out, const std::stop_token& stop);
+  Status Rewind();
 
-  std::string path_;
-  LocatedVolume volume_;
+  const std::string path_;
+  const LocatedVolume volume_;
+  const SourceContext context_;
+  mutable std::mutex mutex_;  // guards what follows; held while slices are read
+  ReadProgress* progress_;    // null: nobody asks
+  std::unique_ptr<PayloadStream> stream_;
+  std::int32_t next_ = 0;     // slice of the file
+  std::int32_t counted_ = 0;  // slices that progress_ knows
+  AlignedVector<std::byte> stored_;
+  Counts counts_;
 };
 
 }  // namespace slabstream

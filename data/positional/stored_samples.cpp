@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -70,8 +71,11 @@ bool StoredSamples::CanReadInto(const Box& part, const TurnedBox& to) const {
   const bool kept_as_stored =
       type_ == SampleType::kUint8 || ((type_ == SampleType::kUint16 || type_ == SampleType::kFloat32) && !big_endian_);
   if (!kept_as_stored || voxel_ != sample_ || to.turn != AxisTurn{}) return false;
-  // Whole rows lie in memory as in the file.
-  return RowBytes(part.size()) == row_ || PitchFor(part.size()).row != row_;
+  const Index3 size = part.size();
+  // What ReadRows reads together must not hold what belongs to nobody here.
+  const bool rows_as_in_file = to.out.row * sample_ == row_, slices_as_in_file = to.out.slice * sample_ == slice_;
+  if (RowBytes(size) != row_) return !rows_as_in_file && PitchFor(size).row != row_;
+  return !rows_as_in_file || !slices_as_in_file || size.z == 1 || size.y * row_ == slice_;
 }
 
 std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) const {
@@ -83,8 +87,7 @@ std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) cons
 
 Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
   if (CanReadInto(part, to)) {
-    const Index3 size = to.box.size();
-    return ReadRows(part, to.Place(part, type_), {size.x * sample_, size.x * sample_ * size.y});
+    return ReadRows(part, to.Place(part, type_), {to.out.row * sample_, to.out.slice * sample_});
   }
 
   UnwrittenVector<std::byte> stored(std::size_t(MemoryFor(part, to)));
@@ -95,9 +98,16 @@ Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
   return Status::Ok();
 }
 
-// Where rows or slices lie in memory as far apart as in the file, one read brings all of them.
+// Where rows or slices lie in memory as far apart as in the file, one read brings all of them. One read brings whole rows to any place.
 Status StoredSamples::ReadRows(const Box& part, std::byte* to, const Pitch& pitch) {
   const Index3 size = part.size();
+  if (RowBytes(size) == row_ && pitch.row != row_) {
+    for (std::int32_t z = 0; z < size.z; ++z) {
+      const std::int64_t offset = first_ + (part.begin.z + z) * slice_ + part.begin.y * row_;
+      if (Status status = ReadApart(offset, to + z * pitch.slice, size.y, pitch.row); !status.ok()) return status;
+    }
+    return Status::Ok();
+  }
   const bool rows_joined = pitch.row == row_, slices_joined = rows_joined && pitch.slice == slice_;
   const std::int32_t rows = rows_joined ? size.y : 1, slices = slices_joined ? size.z : 1;
   const std::int64_t bytes = (slices - 1) * slice_ + (rows - 1) * row_ + RowBytes(size);
@@ -110,18 +120,40 @@ Status StoredSamples::ReadRows(const Box& part, std::byte* to, const Pitch& pitc
   return Status::Ok();
 }
 
-Status StoredSamples::ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes) {
-  while (bytes > 0) {
-    const ssize_t got = ::pread(file_.number(), to, std::size_t(bytes), off_t(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return Status::Unavailable(fmt::format("{}: cannot be read: {}", name_, std::generic_category().message(errno)));
-    if (got == 0) return Status::DataLoss(fmt::format("{}: truncated: it has become shorter, and ends before byte {}", name_, offset + 1));
-    read_bytes_ += std::uint64_t(got);
-    to += got;
-    offset += got;
-    bytes -= got;
+// Rows that follow each other in the file.
+Status StoredSamples::ReadApart(std::int64_t offset, std::byte* to, std::int64_t rows, std::int64_t pitch) {
+  constexpr std::int64_t kMostRows = 256;  // of a call; systems take at least 1024 (IOV_MAX)
+  for (std::int64_t done = 0; done < rows * row_;) {
+    // A read may end within a row.
+    const std::int64_t row = done / row_, within = done % row_;
+    std::array<iovec, kMostRows> places;
+    const auto count = std::size_t(std::min(kMostRows, rows - row));
+    for (std::size_t i = 0; i < count; ++i) places.at(i) = {to + (row + std::int64_t(i)) * pitch, std::size_t(row_)};
+    places[0] = {to + row * pitch + within, std::size_t(row_ - within)};
+    const Result<std::int64_t> got = Got(::preadv(file_.number(), places.data(), int(count), off_t(offset + done)), offset + done);
+    if (!got.ok()) return got.status();
+    done += *got;
   }
   return Status::Ok();
+}
+
+Status StoredSamples::ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes) {
+  for (std::int64_t done = 0; done < bytes;) {
+    const Result<std::int64_t> got =
+        Got(::pread(file_.number(), to + done, std::size_t(bytes - done), off_t(offset + done)), offset + done);
+    if (!got.ok()) return got.status();
+    done += *got;
+  }
+  return Status::Ok();
+}
+
+// What the system says of a read at `offset`; 0: it was interrupted.
+Result<std::int64_t> StoredSamples::Got(std::int64_t bytes, std::int64_t offset) {
+  if (bytes < 0 && errno == EINTR) return std::int64_t{0};
+  if (bytes < 0) return Status::Unavailable(fmt::format("{}: cannot be read: {}", name_, std::generic_category().message(errno)));
+  if (bytes == 0) return Status::DataLoss(fmt::format("{}: truncated: it has become shorter, and ends before byte {}", name_, offset + 1));
+  read_bytes_ += std::uint64_t(bytes);
+  return bytes;
 }
 
 }  // namespace slabstream

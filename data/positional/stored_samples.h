@@ -46,7 +46,9 @@ class StoredSamples {
   bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }
   Status ReadRows(const Box& part, std::byte* to, const Pitch& pitch);
+  Status ReadApart(std::int64_t offset, std::byte* to, std::int64_t rows, std::int64_t pitch);
   Status ReadAt(std::int64_t offset, std::byte* to, std::int64_t bytes);
+  Result<std::int64_t> Got(std::int64_t bytes, std::int64_t offset);
 
   const std::string name_;
   const FileDescriptor file_;

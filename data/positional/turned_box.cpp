@@ -27,7 +27,8 @@ Box TurnedBox::Turned(const Box& part) const {
 }
 
 std::byte* TurnedBox::Place(const Box& turned_part, SampleType type) const {
-  return out + NumberIn(box.size(), turned_part.begin - box.begin) * BytesPerSample(KeptTypeOf(type).type);
+  const Index3 offset = turned_part.begin - box.begin;
+  return out.first + (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(BytesPerSample(KeptTypeOf(type).type));
 }
 
 void TurnedBox::Fill(const Box& part, SampleType type, const std::byte* from, const std::array<std::int64_t, 3>& steps) const {
@@ -38,8 +39,7 @@ void TurnedBox::Fill(const Box& part, SampleType type, const std::byte* from, co
     turned_steps[i] = turn.flipped[i] ? -step : step;
     if (turn.flipped[i]) from += step * (turned.size()[int(i)] - 1) * std::int64_t(BytesPerSample(type));
   }
-  const Index3 pitch = box.size();
-  CopySamples(type, from, turned_steps, turned.size(), Place(turned, type), pitch.x, std::int64_t{pitch.x} * pitch.y);
+  CopySamples(type, from, turned_steps, turned.size(), Place(turned, type), out.row, out.slice);
 }
 
 }  // namespace slabstream

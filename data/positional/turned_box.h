@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "common/volume/box.h"
+#include "data/sources/volume_source.h"
 #include "data/volume_io/sample_type.h"
 #include "data/volume_io/world_placement.h"
 
@@ -15,7 +16,7 @@ struct TurnedBox {
   AxisTurn turn;
   Index3 size;  // of the volume
   Box box;
-  std::byte* out = nullptr;  // the samples of the box, x fastest, as CopySamples keeps them
+  BoxRoom out;  // for samples as CopySamples keeps them
 
   Box Stored() const;                 // the box by the axes of the file
   Box Turned(const Box& part) const;  // a part of that, by those of the volume

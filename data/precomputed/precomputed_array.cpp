@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "data/codecs/codecs.h"
+#include "data/metadata/json_fields.h"
 #include "data/precomputed/jpeg_codec.h"
 #include "data/precomputed/segmentation_codec.h"
 #include "data/sources/decode_chunk.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::precomputed {
 namespace {
@@ -51,7 +51,7 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
           fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(begin), scale_.offset[axis] + std::int64_t(end));
     }
     if (scale_.sharding) return ReadFromShard(index, size, std::move(done));
-    const std::string key = zarr::Join(scale_.key, name);
+    const std::string key = metadata::Join(scale_.key, name);
     // CloudVolume gives gzipped files an ending.
     store_->Read(key, {}, MostStored(), [self = shared_from_this(), key, size, done = std::move(done)](Result<Bytes> answer) {
       if (answer.status().code() != StatusCode::kNotFound)
@@ -69,7 +69,7 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
     for (std::size_t axis = 0; axis < 3; ++axis) counts[axis] = (scale_.size[axis] - 1) / scale_.chunk[axis] + 1;
     const std::uint64_t chunk = ChunkNumber({index[3], index[2], index[1]}, counts);
     const ShardPlace place = PlaceOf(*scale_.sharding, chunk);
-    const std::string key = zarr::Join(scale_.key, place.file);
+    const std::string key = metadata::Join(scale_.key, place.file);
     const std::string what = fmt::format("{}/{}: chunk {}", store_->name(), key, chunk);
     constexpr std::uint64_t kEntryBytes = 16;
     auto found_chunk = [self = shared_from_this(), key, size, what, done](Result<std::optional<ByteRange>> range) {

@@ -1,4 +1,5 @@
 #include "data/precomputed/precomputed_pyramid.h"
+#include "data/volume_io/chosen_channel.h"
 
 #include <fmt/format.h>
 
@@ -7,14 +8,13 @@
 #include <utility>
 
 #include "common/base/printable.h"
+#include "data/metadata/json_fields.h"
 #include "data/precomputed/precomputed_array.h"
-#include "data/sources/chosen_channel.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::precomputed {
 namespace {
 
-using zarr::Field;
+using metadata::Field;
 
 constexpr std::uint64_t kMostScales = 64, kMostChannels = 4096;
 
@@ -29,7 +29,7 @@ Status TakeTriple(const Field& list, std::array<T, 3>& triple, Take&& take) {
 }
 
 Status TakeCount(const Field& field, std::uint64_t& count) {
-  const Result<std::uint64_t> whole = field.Whole(1, zarr::kMostElements);
+  const Result<std::uint64_t> whole = field.Whole(1, metadata::kMostElements);
   if (whole.ok()) count = *whole;
   return whole.status();
 }
@@ -37,7 +37,7 @@ Status TakeCount(const Field& field, std::uint64_t& count) {
 Status TakeOffset(const Field& field, std::int64_t& offset) {
   const Result<double> number = field.Number();
   if (!number.ok()) return number.status();
-  if (*number != std::floor(*number) || std::abs(*number) > double(zarr::kMostElements)) return field.Wrong("a whole number");
+  if (*number != std::floor(*number) || std::abs(*number) > double(metadata::kMostElements)) return field.Wrong("a whole number");
   offset = std::int64_t(*number);
   return Status::Ok();
 }
@@ -102,7 +102,7 @@ Result<Scale> ParseScale(const Field& field, SampleType type, std::uint64_t chan
 
 Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptions& options, const SourceContext& context) {
   const std::string object = store->name() + "/" + kInfo;
-  const Result<std::optional<zarr::Json>> json = zarr::ReadJson(*store, kInfo);
+  const Result<std::optional<metadata::Json>> json = metadata::ReadJson(*store, kInfo);
   if (!json.ok()) return json.status();
   if (!json->has_value()) return Status::NotFound(object + ": does not exist");
   const Field info(object, **json);
@@ -127,6 +127,7 @@ Result<Pyramid> OpenPyramid(const std::shared_ptr<Store>& store, const ReadOptio
   Pyramid pyramid{.info = {.format = "Neuroglancer precomputed", .files = {object}, .folder = store->name()}};
   pyramid.info.labels = info["type"].given() && info["type"].value() == "segmentation";
   if (*channels > 1) pyramid.info.channels = names;
+  pyramid.info.channel = *channel;
   pyramid.orientation.world = World::kScene;
   pyramid.orientation.unit = LengthUnit::kNanometre;
   for (std::size_t i = 0; i < scales.size(); ++i) {

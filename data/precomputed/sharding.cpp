@@ -45,14 +45,14 @@ std::uint64_t Murmur(std::uint64_t key) {
 std::uint64_t LowBits(std::uint64_t number, unsigned bits) { return bits >= 64 ? number : number & ((std::uint64_t{1} << bits) - 1); }
 std::uint64_t WithoutLowBits(std::uint64_t number, unsigned bits) { return bits >= 64 ? 0 : number >> bits; }
 
-Status TakeBits(const zarr::Field& field, unsigned most, unsigned& bits) {
+Status TakeBits(const metadata::Field& field, unsigned most, unsigned& bits) {
   const Result<std::uint64_t> number = field.Whole(0, most);
   if (number.ok()) bits = unsigned(*number);
   return number.status();
 }
 
 // One of two names; the second one is true.
-Status TakeName(const zarr::Field& field, std::string_view no, std::string_view yes, bool& value) {
+Status TakeName(const metadata::Field& field, std::string_view no, std::string_view yes, bool& value) {
   if (!field.is_text() || (field.value() != no && field.value() != yes)) return field.Wrong(fmt::format("{} or {}", no, yes));
   value = field.value() == yes;
   return Status::Ok();
@@ -60,11 +60,11 @@ Status TakeName(const zarr::Field& field, std::string_view no, std::string_view 
 
 }  // namespace
 
-Result<Sharding> ParseSharding(const zarr::Field& field) {
+Result<Sharding> ParseSharding(const metadata::Field& field) {
   constexpr unsigned kMostBits = 64, kMostMinishardBits = 32;
   constexpr std::string_view kType = "neuroglancer_uint64_sharded_v1";
   Sharding sharding;
-  const zarr::Field type = field["@type"], index = field["minishard_index_encoding"], data = field["data_encoding"];
+  const metadata::Field type = field["@type"], index = field["minishard_index_encoding"], data = field["data_encoding"];
   if (!type.is_text() || type.value() != kType) return type.Wrong(kType);
   if (Status status = TakeBits(field["preshift_bits"], kMostBits, sharding.preshift_bits); !status.ok()) return status;
   if (Status status = TakeBits(field["minishard_bits"], kMostMinishardBits, sharding.minishard_bits); !status.ok()) return status;
@@ -100,7 +100,7 @@ Result<ByteRange> MinishardRange(const Sharding& sharding, const Bytes& entry) {
   constexpr std::size_t kEntryBytes = 16;
   if (entry.size() != kEntryBytes) return Status::DataLoss("the shard ends within its index");
   const std::uint64_t begin = NumberAt(entry, 0), end = NumberAt(entry, 1);
-  if (end < begin || end - begin > kMostMinishardBytes || begin > zarr::kMostElements) {
+  if (end < begin || end - begin > kMostMinishardBytes || begin > metadata::kMostElements) {
     return Status::DataLoss(fmt::format("the index of the shard is damaged: a minishard lies from {} to {}", begin, end));
   }
   return ByteRange{.begin = sharding.index_bytes() + begin, .bytes = end - begin};
@@ -122,7 +122,7 @@ Result<std::optional<ByteRange>> ChunkRange(const Sharding& sharding, Bytes inde
     begin += NumberAt(index, count + i);
     const std::uint64_t bytes = NumberAt(index, 2 * count + i);
     if (number == chunk) {
-      if (begin > zarr::kMostElements) return Status::DataLoss("the index of a minishard is damaged: a chunk lies behind every end");
+      if (begin > metadata::kMostElements) return Status::DataLoss("the index of a minishard is damaged: a chunk lies behind every end");
       return std::optional(ByteRange{.begin = sharding.index_bytes() + begin, .bytes = bytes});
     }
     begin += bytes;

@@ -9,8 +9,8 @@
 
 #include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "data/metadata/json_fields.h"
 #include "data/stores/store.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::precomputed {
 
@@ -23,7 +23,7 @@ struct Sharding {
 };
 
 // InvalidArgument: not `neuroglancer_uint64_sharded_v1`, or wrong; names the field.
-Result<Sharding> ParseSharding(const zarr::Field& field);
+Result<Sharding> ParseSharding(const metadata::Field& field);
 
 // The number of a chunk: the bits of its place along x, y and z in turn, without those that are 0 in all of a grid of so many chunks
 // (compressed Morton code).

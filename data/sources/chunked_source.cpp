@@ -19,11 +19,11 @@ namespace {
 // A read under way. It ends when all its chunks have been copied or given up.
 class Reading {
  public:
-  Reading(const Box& box, std::span<std::byte> out, std::stop_token stop, VolumeSource::ReadDone done)
+  Reading(const Box& box, const BoxRoom& out, std::stop_token stop, VolumeSource::ReadDone done)
       : box_(box), out_(out), stop_(std::move(stop)), done_(std::move(done)) {}
 
   const Box& box() const { return box_; }
-  std::byte* out() const { return out_.data(); }
+  const BoxRoom& out() const { return out_; }
   // Whether its chunks are still wanted.
   bool goes_on() const { return !failed_ && !stop_.stop_requested(); }
 
@@ -41,7 +41,7 @@ class Reading {
 
  private:
   const Box box_;
-  const std::span<std::byte> out_;
+  const BoxRoom out_;
   const std::stop_token stop_;
   const VolumeSource::ReadDone done_;
   std::atomic<std::int64_t> parts_ = 1;  // that have not ended; one is the search for chunks
@@ -65,6 +65,9 @@ class Level : public std::enable_shared_from_this<Level> {
       chunk_[axis] = a < 0 ? 1 : std::int32_t(std::min(shape.chunk[std::size_t(a)], std::uint64_t(side)));
     }
     counts_ = {(size_.x - 1) / chunk_.x + 1, (size_.y - 1) / chunk_.y + 1, (size_.z - 1) / chunk_.z + 1};
+    std::array<std::byte, sizeof(float)> fill{};
+    CopySamples(shape.type, shape.fill.data(), {0, 0, 0}, {1, 1, 1}, fill.data(), 1, 1);
+    fills_with_zeros_ = std::ranges::all_of(fill, [](std::byte each) { return each == std::byte{0}; });
   }
   ~Level() { context_->cache().Forget(owner_); }
 
@@ -230,6 +233,7 @@ class Level : public std::enable_shared_from_this<Level> {
 
   void Copy(const Index3& chunk, const Bytes& elements, Reading& reading) const {
     if (!reading.goes_on()) return reading.GiveUp();
+    if (elements.empty() && fills_with_zeros_ && reading.out().zeroed) return;
     const ArrayShape& shape = level_.array->shape();
     const Box part = Intersection(BoxOf(chunk), reading.box());
     const std::byte* from = shape.fill.data();
@@ -249,10 +253,11 @@ class Level : public std::enable_shared_from_this<Level> {
       }
       from = elements.span().data() + first * std::int64_t(BytesPerSample(shape.type));
     }
-    const Index3 size = reading.box().size();
-    const std::int64_t place = std::int64_t(NumberIn(size, part.begin - reading.box().begin));
-    CopySamples(shape.type, from, steps, part.size(), reading.out() + place * std::int64_t(BytesPerSample(KeptTypeOf(shape.type).type)),
-                size.x, std::int64_t(size.x) * size.y);
+    const BoxRoom& out = reading.out();
+    const Index3 offset = part.begin - reading.box().begin;
+    const std::int64_t place = offset.x + offset.y * out.row + offset.z * out.slice;
+    CopySamples(shape.type, from, steps, part.size(), out.first + place * std::int64_t(BytesPerSample(KeptTypeOf(shape.type).type)),
+                out.row, out.slice);
   }
 
   Status OutOfMemory(const std::exception& error) const {
@@ -266,6 +271,7 @@ class Level : public std::enable_shared_from_this<Level> {
   const ChunkCache::Owner owner_;
   Index3 chunk_, counts_;             // voxels of a chunk, and chunks, along each axis
   std::vector<std::uint64_t> index_;  // of chunks along the other axes of the array
+  bool fills_with_zeros_ = false;     // where there is no chunk
   std::atomic<std::uint64_t> stored_bytes_ = 0, chunks_ = 0;
   std::mutex mutex_;                                     // guards what follows
   std::unordered_map<std::uint64_t, Readings> flights_;  // who waits, by the number of the chunk
@@ -278,10 +284,9 @@ class ChunkedSource : public VolumeSource {
 
   const SourceInfo& info() const override { return info_; }
 
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     const VolumeDescription& description = info_.levels.at(std::size_t(level)).description;
     CHECK(!box.empty() && description.geometry.bounds().Contains(box));
-    CHECK_EQ(out.size(), std::size_t(box.voxel_count()) * BytesPerSample(description.type));
     const auto reading = std::make_shared<Reading>(box, out, std::move(stop), std::move(done));
     try {
       levels_[std::size_t(level)]->Read(reading);

@@ -18,14 +18,15 @@ class MemorySource : public VolumeSource {
 
   const SourceInfo& info() const override { return info_; }
 
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     CHECK(level == 0 && volume_->block.box.Contains(box));
     if (stop.stop_requested()) return done(Status::Cancelled("reading was stopped"));
     const std::size_t sample = BytesPerSample(volume_->block.type), row = std::size_t(box.size().x) * sample;
-    std::byte* to = out.data();
     for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
-      for (v.y = box.begin.y; v.y < box.end.y; ++v.y, to += row) {
-        std::memcpy(to, volume_->block.bytes.data() + std::size_t(volume_->block.Offset(v)) * sample, row);
+      for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {
+        const std::int64_t place = (v.z - box.begin.z) * out.slice + (v.y - box.begin.y) * out.row;
+        std::memcpy(out.first + place * std::int64_t(sample), volume_->block.bytes.data() + std::size_t(volume_->block.Offset(v)) * sample,
+                    row);
       }
     }
     done(Status::Ok());

@@ -3,13 +3,29 @@
 #include <future>
 #include <utility>
 
+#include "common/base/check.h"
+
 namespace slabstream {
+
+void VolumeSource::Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) {
+  const ScalarType type = info().levels.at(std::size_t(level)).description.type;
+  CHECK_EQ(out.size(), std::size_t(box.voxel_count()) * BytesPerSample(type));
+  Read(level, box, BoxRoom::Dense(box, out.data()), std::move(stop), std::move(done));
+}
 
 Status VolumeSource::ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop) {
   std::promise<Status> end;
   std::future<Status> read = end.get_future();
   Read(level, box, out, std::move(stop), [&end](Status status) { end.set_value(std::move(status)); });
   return read.get();
+}
+
+std::uint64_t VolumeSource::TakeStoredBytes() {
+  const std::uint64_t now = counts().stored_bytes;
+  std::uint64_t taken = taken_bytes_;
+  while (taken < now && !taken_bytes_.compare_exchange_weak(taken, now)) {
+  }
+  return taken < now ? now - taken : 0;
 }
 
 }  // namespace slabstream

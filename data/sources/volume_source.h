@@ -8,6 +8,7 @@
 // Any thread may call a source. It answers on threads of its own (ReadContext).
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -37,10 +38,25 @@ struct SourceInfo {
   std::string file_type;                   // of samples as they are stored: "int16"
   bool labels = false;                     // samples are numbers of structures, not measurements
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
+  int channel = 0;                         // which of them it shows
   int times = 1;                           // that the source holds, of which it shows one
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
+  std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
   std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them
+};
+
+// Where the samples of a box go: x fastest.
+struct BoxRoom {
+  // Without gaps between rows or slices. `out` has room for all samples of the box.
+  static BoxRoom Dense(const Box& box, std::byte* out) {
+    const Index3 size = box.size();
+    return {out, size.x, std::int64_t{size.x} * size.y};
+  }
+
+  std::byte* first = nullptr;       // the sample of the box's first voxel
+  std::int64_t row = 0, slice = 0;  // samples from a voxel to the next along y and z
+  bool zeroed = false;              // all samples are 0 already, so that zeros need not be written
 };
 
 class VolumeSource {
@@ -53,10 +69,13 @@ class VolumeSource {
   virtual const SourceInfo& info() const = 0;
 
   using ReadDone = std::function<void(Status)>;
-  // Fills `out` with the samples of `box`, x fastest: exactly box.voxel_count() of the level's type. `box` is not empty and lies inside the
+  // Fills `out` with the samples of `box`, of the level's type, and writes nothing between its rows. `box` is not empty and lies inside the
   // level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay until then. Once `stop` is told to stop,
   // what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of ChunkedArray::ReadChunk; ResourceExhausted.
-  virtual void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) = 0;
+  virtual void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) = 0;
+
+  // The same without gaps: `out` has exactly box.voxel_count() samples.
+  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done);
 
   // Waits, so not on a thread that decodes.
   Status ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop = {});
@@ -66,6 +85,11 @@ class VolumeSource {
     std::uint64_t stored_bytes = 0, chunks = 0;
   };
   virtual Counts counts() const = 0;
+  // The part of counts().stored_bytes that no call before has returned.
+  std::uint64_t TakeStoredBytes();
+
+ private:
+  std::atomic<std::uint64_t> taken_bytes_ = 0;
 };
 
 }  // namespace slabstream

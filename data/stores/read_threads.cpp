@@ -19,6 +19,8 @@ BackgroundTasks& Threads() {
 
 }  // namespace
 
+void PostRead(std::function<void()> task) { Threads().Post(std::move(task)); }
+
 void ReadOnThread(std::string what, std::function<Result<Bytes>()> read, Store::Done done) {
   struct Task {
     std::string what;
@@ -29,7 +31,7 @@ void ReadOnThread(std::string what, std::function<Result<Bytes>()> read, Store::
   std::shared_ptr<Task> task;
   try {
     task = std::make_shared<Task>(std::move(what), std::move(read), std::move(done));
-    Threads().Post([task] { task->Run(); });
+    PostRead([task] { task->Run(); });
   } catch (...) {
     if (task == nullptr) throw;  // nobody was promised anything yet
     task->done(CurrentFailure(task->what));

@@ -37,7 +37,7 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
 
 }  // namespace
 
-Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int percent)>& tell) {
+Result<Survey> SurveySource(VolumeSource& source, ReadProgress* progress) {
   const std::vector<SourceLevel>& levels = source.info().levels;
   const auto bytes = [&](std::size_t level) { return levels[level].description.voxel_bytes(); };
   std::size_t level = 0;
@@ -49,11 +49,14 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
   const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], kSurveyBytes);
 
   PiecewiseSummary pieces(description);
-  std::size_t done = 0;
-  const auto count = [&] { tell(int(100 * ++done / boxes.size())); };
+  if (progress != nullptr) {
+    std::int64_t expected = 0;
+    for (const Box& box : boxes) expected += box.voxel_count() * std::int64_t(BytesPerSample(description.type));
+    progress->Begin(expected);
+  }
   Status read = ReadPieces(source, int(level), boxes, 1, [&](const VoxelBlock& block) {
     whole ? pieces.Add(block) : pieces.AddSample(block);
-    count();
+    if (progress != nullptr) progress->Add(std::int64_t(block.bytes.size()));
   });
   if (read.ok() && pieces.EndOfPieces()) {
     read = ReadPieces(source, int(level), boxes, 1, [&](const VoxelBlock& block) { pieces.AddAgain(block); });
@@ -62,15 +65,7 @@ Result<Survey> SurveySource(VolumeSource& source, const std::function<void(int p
   return Survey{int(level), !whole, std::make_shared<const VolumeSummary>(pieces.Take())};
 }
 
-VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed) {
-  VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
-  summary.non_finite = surveyed.non_finite;
-  summary.brick_counts = CubesOver(description.geometry.size, kBrick);
-  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
-  return summary;
-}
-
-Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, const std::function<void(int percent)>& tell) {
+Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, ReadProgress* progress) {
   const SourceLevel& of = source.info().levels[std::size_t(level)];
   if (Status fits = CheckFitsMemory(of.description.voxel_bytes(), source.info().format + " volume"); !fits.ok()) return fits;
   auto volume = std::make_shared<Volume>();
@@ -80,12 +75,13 @@ Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level,
   const Index3& size = of.description.geometry.size;
   const std::size_t slice_bytes = std::size_t(size.x) * std::size_t(size.y) * BytesPerSample(of.description.type);
   const std::int32_t step = std::max(of.block.z, std::int32_t(kPieceBytes / std::int64_t(slice_bytes)) / of.block.z * of.block.z);
+  if (progress != nullptr) progress->Begin(of.description.voxel_bytes());
   for (std::int32_t z = 0; z < size.z; z += step) {
     const std::int32_t end = std::min(z + step, size.z);
     const std::span<std::byte> out =
         std::span(volume->block.bytes).subspan(std::size_t(z) * slice_bytes, std::size_t(end - z) * slice_bytes);
     if (Status read = source.ReadNow(level, {{0, 0, z}, {size.x, size.y, end}}, out); !read.ok()) return read;
-    tell(int(100 * std::int64_t{end} / size.z));
+    if (progress != nullptr) progress->Add(std::int64_t(out.size()));
   }
   return std::shared_ptr<const Volume>(std::move(volume));
 }

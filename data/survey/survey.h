@@ -11,13 +11,13 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <stop_token>
 
 #include "common/base/status.h"
 #include "common/volume/summary.h"
 #include "data/sources/volume_source.h"
+#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 
@@ -30,15 +30,10 @@ struct Survey {
   std::shared_ptr<const VolumeSummary> summary;
 };
 
-// `tell`: hears each whole percent, on this thread. Errors of VolumeSource::Read.
-Result<Survey> SurveySource(
-    VolumeSource& source, const std::function<void(int percent)>& tell = [](int) {});
-
-// What is known of a level of which nobody has read all voxels: the statistics of the survey, and bricks of any value.
-VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
+// `progress`, if any, counts what is read, on this thread. Errors of VolumeSource::Read.
+Result<Survey> SurveySource(VolumeSource& source, ReadProgress* progress = nullptr);
 
 // A whole level in memory. ResourceExhausted: it does not fit; errors of VolumeSource::Read.
-Result<std::shared_ptr<const Volume>> ReadLevel(
-    VolumeSource& source, int level, const std::function<void(int percent)>& tell = [](int) {});
+Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, ReadProgress* progress = nullptr);
 
 }  // namespace slabstream

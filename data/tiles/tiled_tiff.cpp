@@ -83,6 +83,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
                   .rescale = header.rescale,
                   .info = {.format = "TIFF", .channels = stack->order.channels, .times = stack->order.times, .files = {path}}};
   if (!stack->order.of_channel) pyramid.info.channels.resize(header.components > 1 ? std::size_t(header.components) : 0);
+  pyramid.info.channel = stack->order.of_channel ? stack->order.channel : stack->of_pages.channel.value_or(0);
   const auto pool = std::make_shared<TiffPool>(std::move(stack->file));
   for (Pictures& level : *levels) {
     const Vec3 size = ToVec3({level.picture.size.x, level.picture.size.y, geometry.size.z});

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/base/parse_number.h"
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/xml_events.h"
 
@@ -96,24 +97,17 @@ Result<PageOrder> ReadOmeHeader(const std::string& path, const std::string& desc
   }
   const Result<std::int64_t> time = ChosenVolume(path, times, options);
   if (!time.ok()) return time.status();
-  std::int64_t channel = 0;
-  if (in_page == 1 && channels > 1) {
-    if (!options.channel || *options.channel < 0 || *options.channel >= channels) {
-      std::string names;
-      for (std::size_t i = 0; i < ome->channels.size(); ++i) {
-        names += fmt::format("{}{}{}", names.empty() ? " (" : ", ", i, ome->channels[i].empty() ? "" : ": " + ome->channels[i]);
-      }
-      return wrong(fmt::format("has {} channels, of which --channel takes one: 0 to {}{}", channels, channels - 1,
-                               names.empty() ? "" : names + ")"));
-    }
-    channel = *options.channel;
-  }
 
   // "XYZCT": z runs fastest from page to page, then c, then t.
   const std::string order = ome->pixels.Attribute("DimensionOrder");
   PageOrder pages_of{.count = slices, .of_channel = in_page == 1 && channels > 1, .spacing = SpacingOf(ome->pixels), .times = int(times)};
   pages_of.channels = ome->channels;
-  if (pages_of.of_channel) pages_of.channels.resize(std::size_t(channels));
+  if (pages_of.of_channel) {
+    pages_of.channels.resize(std::size_t(channels));
+    const Result<int> channel = ChosenChannel(path, pages_of.channels, options);
+    if (!channel.ok()) return channel.status();
+    pages_of.channel = *channel;
+  }
   std::int64_t step = 1;
   for (const char letter : order.substr(std::min<std::size_t>(2, order.size()))) {
     switch (letter) {
@@ -122,7 +116,7 @@ Result<PageOrder> ReadOmeHeader(const std::string& path, const std::string& desc
         step *= slices;
         break;
       case 'C':
-        pages_of.first += channel * step;
+        pages_of.first += pages_of.channel * step;
         step *= channels / in_page;
         break;
       case 'T':

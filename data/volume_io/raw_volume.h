@@ -38,6 +38,9 @@ struct RawHeader {
   SampleType type = SampleType::kUint8;
   ValueMapping rescale;  // from the file's samples to data values
   bool labels = false;   // samples are numbers of structures, not measurements
+  // Of an image: names of its channels, and which of them this is; empty: there is one channel.
+  std::vector<std::string> channels = {};
+  int channel = 0;
 
   // Of all components.
   std::int64_t sample_bytes() const {

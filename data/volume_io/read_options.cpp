@@ -144,8 +144,8 @@ Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text)
 const std::vector<ReadOption>& ReadOptionList() {
   static const std::vector<ReadOption> options = {
       {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime, IsGiven<&ReadOptions::time>},
-      {"channel", "N|luminance", "Which component of a voxel, counted from 0; or the luminance of red, green and blue", SetChannel,
-       IsGiven<&ReadOptions::channel>},
+      {"channel", "N|luminance", "Which channel of an image (default: 0) or component of a voxel; or the luminance of red, green and blue",
+       SetChannel, IsGiven<&ReadOptions::channel>},
       {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing, IsGiven<&ReadOptions::spacing>},
       {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims, IsGiven<&ReadOptions::dims>},
       {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32 or float64", SetType,

@@ -24,6 +24,10 @@ Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& opti
   if (order->of_channel) of_pages.channel.reset();
   Result<RawHeader> header = HeaderOfSlices(path, *first, order->count, BytesOfFile(path), options);
   if (!header.ok()) return header.status();
+  if (order->of_channel) {
+    header->channels = order->channels;
+    header->channel = order->channel;
+  }
   return TiffStack{*std::move(at_first), *std::move(pages), *std::move(order), *std::move(header), std::move(of_pages)};
 }
 

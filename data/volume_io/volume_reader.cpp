@@ -45,6 +45,8 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   info.steps = raw.header.steps;
   info.straightened = placed->slant.has_value();
   info.labels = raw.header.labels;
+  info.channels = std::move(raw.header.channels);
+  info.channel = raw.header.channel;
   info.samples_file = std::move(raw.samples_file);
   VolumeDescription& description = info.description;
   description.geometry = placed->geometry;

@@ -37,9 +37,11 @@ struct VolumeFileInfo {
   // As stored, before they were turned: voxels along each axis, and from a voxel to the next one along it, in the world.
   Index3 stored_size;
   std::array<Vec3, 3> steps;
-  bool straightened = false;           // the stored axes are not at right angles
-  bool labels = false;                 // samples are numbers of structures, not measurements
-  std::filesystem::path samples_file;  // if the samples are in a file of their own
+  bool straightened = false;               // the stored axes are not at right angles
+  bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<std::string> channels = {};  // of an image: names, "" where there is none; empty: there is one channel
+  int channel = 0;                         // which of them it is
+  std::filesystem::path samples_file;      // if the samples are in a file of their own
 };
 
 struct LoadedVolume {

@@ -4,25 +4,13 @@
 
 #include <algorithm>
 
+#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 
 namespace slabstream::zarr {
 namespace {
 
-constexpr std::uint64_t kMostChannels = 65536;  // that ReadOptions::channel can take
-
 Status Wrong(const std::string& array, const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", array, why)); }
-
-Result<std::size_t> ChosenChannel(const std::string& array, std::uint64_t count, const ReadOptions& options, bool any_channel) {
-  if (count > kMostChannels) return Wrong(array, fmt::format("has {} channels, at most {} are supported", count, kMostChannels));
-  if (!options.channel && (count == 1 || any_channel)) return std::size_t{0};
-  const std::string range = count == 1 ? "0" : fmt::format("0 to {}", count - 1);
-  const std::string has = count == 1 ? "has 1 channel" : fmt::format("has {} channels", count);
-  if (!options.channel) return Wrong(array, fmt::format("{}, of which --channel takes one: {}", has, range));
-  if (*options.channel < 0 || std::uint64_t(*options.channel) >= count)
-    return Wrong(array, fmt::format("{}, so channel must be {}", has, range));
-  return std::size_t(*options.channel);
-}
 
 }  // namespace
 
@@ -53,7 +41,7 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 }
 
 Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
-                              const ReadOptions& options, bool any_channel) {
+                              const ReadOptions& options, std::vector<std::string> names) {
   AxisChoice choice{.at = std::vector<std::uint64_t>(kinds.size(), 0)};
   std::uint64_t times = 1, channels = 1;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
@@ -72,14 +60,16 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   if (times > std::uint64_t{kMaxVolumes}) return Wrong(array, fmt::format("has {} times, at most {} are supported", times, kMaxVolumes));
   const Result<std::int64_t> time = ChosenVolume(array, std::int64_t(times), options);
   if (!time.ok()) return time.status();
-  const Result<std::size_t> channel = ChosenChannel(array, channels, options, any_channel);
+  if (channels > kMostChannels) return Wrong(array, fmt::format("has {} channels, at most {} are supported", channels, kMostChannels));
+  names.resize(std::size_t(channels));
+  const Result<int> channel = ChosenChannel(array, names, options);
   if (!channel.ok()) return channel.status();
   choice.times = int(times);
   choice.channels = int(channels);
   choice.channel = *channel;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     if (kinds[axis] == AxisKind::kTime) choice.at[axis] = std::uint64_t(*time);
-    if (kinds[axis] == AxisKind::kChannel) choice.at[axis] = *channel;
+    if (kinds[axis] == AxisKind::kChannel) choice.at[axis] = std::uint64_t(*channel);
   }
   return choice;
 }

@@ -11,6 +11,9 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+using metadata::Json;
+
 template <class T>
 std::optional<T> FloatOf(const std::string& text) {
   using Limits = std::numeric_limits<T>;

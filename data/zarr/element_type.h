@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "data/metadata/json_fields.h"
 #include "data/volume_io/sample_type.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::zarr {
 
@@ -16,12 +16,12 @@ struct ElementType {
 };
 
 // Version 2: as NumPy writes types, such as "<u2". Truth values are 0 and 1 of uint8.
-Result<ElementType> ReadDtype(const Field& dtype);
+Result<ElementType> ReadDtype(const metadata::Field& dtype);
 // Version 3: "uint16".
-Result<SampleType> ReadDataType(const Field& data_type);
+Result<SampleType> ReadDataType(const metadata::Field& data_type);
 
 // One element in this machine's byte order: a number, null (0), true, false; of floats also "NaN", "Infinity", "-Infinity", or their bits
 // in hexadecimal such as "0x7fc00000".
-Result<std::vector<std::byte>> ReadFill(const Field& fill, SampleType type);
+Result<std::vector<std::byte>> ReadFill(const metadata::Field& fill, SampleType type);
 
 }  // namespace slabstream::zarr

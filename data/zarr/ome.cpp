@@ -13,6 +13,8 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+
 constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostTransformations = 8;
 
 // From Zarr 3 on, what OME says has a member of its own.

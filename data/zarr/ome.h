@@ -12,7 +12,7 @@
 #include "common/base/status.h"
 #include "common/volume/orientation.h"
 #include "common/volume/summary.h"
-#include "data/zarr/metadata.h"
+#include "data/metadata/json_fields.h"
 
 namespace slabstream::zarr {
 
@@ -45,10 +45,10 @@ struct OmeImage {
 };
 
 // `attributes`: of a group of that version of Zarr. Whether it is an image.
-bool IsOmeImage(const Field& attributes, int zarr_version);
+bool IsOmeImage(const metadata::Field& attributes, int zarr_version);
 
 // InvalidArgument, naming the field: it is missing, wrong, or something that is not supported.
-Result<OmeImage> ParseOmeImage(const Field& attributes, int zarr_version);
+Result<OmeImage> ParseOmeImage(const metadata::Field& attributes, int zarr_version);
 
 // The axis that a name stands for, in upper or lower case: x, y, z, t, c, time, channel.
 AxisKind AxisNamed(std::string_view name);

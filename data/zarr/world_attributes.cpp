@@ -7,6 +7,8 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+
 Result<Vec3> ReadVector(const Field& field) {
   if (!field.is_array() || field.size() != 3) return field.Wrong("a list of 3 numbers");
   Vec3 vector;

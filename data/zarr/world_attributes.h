@@ -3,13 +3,13 @@
 #pragma once
 
 #include "common/base/status.h"
+#include "data/metadata/json_fields.h"
 #include "data/sources/chunked_source.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::zarr {
 
 // `own`: the attribute "slabstream" of an image; not stated: nothing changes. `pyramid`: its origins are positions in the coordinate system
 // of the image; they become positions in the world. InvalidArgument, naming the field: it is wrong.
-Status PlaceInWorld(const Field& own, Pyramid& pyramid);
+Status PlaceInWorld(const metadata::Field& own, Pyramid& pyramid);
 
 }  // namespace slabstream::zarr

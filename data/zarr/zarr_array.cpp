@@ -12,6 +12,8 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Join;
+
 constexpr std::uint64_t kIndexBytes = std::uint64_t{32} << 20;  // of shards' indices, for each source
 
 // Codecs may make bytes that they cannot pack a little longer.

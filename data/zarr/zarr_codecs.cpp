@@ -13,6 +13,8 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+
 struct NamedCodec {
   std::string_view name;
   SharedCodec (*make)();

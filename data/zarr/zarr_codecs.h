@@ -8,21 +8,21 @@
 
 #include "common/base/status.h"
 #include "data/codecs/codecs.h"
+#include "data/metadata/json_fields.h"
 #include "data/volume_io/sample_type.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::zarr {
 
 // Version 2: a compressor or filter, {"id": "zlib", ...}.
-Result<SharedCodec> ReadCompressor(const Field& compressor);
-Result<SharedCodec> ReadFilter(const Field& filter);
+Result<SharedCodec> ReadCompressor(const metadata::Field& compressor);
+Result<SharedCodec> ReadFilter(const metadata::Field& filter);
 
 // Version 3: a list of codecs, as far as they concern the elements of one chunk.
 struct CodecList {
-  std::vector<std::size_t> order;  // axis i of what is stored is the axis order[i] of what goes in
-  std::optional<Field> sharding;   // the configuration of sharding_indexed, which comes last
-  CodecChain chain;                // what is done to bytes
+  std::vector<std::size_t> order;           // axis i of what is stored is the axis order[i] of what goes in
+  std::optional<metadata::Field> sharding;  // the configuration of sharding_indexed, which comes last
+  CodecChain chain;                         // what is done to bytes
 };
-Result<CodecList> ReadCodecList(const Field& codecs, std::size_t axes, SampleType type);
+Result<CodecList> ReadCodecList(const metadata::Field& codecs, std::size_t axes, SampleType type);
 
 }  // namespace slabstream::zarr

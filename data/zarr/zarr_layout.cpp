@@ -18,6 +18,8 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+
 template <class T>
 std::vector<T> Reordered(const std::vector<T>& of_axes, const std::vector<std::size_t>& from) {
   std::vector<T> reordered;

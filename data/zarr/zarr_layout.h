@@ -13,8 +13,8 @@
 
 #include "common/base/status.h"
 #include "data/codecs/codec.h"
+#include "data/metadata/json_fields.h"
 #include "data/sources/chunked_array.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::zarr {
 
@@ -50,7 +50,7 @@ struct ZarrLayout {
 };
 
 // InvalidArgument, naming the field: it is missing, wrong, or something that is not supported.
-Result<ZarrLayout> ParseLayout2(const Field& metadata);
-Result<ZarrLayout> ParseLayout3(const Field& metadata);
+Result<ZarrLayout> ParseLayout2(const metadata::Field& metadata);
+Result<ZarrLayout> ParseLayout3(const metadata::Field& metadata);
 
 }  // namespace slabstream::zarr

@@ -5,6 +5,11 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+using metadata::Join;
+using metadata::Json;
+using metadata::ReadJson;
+
 Result<std::optional<ZarrNode>> ReadNode3(Store& store, const std::string& path) {
   const std::string key = Join(path, kNode3);
   Result<std::optional<Json>> metadata = ReadJson(store, key);

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "data/metadata/json_fields.h"
 #include "data/stores/store.h"
-#include "data/zarr/metadata.h"
 
 namespace slabstream::zarr {
 
@@ -16,15 +16,17 @@ struct ZarrNode {
   std::string path;           // in the store; "": its root
   int version = 3;            // of Zarr: 2 or 3
   bool array = false;         // else a group
-  Json metadata;              // of version 2: of an array .zarray, of a group nothing
+  metadata::Json metadata;    // of version 2: of an array .zarray, of a group nothing
   std::string metadata_name;  // of the store and the object: "/data/scan.zarr/0/zarr.json"
-  Json attributes;
+  metadata::Json attributes;
   std::string attributes_name;
   std::vector<std::string> keys = {};  // of the objects that were read
 
-  Field metadata_field() const { return {metadata_name, metadata}; }
+  metadata::Field metadata_field() const { return {metadata_name, metadata}; }
   // Of version 3 they are a member of the metadata, so their place in messages is "attributes".
-  Field attributes_field() const { return version == 3 ? metadata_field()["attributes"] : Field(attributes_name, attributes); }
+  metadata::Field attributes_field() const {
+    return version == 3 ? metadata_field()["attributes"] : metadata::Field(attributes_name, attributes);
+  }
 };
 
 // nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read. Waits.

@@ -17,6 +17,9 @@
 namespace slabstream::zarr {
 namespace {
 
+using metadata::Field;
+using metadata::Join;
+
 std::string NameOf(const Store& store, const std::string& path) { return path.empty() ? store.name() : store.name() + "/" + path; }
 
 // The node that a volume is read from, and the objects that were read to find it.
@@ -126,11 +129,12 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   if (!names.ok()) return names.status();
   const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(name, *names, options);
   if (!kinds.ok()) return kinds.status();
-  const Result<AxisChoice> choice = ChooseAxes(name, *kinds, SizesInMetadata(*array), options, false);
+  const Result<AxisChoice> choice = ChooseAxes(name, *kinds, SizesInMetadata(*array), options);
   if (!choice.ok()) return choice.status();
   Pyramid pyramid;
   pyramid.info = {.format = fmt::format("Zarr {}", node.version), .times = choice->times};
   if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
+  pyramid.info.channel = choice->channel;
   pyramid.levels.push_back(LevelOf(*array, *choice));
   if (options.spacing) pyramid.levels.back().spacing = *options.spacing;
   return pyramid;
@@ -190,6 +194,8 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   if (options.spacing) return Status::InvalidArgument(name + ": states its spacing, so it takes no option spacing");
   std::vector<AxisKind> kinds;
   for (const OmeAxis& axis : image->axes) kinds.push_back(axis.kind);
+  std::vector<std::string> names;
+  for (const OmeChannel& channel : image->channels) names.push_back(channel.name);
 
   Pyramid pyramid;
   AxisChoice choice;
@@ -207,7 +213,7 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
       return Status::InvalidArgument(
           fmt::format("{}: has {} axes, must have {} as its image", array_name, sizes.back().size(), kinds.size()));
     }
-    const Result<AxisChoice> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, true);
+    const Result<AxisChoice> chosen = ChooseAxes(array_name, kinds, sizes.back(), options, names);
     if (!chosen.ok()) return chosen.status();
     if (sizes.size() == 1) choice = *chosen;
     pyramid.levels.push_back(LevelOf(*array, *chosen));
@@ -216,11 +222,14 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   if (Status status = PlaceInWorld(node.attributes_field()["slabstream"], pyramid); !status.ok()) return status;
 
   SourceInfo& info = pyramid.info;
-  info = {.format = "OME-Zarr " + image->version, .labels = image->labels, .times = choice.times};
-  const bool named = choice.channel < image->channels.size();
-  if (choice.channels > 1 || (named && !image->channels.front().name.empty())) info.channels.resize(std::size_t(choice.channels));
-  for (std::size_t i = 0; i < std::min(info.channels.size(), image->channels.size()); ++i) info.channels[i] = image->channels[i].name;
-  if (named) info.window = image->channels[choice.channel].window;
+  info = {.format = "OME-Zarr " + image->version, .labels = image->labels, .channel = choice.channel, .times = choice.times};
+  const auto channel = std::size_t(choice.channel);
+  const bool described = channel < image->channels.size();
+  if (choice.channels > 1 || (described && !names.front().empty())) {
+    info.channels = names;
+    info.channels.resize(std::size_t(choice.channels));
+  }
+  if (described) info.window = image->channels[channel].window;
   return pyramid;
 }
 

@@ -90,7 +90,7 @@ Json ArrayV3(const ZarrLayout& layout, const WrittenLevel& level) {
 std::string_view ToString(OmeZarrVersion version) { return version == OmeZarrVersion::k04 ? "0.4" : "0.5"; }
 
 Index3 ShardOf(const ZarrLayout& layout, const WrittenLevel& level) {
-  return Min(Uniform(layout.shard_side), layout.chunk_side * CubesOver(level.size, layout.chunk_side));
+  return Min(layout.shard, layout.chunk_side * CubesOver(level.size, layout.chunk_side));
 }
 
 std::vector<MetadataFile> OmeMetadata(const ZarrLayout& layout, const std::vector<WrittenLevel>& levels, const std::string& name,

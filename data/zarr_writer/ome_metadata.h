@@ -27,8 +27,9 @@ std::string_view ToString(OmeZarrVersion version);  // "0.4"
 struct ZarrLayout {
   OmeZarrVersion version = OmeZarrVersion::k05;
   SampleType type = SampleType::kUint8;
-  std::int32_t chunk_side = 64, shard_side = 256;  // elements; the second one of version 0.5
-  int codec_level = 3;                             // of zstd
+  std::int32_t chunk_side = 64;    // elements
+  Index3 shard = {256, 256, 256};  // elements: multiples of chunk_side; of version 0.5
+  int codec_level = 3;             // of zstd
 };
 
 // Side of a shard of a level along an axis: no longer than the chunks that hold all of it.

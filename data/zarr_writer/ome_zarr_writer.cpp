@@ -33,6 +33,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kConversion = ".slabstream-conversion";
 
+std::int32_t CoarsestSide(const OmeZarrOptions& options) { return options.coarsest_side > 0 ? options.coarsest_side : options.chunk_side; }
+
 Status CheckOptions(const OmeZarrOptions& options) {
   const auto check = [](const char* name, std::int64_t value, std::int64_t least, std::int64_t most) {
     if (value >= least && value <= most) return Status::Ok();
@@ -40,7 +42,7 @@ Status CheckOptions(const OmeZarrOptions& options) {
   };
   for (const Status& status :
        {check("chunk side", options.chunk_side, 8, 512), check("shard side", options.shard_side, options.chunk_side, 4096),
-        check("codec level", options.codec_level, 1, 19)}) {
+        check("coarsest side", CoarsestSide(options), 8, 512), check("codec level", options.codec_level, 1, 19)}) {
     if (!status.ok()) return status;
   }
   if (options.shard_side % options.chunk_side != 0 || options.shard_side % 2 != 0) {
@@ -99,15 +101,30 @@ struct Elements {
   }
 };
 
+// A cube, or a slab of slices. Even along each axis that is halved, so that no voxel of a coarser level lies in two of them.
+Index3 ShardFor(const OmeZarrOptions& options, const Index3& size) {
+  if (!options.slices) return Uniform(options.shard_side);
+  Index3 shard = options.chunk_side * CubesOver(size, options.chunk_side);
+  shard[options.slices->along] = options.chunk_side * (options.chunk_side % 2 == 0 ? 1 : 2);
+  return shard;
+}
+
+ZarrObjects ObjectsFor(const SourceInfo& source, const std::string& folder, const OmeZarrOptions& options) {
+  const VolumeGeometry& geometry = source.levels.front().description.geometry;
+  const ZarrLayout layout = {options.version, Elements::Of(source).type, options.chunk_side, ShardFor(options, geometry.size),
+                             options.codec_level};
+  return {folder, layout, PlanLevels(geometry, CoarsestSide(options))};
+}
+
 // What decides the bytes that are written.
-std::string Description(const VolumeSource& source, const OmeZarrOptions& options, const std::vector<MetadataFile>& metadata,
-                        const std::optional<FileStamp>& stamp) {
+std::string Description(const VolumeSource& source, const OmeZarrOptions& options, const Index3& shard,
+                        const std::vector<MetadataFile>& metadata, const std::optional<FileStamp>& stamp) {
   nlohmann::ordered_json files;
   for (const MetadataFile& file : metadata) files[file.key] = file.text;
   const nlohmann::ordered_json all = {{"source", options.source},
                                       {"format", source.info().format},
                                       {"stamp", stamp ? stamp->digest : 0},
-                                      {"region", options.shard_side},
+                                      {"region", {shard.x, shard.y, shard.z}},
                                       {"metadata", files}};
   return all.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
@@ -177,20 +194,28 @@ struct Step {
 
 // Adds the steps to a region: all regions that are not finished, and those that are finished and needed for them; each behind those that it
 // is made of.
-void AddSteps(const ZarrObjects& objects, const ZarrRegion& region, std::vector<Step>& steps) {
+void AddSteps(const ZarrObjects& objects, const ZarrRegion& region, bool from_end, std::vector<Step>& steps) {
   if (objects.IsFinished(region)) return steps.push_back({region, true});
   if (region.level > 0) {
     const Index3& step = objects.levels()[std::size_t(region.level)].step;
-    for (std::int32_t z = 0; z < step.z; ++z) {
-      for (std::int32_t y = 0; y < step.y; ++y) {
-        for (std::int32_t x = 0; x < step.x; ++x) {
-          const ZarrRegion part = {region.level - 1, step * region.index + Index3{x, y, z}};
-          if (!objects.BoxOf(part).empty()) AddSteps(objects, part, steps);
-        }
-      }
+    const std::size_t count = CountIn(step);
+    for (std::size_t i = 0; i < count; ++i) {
+      const ZarrRegion part = {region.level - 1, step * region.index + PlaceIn(step, from_end ? count - 1 - i : i)};
+      if (!objects.BoxOf(part).empty()) AddSteps(objects, part, from_end, steps);
     }
   }
   steps.push_back({region, false});
+}
+
+// Of all levels. Those of the first one come in the order of slices, if there is one.
+std::vector<Step> StepsFor(const ZarrObjects& objects, const std::optional<SliceOrder>& slices) {
+  const bool from_end = slices && slices->from_end;
+  const int last = int(objects.levels().size()) - 1;
+  const Index3 counts = objects.RegionsOf(last);
+  const std::size_t count = CountIn(counts);
+  std::vector<Step> steps;
+  for (std::size_t i = 0; i < count; ++i) AddSteps(objects, {last, PlaceIn(counts, from_end ? count - 1 - i : i)}, from_end, steps);
+  return steps;
 }
 
 // Reads regions of level 0, one of them ahead if there is memory for it.
@@ -206,7 +231,10 @@ class Reader {
 
   // The samples of a step that is not finished.
   Status Read(std::size_t step, AlignedVector<std::byte>& samples) {
-    if (!read_.valid()) Begin(step);
+    if (!read_.valid()) {
+      samples.swap(buffer_);  // what it holds is not needed any more, so there is one buffer
+      Begin(step);
+    }
     if (Status status = read_.get(); !status.ok()) return status;
     samples.swap(buffer_);
     if (ahead_) {
@@ -236,14 +264,18 @@ class Reader {
   std::future<Status> read_;
 };
 
-// Bytes of the largest region of each level.
-std::vector<std::uint64_t> RegionBytes(const ZarrObjects& objects) {
-  std::vector<std::uint64_t> bytes;
-  for (int level = 0; level < int(objects.levels().size()); ++level) bytes.push_back(objects.BytesOf({level, {0, 0, 0}}));
+// For a region of each level.
+std::uint64_t LeastMemory(const ZarrObjects& objects) {
+  std::uint64_t bytes = objects.memory();
+  for (int level = 0; level < int(objects.levels().size()); ++level) bytes += objects.BytesOf({level, {0, 0, 0}});
   return bytes;
 }
 
 }  // namespace
+
+std::uint64_t LeastMemoryFor(const SourceInfo& source, const OmeZarrOptions& options) {
+  return LeastMemory(ObjectsFor(source, "", options));
+}
 
 Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const OmeZarrOptions& options) {
   if (Status status = CheckOptions(options); !status.ok()) return status;
@@ -252,19 +284,17 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
   const SourceInfo& info = source.info();
   const VolumeGeometry& geometry = info.levels[0].description.geometry;
   const Elements elements = Elements::Of(info);
-  const ZarrLayout layout = {options.version, elements.type, options.chunk_side, options.shard_side, options.codec_level};
-  const ZarrObjects objects(folder, layout, PlanLevels(geometry, options.chunk_side));
+  const ZarrObjects objects = ObjectsFor(info, folder, options);
+  const ZarrLayout& layout = objects.layout();
   const int levels = int(objects.levels().size());
 
-  // A region of each level, and one more of level 0 if there is room: then it is read while the one before it is compressed.
-  const std::vector<std::uint64_t> region_bytes = RegionBytes(objects);
-  std::uint64_t needed = objects.memory();
-  for (const std::uint64_t bytes : region_bytes) needed += bytes;
+  // One more region of level 0 if there is room: then it is read while the one before it is compressed.
+  const std::uint64_t needed = LeastMemory(objects);
   if (needed > options.memory) {
     return Status::ResourceExhausted(
         fmt::format("writing '{}' needs {} of memory, but only {} are given", folder, MemoryText(needed), MemoryText(options.memory)));
   }
-  const bool ahead = options.memory - needed >= region_bytes[0];
+  const bool ahead = options.memory - needed >= objects.BytesOf({0, {0, 0, 0}});
 
   std::optional<FileStamp> stamp;
   if (!info.files.empty()) {
@@ -275,11 +305,10 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
   const std::string name = fs::path(folder).stem().stem().string();
   const std::vector<MetadataFile> metadata =
       OmeMetadata(layout, objects.levels(), name, geometry.orientation, elements.mapping, info.labels);
-  const Result<Target> target = Target::Open(folder, Description(source, options, metadata, stamp));
+  const Result<Target> target = Target::Open(folder, Description(source, options, layout.shard, metadata, stamp));
   if (!target.ok()) return target.status();
 
-  std::vector<Step> steps;
-  AddSteps(objects, {levels - 1, {0, 0, 0}}, steps);
+  const std::vector<Step> steps = StepsFor(objects, options.slices);
   OmeZarrProgress progress;
   for (const WrittenLevel& level : objects.levels()) progress.all_bytes += CountIn(level.size) * BytesPerSample(layout.type);
   progress.done_bytes = progress.all_bytes;
@@ -296,7 +325,7 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
     if (options.stop.stop_requested()) return Status::Cancelled(fmt::format("writing '{}' was stopped", folder));
     AlignedVector<std::byte>& buffer = buffers[std::size_t(region.level)];
     if (finished) {
-      if (region.level == levels - 1) break;  // nobody needs it
+      if (region.level == levels - 1) continue;  // nobody needs it
       buffer.resize(objects.BytesOf(region));
       if (Status status = objects.Read(region, buffer.data()); !status.ok()) return status;
     } else {

@@ -10,10 +10,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 
 #include "common/base/status.h"
+#include "common/math/vec.h"
 #include "data/sources/volume_source.h"
 #include "data/zarr_writer/ome_metadata.h"
 
@@ -24,16 +26,29 @@ struct OmeZarrProgress {
   int level = 0;                                // of the region that was finished last
 };
 
+// A source that is read once, slice by slice.
+struct SliceOrder {
+  Axis along = Axis::kZ;  // the slices lie one after the other along it
+  bool from_end = false;  // the last one comes first
+};
+
 struct OmeZarrOptions {
   OmeZarrVersion version = OmeZarrVersion::k05;
   std::int32_t chunk_side = 64;   // voxels, [8, 512]
   std::int32_t shard_side = 256;  // voxels: a multiple of chunk_side, even, at most 4096. In version 0.4: what is written at a time
-  int codec_level = 3;            // of zstd, [1, 19]
+  // The source is read in this order. A shard is then a slab of as many slices as a chunk has, and shard_side says nothing.
+  std::optional<SliceOrder> slices = {};
+  std::int32_t coarsest_side = 0;                 // the last level is no longer than this along any axis, [8, 512]; 0: chunk_side
+  int codec_level = 3;                            // of zstd, [1, 19]
   std::uint64_t memory = std::uint64_t{1} << 30;  // bytes, beside what the source takes
   std::string source;                             // what the user calls it: another one does not go on with its conversion
   std::stop_token stop;
   std::function<void(const OmeZarrProgress&)> progress;  // called first, and after each region, on the calling thread
 };
+
+// Bytes of memory that WriteOmeZarr takes at least, beside what the source takes. More than that is used to read ahead. The options are
+// right.
+std::uint64_t LeastMemoryFor(const SourceInfo& source, const OmeZarrOptions& options);
 
 // Level 0 is that of the source; the others are made here (PlanLevels, Reduce). `folder` is made; it may be there if it is empty or holds
 // an unfinished conversion of the same source with the same layout. InvalidArgument: an option is out of range; the folder holds something

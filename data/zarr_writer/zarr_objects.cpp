@@ -152,8 +152,13 @@ ZarrObjects::ZarrObjects(std::string folder, const ZarrLayout& layout, std::vect
     : folder_(std::move(folder)), layout_(layout), levels_(std::move(levels)) {}
 
 Box ZarrObjects::BoxOf(const ZarrRegion& region) const {
-  const Index3 begin = layout_.shard_side * region.index;
-  return {begin, Min(begin + Uniform(layout_.shard_side), levels_[std::size_t(region.level)].size)};
+  const Index3 begin = layout_.shard * region.index;
+  return {begin, Min(begin + layout_.shard, levels_[std::size_t(region.level)].size)};
+}
+
+Index3 ZarrObjects::RegionsOf(int level) const {
+  const Index3& size = levels_[std::size_t(level)].size;
+  return (size + layout_.shard - Uniform(1)) / layout_.shard;
 }
 
 std::uint64_t ZarrObjects::BytesOf(const ZarrRegion& region) const {
@@ -175,7 +180,7 @@ std::uint64_t ZarrObjects::memory() const {
 bool ZarrObjects::IsFinished(const ZarrRegion& region) const {
   std::error_code error;
   if (layout_.version == OmeZarrVersion::k05) return std::filesystem::is_regular_file(FileOf(region.level, region.index), error);
-  const Index3 counts = ChunksOf(region), first = layout_.shard_side / layout_.chunk_side * region.index;
+  const Index3 counts = ChunksOf(region), first = layout_.shard / layout_.chunk_side * region.index;
   for (std::size_t i = 0; i < CountIn(counts); ++i) {
     if (!std::filesystem::is_regular_file(FileOf(region.level, first + Along(counts, i)), error)) return false;
   }
@@ -235,7 +240,7 @@ Status ZarrObjects::WriteShard(const ZarrRegion& region, const std::byte* elemen
 }
 
 Status ZarrObjects::WriteChunks(const ZarrRegion& region, const std::byte* elements) const {
-  const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard_side / layout_.chunk_side * region.index;
+  const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard / layout_.chunk_side * region.index;
   FirstFailure failure;
   tbb::parallel_for(std::size_t{0}, CountIn(counts), [&](std::size_t number) {
     if (failure.any()) return;
@@ -289,7 +294,7 @@ Status ZarrObjects::ReadShard(const ZarrRegion& region, std::byte* elements) con
 }
 
 Status ZarrObjects::ReadChunks(const ZarrRegion& region, std::byte* elements) const {
-  const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard_side / layout_.chunk_side * region.index;
+  const Index3 size = BoxOf(region).size(), counts = ChunksOf(region), first = layout_.shard / layout_.chunk_side * region.index;
   FirstFailure failure;
   tbb::parallel_for(std::size_t{0}, CountIn(counts), [&](std::size_t number) {
     const Index3 chunk = Along(counts, number);

@@ -1,5 +1,5 @@
 // The objects that hold the elements of an image's levels: chunks as files of their own (Zarr v2), or shards of chunks with an index behind
-// them (Zarr v3). A writer deals in regions, cubes of ZarrLayout::shard_side voxels: one shard, or the chunks in its place.
+// them (Zarr v3). A writer deals in regions of the size of ZarrLayout::shard: one shard, or the chunks in its place.
 //
 // Each file is written whole or not at all, so one that is there is finished. Chunks of zeros alone are left out of shards.
 #pragma once
@@ -17,14 +17,16 @@ namespace slabstream {
 
 struct ZarrRegion {
   int level = 0;
-  Index3 index;  // of the cube
+  Index3 index;  // of the region, from 0 along each axis
 };
 
 class ZarrObjects {
  public:
   ZarrObjects(std::string folder, const ZarrLayout& layout, std::vector<WrittenLevel> levels);
 
+  const ZarrLayout& layout() const { return layout_; }
   const std::vector<WrittenLevel>& levels() const { return levels_; }
+  Index3 RegionsOf(int level) const;                      // along each axis
   Box BoxOf(const ZarrRegion& region) const;              // voxels
   std::uint64_t BytesOf(const ZarrRegion& region) const;  // of their elements
 

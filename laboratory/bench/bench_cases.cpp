@@ -7,6 +7,7 @@
 
 #include "client/cli/input_volume.h"
 #include "client/request/volume_argument.h"
+#include "data/open/any_volume.h"
 
 namespace slabstream {
 namespace {
@@ -38,7 +39,8 @@ std::string SphereName(const SphereRequest& sphere) {
 // "volumes/head.nii.gz" is "head", as in the catalogue of a service.
 std::string Stem(const std::string& path) {
   const std::filesystem::path name = std::filesystem::path(path).lexically_normal().filename();
-  const std::filesystem::path stem = name.extension() == ".gz" ? name.stem().stem() : name.stem();
+  const bool two_endings = name.extension() == ".gz" || name.stem().extension() == ".ome";  // .nii.gz, .ome.zarr
+  const std::filesystem::path stem = two_endings ? name.stem().stem() : name.stem();
   return stem.empty() ? "volume" : stem.string();
 }
 
@@ -102,7 +104,7 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   if (!at_service) {
     const Result<SourceText> source = ParseSourceText(argument->volume);
     if (!source.ok()) return Status(source.status().code(), "CASE " + source.status().message());
-    const Status known = CheckVolume(source->path, source->options);
+    const Status known = CheckAnyVolume(source->path, source->options);
     if (known.code() == StatusCode::kNotFound) {
       return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
     }

@@ -30,7 +30,8 @@ from .local import shutdown
 from .presets import presets
 from .probe import Histogram, Label, Sample
 from .service import Service, connect
-from .status import Dataset, Status, Worker
+from .sources import Level, Source, open
+from .status import Dataset, DatasetLevel, Status, Worker
 from .transfer import TransferFunction
 from .viewer import Viewer
 
@@ -40,6 +41,7 @@ __all__ = [
     "Cancelled",
     "DataLoss",
     "Dataset",
+    "DatasetLevel",
     "DeadlineExceeded",
     "Frame",
     "Geometry",
@@ -48,12 +50,14 @@ __all__ = [
     "Internal",
     "InvalidArgument",
     "Label",
+    "Level",
     "NotFound",
     "Progress",
     "ResourceExhausted",
     "Sample",
     "Service",
     "SlabstreamError",
+    "Source",
     "Statistics",
     "Status",
     "TransferFunction",
@@ -64,6 +68,7 @@ __all__ = [
     "Worker",
     "connect",
     "load",
+    "open",
     "presets",
     "render",
     "show",

@@ -113,6 +113,8 @@ _MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
 def _text(option: Option, value: Any) -> str:
     if option.choices:
         values.choice(option.name, value, option.choices)
+    if isinstance(value, int) and not isinstance(value, bool):
+        value = str(value)  # level=2
     if not isinstance(value, str) or not 1 <= len(value.encode()) <= values.MOST_NAME_BYTES:
         raise InvalidArgument(f"{option.name} {value!r} must be a text of 1 to {values.MOST_NAME_BYTES} bytes")
     return value
@@ -125,10 +127,10 @@ def _scalar(field: FieldDescriptor, option: Option, value: Any) -> Any:
         return values.flag(option.name, value)
     if field.cpp_type == FieldDescriptor.CPPTYPE_STRING:
         return _text(option, value)
+    if value == "auto" and (option.type or "").endswith("|auto"):
+        return 0  # left to the service
     if field.cpp_type in (FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT):
         return values.number(option.name, value, option.least, option.most, option.above)
-    if value == option.default == "auto":
-        return 0
     return values.integer(option.name, value, int(option.least), int(option.most))
 
 

@@ -67,6 +67,10 @@ class Statistics:
     frame_seconds: float         # from the plan to the last byte at the coordinator
     latency_seconds: float       # from submit() to the last byte here
     worker_seconds: dict[str, float]  # worker time by stage, summed over all of them
+    levels: tuple[int, ...]      # that the picture was drawn from; 0 is the finest
+    voxel_bytes: int             # that workers received for it
+    stored_bytes: int            # that were read from the dataset's source for it, as they are stored
+    lowered: str                 # with detail="auto": which coarser level was drawn, and why; else empty
     message: Any = dataclasses.field(repr=False)  # FrameStatistics of the wire, with the reports of all ranks
 
 
@@ -114,6 +118,10 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
         frame_seconds=(message.end_ns - message.begin_ns) * 1e-9,
         latency_seconds=latency_seconds,
         worker_seconds=stages,
+        levels=tuple(use.level for use in message.levels),
+        voxel_bytes=sum(report.voxel_bytes for report in message.reports),
+        stored_bytes=sum(report.stored_bytes for report in message.reports),
+        lowered=message.lowered,
         message=message,
     )
 

@@ -77,7 +77,7 @@ def _is_path(volume: Any) -> bool:
     return isinstance(volume, (str, os.PathLike))
 
 
-def _path_text(path: Any, what: str) -> str:
+def path_text(path: Any, what: str) -> str:
     """Absolute; options for reading may stand behind a question mark."""
     text = str(os.fspath(path))
     file = text if os.path.exists(text) else text.partition("?")[0]
@@ -122,7 +122,7 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
 
     try:
         if _is_path(volume):
-            text = _path_text(volume, "volume")
+            text = path_text(volume, "volume")
             for field, value in (("origin", origin), ("direction", direction), ("world", world)):
                 if value is not None:
                     raise InvalidArgument(f"{field} is for arrays; files state their own")
@@ -135,7 +135,7 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
             text = written(checked)
         for what, layer in (("labels", labels), ("overlay", overlay)):
             if layer is not None:
-                path = _path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
+                path = path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
                 text += f",{what}={path}"
         where.add_data(f"{name}={text}")
     except BaseException:

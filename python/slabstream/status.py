@@ -12,6 +12,12 @@ _TYPES = {schema.SCALAR_TYPE_UINT8: "uint8", schema.SCALAR_TYPE_UINT16: "uint16"
 
 
 @dataclasses.dataclass(frozen=True)
+class DatasetLevel:
+    shape: tuple[int, int, int]             # voxels along z, y, x
+    spacing: tuple[float, float, float]     # along z, y, x
+
+
+@dataclasses.dataclass(frozen=True)
 class Dataset:
     name: str
     state: str                                      # "unloaded", "loading", "ready" or "failed"
@@ -25,6 +31,7 @@ class Dataset:
     labels: int = 0                                 # different ones
     overlay: bool = False
     cells: int = 0                                  # tetrahedra of an unstructured grid; 0: it is a volume
+    levels: tuple[DatasetLevel, ...] = ()           # finest first, at least one
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,6 +63,10 @@ class Status:
     datasets: tuple[Dataset, ...]
 
 
+def _level_of(about: Any) -> DatasetLevel:
+    return DatasetLevel((about.size.z, about.size.y, about.size.x), (about.spacing.z, about.spacing.y, about.spacing.x))
+
+
 def dataset_of(message: Any) -> Dataset:
     state = _STATES.get(message.state, "failed")
     if state != "ready":
@@ -72,6 +83,7 @@ def dataset_of(message: Any) -> Dataset:
         labels=message.labels,
         overlay=message.overlay,
         cells=message.cells,
+        levels=tuple(map(_level_of, message.levels or [about])),
     )
 
 

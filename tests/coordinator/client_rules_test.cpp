@@ -80,12 +80,13 @@ TEST(CoordinatorClients, ProgressTellsPhasesAndPositions) {
   ASSERT_EQ(ToClients<FrameProgress>(loading).size(), 1U);
   EXPECT_EQ(ToClients<FrameProgress>(loading)[0].message.phase, FramePhase::kLoading);
   const LoadId load = script.loads.back().load;
-  const auto read = ToClients<FrameProgress>(script.Step(DatasetReading{"other", load, 40}));
+  const auto read = ToClients<FrameProgress>(script.Step(DatasetReading{"other", load, {40, 310 << 20}}));
   ASSERT_EQ(read.size(), 1U);
   EXPECT_EQ(read[0].to, kOther);
   EXPECT_EQ(read[0].message.phase, FramePhase::kLoading);
   EXPECT_EQ(read[0].message.read_percent, 40U);
-  EXPECT_THAT(ToClients<FrameProgress>(script.Step(DatasetReading{"other", load + 1, 50})), testing::IsEmpty()) << "of another load";
+  EXPECT_EQ(read[0].message.read_rate, std::uint64_t{310} << 20);
+  EXPECT_THAT(ToClients<FrameProgress>(script.Step(DatasetReading{"other", load + 1, {50}})), testing::IsEmpty()) << "of another load";
   const auto loaded = ToClients<FrameProgress>(script.Step(DatasetLoaded{"other", load, 1, BlockSummary()}));
   ASSERT_EQ(loaded.size(), 2U) << "it begins at once";
   EXPECT_EQ(loaded[0].to, kOther);

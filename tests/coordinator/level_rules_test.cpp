@@ -1,6 +1,7 @@
 // What the coordinator does about datasets with several levels, told as scripts.
 #include "common/planning/levels.h"
 
+#include "common/volume/memory_budget.h"
 #include "tests/coordinator/coordinator_script.h"
 
 namespace slabstream {
@@ -140,6 +141,52 @@ TEST_F(LevelRules, DetailChoosesTheLevel) {
   }
 }
 
+// One looks down on the volume from close by: its upper third is drawn from level 0, the rest from level 1.
+SubmitFrame FromAbove(RequestId request) {
+  SubmitFrame submit = Frame(request);
+  submit.frame.renderer = "raycast";
+  submit.frame.view = {.projection = Projection::kPerspective, .elevation_degrees = 90, .fov_degrees = 60, .distance = 31};
+  submit.frame.detail = 5.5;
+  return submit;
+}
+
+TEST_F(LevelRules, AFrameWaitsForAllLevelsThatItIsDrawnFrom) {
+  script.Client(kClient, FromAbove(1));
+  EXPECT_THAT(HandedOut(Opened()), IsEmpty());
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  const LoadDataset fine = script.loads[1], coarse = script.loads[2];
+  EXPECT_THAT(HandedOut(NothingChanged(Loaded(coarse))), IsEmpty());
+  const Actions begun = NothingChanged(Loaded(fine));
+  const std::vector<GroupAssignment> groups = HandedOut(begun);
+  ASSERT_THAT(groups, testing::Not(IsEmpty()));
+  const FrameSetup& setup = groups[0].setup;
+  EXPECT_EQ(setup.dataset, fine.load);
+  EXPECT_EQ(setup.description.geometry, GeometryOfLevel(0));
+  ASSERT_THAT(setup.coarser, SizeIs(1));
+  EXPECT_EQ(setup.coarser[0].dataset, coarse.load);
+  EXPECT_EQ(setup.coarser[0].description.geometry, GeometryOfLevel(1));
+  for (const Placement& placement : groups[0].group.placements) EXPECT_EQ(placement.level, placement.box.begin.z < 32 ? 1 : 0);
+  EXPECT_EQ(Of<UnloadDataset>(script.Client(kOther, DataOrder{.action = DataAction::kRemove, .items = {"block"}})).size(), 0U)
+      << "a frame that has begun keeps all of its voxels";
+  std::vector<DatasetId> unloaded;
+  for (const UnloadDataset& unload : Of<UnloadDataset>(script.AnswerAll(begun))) unloaded.push_back(unload.dataset);
+  EXPECT_THAT(unloaded, testing::UnorderedElementsAre(fine.load, coarse.load));
+}
+
+TEST_F(LevelRules, FilesOfAnyLevelOfAFrameThatChangeRenewThemAll) {
+  Visit(FromAbove(1));
+  const std::size_t before = script.loads.size();
+  const Actions actions = script.Client(kClient, FromAbove(2));
+  EXPECT_THAT(HandedOut(Seen(LookAt(actions, LevelName("block", 0)), false)), IsEmpty()) << "the other level is looked at, too";
+  Seen(LookAt(actions, LevelName("block", 1)), true);
+  EXPECT_THAT(LoadedNames(before), ElementsAre("block"));
+  Opened();
+  ASSERT_THAT(LoadedNames(before), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  Actions loaded = Loaded(script.loads[before + 1]);
+  CoordinatorScript::Append(loaded, Loaded(script.loads[before + 2]));
+  EXPECT_THAT(HandedOut(NothingChanged(loaded)), testing::Not(IsEmpty()));
+}
+
 TEST_F(LevelRules, AFrameShowsTheSameViewAtEveryLevel) {
   SubmitFrame submit = Frame(1);
   submit.frame.clipping.slab = ClipSlab{.index = 20, .thickness = 8};
@@ -195,6 +242,90 @@ TEST_F(LevelRules, NamesOfLevelsAreNoDatasets) {
     EXPECT_THAT(ToClients<DataReply>(script.Client(kOther, DataOrder{.action = action, .items = {name}})), IsEmpty()) << int(action);
   }
   EXPECT_THAT(script.QueryStatus().datasets, SizeIs(2)) << "a status has datasets, not levels";
+}
+
+// ---------------------------------------------------------------- memory
+
+// Of 512 x 512 x 768 voxels at level 0, in one group: 384 MiB with what renderers make of them, a worker has room for 120.
+class LevelsThatFit : public LevelRules {
+ protected:
+  LevelsThatFit() {
+    FakeWorker worker{.token = 12, .incarnation = 2};
+    Register message = CoordinatorScript::RegisterOf(worker);
+    message.memory_bytes = kIdleMemoryBytes + (std::uint64_t{120} << 20);
+    worker.id = ToWorkers<Welcome>(script.Worker(worker, message)).at(0).message.worker;
+    script.tokens[worker.id] = worker.token;
+    script.workers.push_back(worker);
+  }
+  static std::shared_ptr<const VolumeSummary> LargeSummary(int level) {
+    VolumeDescription description{.geometry = GeometryOfLevel(level)};
+    description.geometry.size = 16 * description.geometry.size;
+    return std::make_shared<const VolumeSummary>(UnreadSummary(description, *BlockSummary()));
+  }
+  // Opens the dataset and loads whatever level is sought, until a frame is planned or refused.
+  Actions Settle(Actions actions) {
+    for (std::size_t next = 0; next < script.loads.size(); ++next) {
+      const LoadDataset load = script.loads[next];
+      if (IsLevelName(load.name)) {
+        const auto summary = LargeSummary(load.name.back() - '0');
+        CoordinatorScript::Append(actions, NothingChanged(script.Step(DatasetLoaded{load.name, load.load, load.load, summary, 0, stamp_})));
+        continue;
+      }
+      auto levels = std::make_shared<VolumeLevels>();
+      for (int level = 0; level < kLevels; ++level) levels->levels.push_back(LargeSummary(level)->description);
+      levels->overview = LargeSummary(kLevels - 1);
+      std::vector<DataSource> sources(kLevels, DataSource("a level", ""));
+      CoordinatorScript::Append(actions, script.Step(DatasetOpened{load.name, load.load, levels, std::move(sources), stamp_}));
+    }
+    return actions;
+  }
+};
+
+TEST_F(LevelsThatFit, AFrameThatDoesNotFitNamesTheLevelThatWould) {
+  const std::vector<Status> failed = Failures(Settle(script.Client(kClient, AtLevelFrame(1, "0"))));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_EQ(failed[0].code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(failed[0].message(), HasSubstr("limit 312 MiB"));
+  EXPECT_THAT(failed[0].message(), HasSubstr("--level 1 would fit, and --detail auto chooses such a level"));
+  EXPECT_EQ(script.QueryStatus().refused.too_large, 1U);
+  EXPECT_EQ(script.machine.sizes().uses, 0U);
+}
+
+TEST_F(LevelsThatFit, DetailAutoDrawsTheFinestLevelThatFitsAndTellsSo) {
+  SubmitFrame submit = Frame(1);
+  submit.frame.view.zoom = 20;  // a voxel of level 0 is wider than a pixel
+  submit.frame.detail = 0;
+  const Actions actions = Settle(script.Client(kClient, submit));
+  EXPECT_THAT(LoadedNames(), ElementsAre("block", LevelName("block", 0), LevelName("block", 1)));
+  const std::vector<GroupAssignment> groups = HandedOut(actions);
+  ASSERT_THAT(groups, SizeIs(1));
+  EXPECT_EQ(groups[0].setup.description.geometry.size, 8 * Index3({32, 32, 48}));
+  const auto replies = ToClients<FrameReply>(script.Answer(groups[0]));
+  ASSERT_THAT(replies, SizeIs(1));
+  EXPECT_THAT(replies[0].message.statistics.lowered, HasSubstr("level 1 is drawn instead of level 0"));
+  EXPECT_THAT(replies[0].message.statistics.lowered, HasSubstr("limit 312 MiB"));
+  EXPECT_EQ(script.machine.sizes().uses, 0U);
+  // What fits is drawn as ever, and nothing is told.
+  submit.request = 2;
+  submit.frame.view.zoom = 2;
+  const auto again = ToClients<FrameReply>(script.AnswerAll(Settle(NothingChanged(script.Client(kClient, submit)))));
+  ASSERT_THAT(again, SizeIs(1));
+  EXPECT_EQ(again[0].message.statistics.lowered, "");
+}
+
+TEST_F(LevelsThatFit, AVolumeWithoutLevelsNeedsConversion) {
+  script.Client(kClient, Frame(1, 1, "other"));
+  const LoadDataset load = script.loads.back();
+  const std::vector<Status> failed = Failures(script.Step(DatasetLoaded{load.name, load.load, load.load, LargeSummary(0)}));
+  ASSERT_THAT(failed, SizeIs(1));
+  EXPECT_THAT(failed[0].message(), HasSubstr("the volume has no coarser levels, which would fit: slabstream convert makes them"));
+  // A picture that is too large at any level, for the only worker.
+  script.Kill(script.workers.front());
+  SubmitFrame huge = Frame(2, 1, "other");
+  huge.frame.size = {8192, 8192};
+  const std::vector<Status> too_large = Failures(script.Client(kClient, huge));
+  ASSERT_THAT(too_large, SizeIs(1));
+  EXPECT_THAT(too_large[0].message(), testing::Not(HasSubstr("convert")));
 }
 
 // ---------------------------------------------------------------- files

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "tests/end_to_end/program.h"
+#include "tests/support/full_disk.h"
 
 namespace slabstream {
 namespace {
@@ -61,11 +62,24 @@ TEST_F(ConvertTest, WritesAnOmeZarrWithLevels) {
   MustRun({"convert", "a.ome.zarr", "b.ome.zarr/", "--zarr-version", "0.4"});
   EXPECT_TRUE(std::filesystem::exists(Path("b.ome.zarr/0/1/1/1")));
   MustRun({"convert", "b.ome.zarr", "c.ome.zarr"});
-  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("c.ome.zarr" + shard), Read("a.ome.zarr" + shard));
+  MustRun({"convert", "a.ome.zarr", "d.ome.zarr"});
+  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("c.ome.zarr" + shard), Read("d.ome.zarr" + shard));
   ExpectRefused({"convert", "s.nrrd", "a.ome.zarr"}, "OUTPUT 'a.ome.zarr' exists: remove it, or name another folder");
   ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--type", "int8"}, "--type: an OME-Zarr keeps the type of SOURCE");
   ExpectRefused({"convert", "s.nrrd", "x.ome.zarr", "--zarr-version", "0.3"}, "--zarr-version: expected 0.4 or 0.5, not '0.3'");
   EXPECT_FALSE(std::filesystem::exists(Path("x.ome.zarr")));
+}
+
+TEST_F(ConvertTest, AFullDiskIsToldAndTheConversionGoesOnWhenThereIsRoom) {
+  MakeSphere("s.nrrd", 1, 130);
+  const ProgramResult full = OnFullDisk(20000, [&] { return Slabstream({"convert", "s.nrrd", "a.ome.zarr"}); });
+  EXPECT_EQ(full.exit_status, 1);
+  ASSERT_EQ(full.err_lines().size(), 1U) << full.err;
+  EXPECT_THAT(full.err, testing::AllOf(HasSubstr("a.ome.zarr"), HasSubstr("File too large")));
+  EXPECT_NE(Slabstream({"info", "a.ome.zarr"}).exit_status, 0) << "it is no image yet";
+  MustRun({"convert", "s.nrrd", "a.ome.zarr"});
+  MustRun({"convert", "s.nrrd", "b.ome.zarr"});
+  for (const std::string shard : {"/0/c/0/0/0", "/1/c/0/0/0"}) EXPECT_EQ(Read("a.ome.zarr" + shard), Read("b.ome.zarr" + shard));
 }
 
 TEST_F(ConvertTest, RawSamplesAreDescribedByOptionsInEitherForm) {

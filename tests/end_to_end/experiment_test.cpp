@@ -79,6 +79,22 @@ TEST_F(ExperimentTest, SweepOfAUsersOwn) {
   EXPECT_FALSE(std::filesystem::exists(Path("bad"))) << "nothing is made before the file is right";
 }
 
+TEST_F(ExperimentTest, VolumesOfSourcesAreMeasuredAtTheirFinestLevel) {
+  MakeSphere("ball.nrrd", 2, 24);
+  MustRun({"convert", "ball.nrrd", "ball.ome.zarr"});
+  std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.ome.zarr", "transfer": "opaque"}], "size": 48,
+    "policies": [{}], "workers": [2]})";
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick"});
+  ExpectResults("out", "sweep");
+  for (const json& row : RowsOf("out")) EXPECT_EQ(row.value("volume", "ball"), "ball");
+
+  std::filesystem::create_directory(Path("none.ome.zarr"));
+  std::ofstream(Path("bad.json")) << R"({"volumes": [{"file": "none.ome.zarr"}], "policies": [{}], "workers": [1]})";
+  const ProgramResult bad = Slabstream({"experiment", "sweep", "bad.json", "-o", "bad"});
+  EXPECT_EQ(bad.exit_status, 2);
+  EXPECT_THAT(bad.err, HasSubstr("none.ome.zarr"));
+}
+
 TEST_F(ExperimentTest, SweepAtARunningService) {
   MakeSphere("ball.nrrd", 2, 24);
   const std::string out = MustRun({"up", "--workers", "2", "--threads", "1", "--listen", "tcp://127.0.0.1:*", "--data",

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -81,8 +82,82 @@ TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {
                                 {{levels, "--level", "9"}, "has levels 0 to 2"},
                                 {{"ball.nrrd", "--level", "1"}, "has level 0 alone"},
                                 {{levels, "--level", "fine"}, "level"},
-                                {{levels, "--detail", "0"}, "detail"},
+                                {{levels, "--detail", "-1"}, "detail"},
                             });
+}
+
+TEST_F(InPartsTest, StatisticsAndRecordsTellLevelsAndBytes) {
+  const std::string levels = MakeLevels();
+  std::uintmax_t size = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(Path(levels)))
+    size += entry.is_regular_file() ? entry.file_size() : 0;
+  MustRun({"turntable", levels, "--local=1", "-o", "f_%04d.png", "--frames", "2", "--in-flight", "1", "--size", "64", "--level", "1",
+           "--stats", "stats.json"});
+  const json stats = json::parse(ReadFile("stats.json"));
+  for (const json& frame : stats["frames"]) {
+    ASSERT_EQ(frame["levels"].size(), 1U);
+    EXPECT_EQ(frame["levels"][0]["level"], 1);
+    EXPECT_GE(frame["levels"][0]["boxes"], 1);
+    EXPECT_GT(frame["levels"][0]["voxels"], 0);
+    EXPECT_LE(frame["levels"][0]["voxels"], 65 * 65 * 65);
+  }
+  EXPECT_GT(stats["frames"][0]["bytes"]["stored"], 0) << "the coordinator reads the level for the first frame";
+  EXPECT_LE(stats["bytes"]["stored"], size) << "packed as they lie in the file";
+  EXPECT_EQ(stats["frames"][1]["bytes"]["stored"], 0) << "and holds it for the second one";
+  EXPECT_EQ(json::parse(MustRun({"info", "f_0000.png", "--json"}).out)["levels"], json::array({1}));
+  EXPECT_THAT(MustRun({"info", "f_0000.png"}).out, HasSubstr("drawn from"));
+
+  MakeLarge("large.nrrd");
+  MustRun({"render", "large.nrrd", "--local=1", "--memory", "768M", "--renderer", "mip", "--zoom", "8", "--size", "64", "-o", "l.png",
+           "--stats", "stats.json"});
+  const json in_parts = json::parse(ReadFile("stats.json"));
+  EXPECT_EQ(in_parts["frames"][0]["levels"][0]["level"], 0);
+  EXPECT_GT(in_parts["bytes"]["stored"], 0) << "a worker reads it";
+  EXPECT_FALSE(json::parse(MustRun({"info", "l.png", "--json"}).out).contains("levels")) << "level 0 alone";
+}
+
+TEST_F(InPartsTest, ConvertWritesALevelOrABoxOfIt) {
+  const std::string levels = MakeLevels();
+  MustRun({"convert", levels, "part.nrrd", "--level", "1", "--box", "10:20,:5,60:"});
+  const json whole = json::parse(MustRun({"info", levels, "--json"}).out)["levels"][1];
+  const json part = json::parse(MustRun({"info", "part.nrrd", "--json"}).out);
+  EXPECT_EQ(part["size"], json::array({10, 5, 5}));
+  EXPECT_EQ(part["spacing"], whole["spacing"]);
+  MustRun({"convert", levels, "part.ome.zarr", "--level", "1", "--box", "10:20,:5,60:"});
+  EXPECT_EQ(json::parse(MustRun({"info", "part.ome.zarr", "--json"}).out)["histogram"], part["histogram"]);
+  ExpectEachRefused({"convert", levels, "no.nrrd"}, {
+                                                        {{"--level", "3"}, "has levels 0 to 2"},
+                                                        {{"--level", "1", "--box", "0:66,:,:"}, "x from 0 to 66"},
+                                                        {{"--box", "5:5,:,:"}, "x from 5 to 5"},
+                                                        {{"--box", "5:9"}, "X0:X1,Y0:Y1,Z0:Z1"},
+                                                        {{"--box", "a:9,:,:"}, "--box"},
+                                                    });
+  ExpectEachRefused({"convert", "ball.nrrd", "no.nrrd"}, {{{"--level", "1"}, "has level 0 alone"}});
+}
+
+// A rod that begins close to the eye: there a voxel of level 0 is as wide as a pixel, and at the other end fifteen are.
+TEST_F(InPartsTest, WhatDoesNotFitNamesTheLevelThatWouldAndDetailAutoDrawsIt) {
+  std::ofstream(Path("rod.nrrd"), std::ios::binary)
+      << ("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8000 8 8\nencoding: raw\n\n" + std::string(8000 * 8 * 8, char(200)));
+  MustRun({"convert", "rod.nrrd", "rod.ome.zarr"});
+  const std::vector<std::string> view = {"--local=1",   "--memory", "768M", "--renderer", "zbuffer", "--size",    "2000", "--projection",
+                                         "perspective", "--fov",    "60",   "--distance", "4100",    "--azimuth", "90"};
+  std::vector<std::string> command = {"render", "rod.ome.zarr", "-o", "rod.png"};
+  command.insert(command.end(), view.begin(), view.end());
+  const ProgramResult refused = Slabstream(command);
+  EXPECT_EQ(refused.exit_status, 1);
+  ASSERT_EQ(refused.err_lines().size(), 1U) << refused.err;
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("limit 512 MiB"), HasSubstr("would fit, and --detail auto chooses such a level")));
+  command.insert(command.end(), {"--detail", "auto", "--stats", "stats.json"});
+  const ProgramResult lowered = MustRun(command);
+  EXPECT_THAT(lowered.err, HasSubstr("is drawn instead of level 0: "));
+  const json stats = json::parse(ReadFile("stats.json"));
+  EXPECT_THAT(stats["frames"][0]["lowered"].get<std::string>(), HasSubstr("is drawn instead of level 0"));
+  // The volume itself has no other level.
+  command[1] = "rod.nrrd";
+  const ProgramResult single = Slabstream(command);
+  EXPECT_EQ(single.exit_status, 1);
+  EXPECT_THAT(single.err, HasSubstr("slabstream convert makes them"));
 }
 
 TEST_F(InPartsTest, ADamagedChunkEndsInOneLineThatNamesIt) {
@@ -135,6 +210,35 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
     if (text.find("reads " + Path("large.nrrd") + " itself") != std::string::npos) ++reading;
   }
   EXPECT_GT(reading, 0) << logs;
+}
+
+// Levels are small, so that the coordinator holds them; shards of level 0 are read when its first picture is asked for.
+TEST_F(InPartsTest, AServiceGoesOnAfterBadChunksAndReadsThemAgainOnceTheyAreRepaired) {
+  const std::string levels = MakeLevels();
+  MakeSphere("other.nrrd", 2, 30);
+  const std::string endpoint = "ipc://" + Path("s");
+  MustRun({"up", "--detach", "--listen", endpoint, "--data", "ball=" + levels, "--data", "other=other.nrrd"});
+  const PictureFile expected = Render("ball.nrrd", {"--local=1"});
+  MustRun({"render", "ball", "-o", "coarse.png", "--level", "2"});  // so it is open
+  const std::string shard = Path(levels + "/0/c/0/0/0"), kept = Path("kept");
+  ASSERT_TRUE(std::filesystem::exists(shard));
+  std::filesystem::copy_file(shard, kept);
+  const auto size = std::filesystem::file_size(shard);
+  const std::vector<std::function<void()>> damages = {
+      [&] { std::filesystem::resize_file(shard, size / 3); },
+      [&] { std::ofstream(shard, std::ios::binary | std::ios::app) << "more"; },
+      [&] { std::ofstream(shard, std::ios::binary | std::ios::in | std::ios::out).seekp(std::streamoff(size / 2)) << "damage"; },
+  };
+  for (const auto& damage : damages) {
+    damage();
+    const ProgramResult result = Slabstream({"render", "ball", "-o", "no.png", "--level", "0"});
+    EXPECT_EQ(result.exit_status, 1);
+    ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("ball.ome.zarr/0/c/0/0/0"));
+    MustRun({"render", "other", "-o", "other.png"});
+    std::filesystem::copy_file(kept, shard, std::filesystem::copy_options::overwrite_existing);
+  }
+  EXPECT_LE(LargestDifference(Render("ball", {"--level", "0"}), expected), kSame);
 }
 
 TEST_F(InPartsTest, AWorkerThatDoesNotSeeTheFilesGetsVoxelsFromTheCoordinator) {
@@ -194,7 +298,7 @@ TEST_F(InPartsTest, AnIndexIsMadeOnceAndToldByInfo) {
 TEST_F(InPartsTest, AnIndexThatCannotBeMadeIsRefused) {
   MakeSphere("ball.nii.gz", 2, 30);
   ExpectEachRefused({"index"}, {
-                                   {{"ball.nii.gz"}, "is read as a whole, so it needs no index"},
+                                   {{"ball.nii.gz"}, "its format cannot be read in parts"},
                                    {{"no.ome.zarr"}, "no.ome.zarr"},
                                    {{"ball.nii.gz", "--memory", "1"}, "--memory"},
                                });

@@ -1,6 +1,9 @@
 // What commands say beside their results: one line on stderr, and the result is there all the same.
 #include <gmock/gmock.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 
@@ -64,6 +67,24 @@ TEST_F(NotesTest, AnEmptyPictureSaysWhatWouldShowSomething) {
   EXPECT_THAT(SaidBy("render", {"--renderer", "raycast", "--isovalue", "999"}), ElementsAre(HasSubstr("no surface of --isovalue")));
   EXPECT_THAT(SaidBy("render", {"--look-at", "900,900,900"}), ElementsAre(HasSubstr("--fit frames what is shown")));
   EXPECT_THAT(SaidBy("slice", {"--plane", "z", "--at", "0,0,99"}), ElementsAre(HasSubstr("the plane of --at leaves nothing")));
+}
+
+TEST_F(NotesTest, WhoDidNotChooseAChannelIsToldWhichOneIsShown) {
+  std::filesystem::create_directories(Path("em/4_4_4"));
+  std::ofstream(Path("em/info")) << R"({"data_type": "uint8", "num_channels": 2, "type": "image", "scales": [{"key": "4_4_4",
+      "size": [4, 4, 4], "chunk_sizes": [[4, 4, 4]], "resolution": [4, 4, 4], "encoding": "raw"}]})";
+  std::ofstream(Path("em/4_4_4/0-4_0-4_0-4"), std::ios::binary) << std::string(64, char(10)) << std::string(64, char(20));
+  const std::string note = "em: shows channel 0 of 2; --channel takes another one: 0 to 1";
+  const auto said = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"render", "em", "--local=1", "--size", "16", "-o", "x.png", "--scalar-range", "0:30"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return MustRun(arguments).err_lines();
+  };
+  EXPECT_THAT(said({}), ElementsAre(HasSubstr(note)));
+  EXPECT_THAT(said({"--channel", "0"}), IsEmpty());
+  EXPECT_THAT(MustRun({"info", "em", "--channel", "1"}).out,
+              AllOf(HasSubstr("channels     2: \"\" \"\"; this is number 1\n"), HasSubstr("values       20 ... 20")));
+  EXPECT_THAT(MustRun({"convert", "em", "em.ome.zarr"}).err_lines(), ElementsAre(HasSubstr(note)));
 }
 
 TEST_F(NotesTest, PresetsAreListed) {

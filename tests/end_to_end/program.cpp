@@ -100,7 +100,7 @@ ProgramResult RunningProgram::Wait() {
 
 EndToEndTest::EndToEndTest() {
   ::setenv("XDG_RUNTIME_DIR", directory_.c_str(), 1);
-  ::setenv("XDG_CACHE_HOME", Path("cache").c_str(), 1);
+  ::setenv("XDG_CACHE_HOME", (directory_ + "/cache").c_str(), 1);
   ::unsetenv("SLABSTREAM_ENDPOINT");
 }
 

@@ -11,13 +11,9 @@ namespace slabstream {
 namespace {
 
 const std::vector<CodecChain>& Codecs() {
-  static const std::vector<CodecChain> codecs = {{GzipCodec()},
-                                                 {ZlibCodec()},
-                                                 {ZstdCodec()},
-                                                 {BloscCodec()},
-                                                 {Lz4Codec()},
-                                                 {Crc32cCodec()},
-                                                 {SwapBytesCodec(2), ShuffleCodec(4), ZstdCodec(), Crc32cCodec()}};
+  static const std::vector<CodecChain> codecs = {
+      {GzipCodec()}, {ZlibCodec()},   {ZstdCodec()}, {BloscCodec()},
+      {Lz4Codec()},  {Crc32cCodec()}, {LzfCodec()},  {SwapBytesCodec(2), ShuffleCodec(4), ZstdCodec(), Crc32cCodec()}};
   return codecs;
 }
 
@@ -50,13 +46,13 @@ std::vector<FuzzBytes> ChunkCodecSeeds() {
     seeds.push_back(FuzzSeed().Put(codec).Put(std::uint16_t{1000}).Put(std::string_view(packed)).bytes());
   };
   std::uint8_t number = 0;
-  for (const char* const codec : {"gzip", "zlib", "zstd", "blosc", "lz4", "crc32c"}) add(number++, PackBytes(codec, bytes));
+  for (const char* const codec : {"gzip", "zlib", "zstd", "blosc", "lz4", "crc32c", "lzf"}) add(number++, PackBytes(codec, bytes));
   add(0, PackBytes("gzip", bytes) + PackBytes("gzip", bytes));
   add(2, PackZstdStream(bytes));
   for (const char* const inner : {"blosclz", "lz4", "snappy", "zlib", "zstd"}) {
     for (const int shuffle : {0, 1, 2}) add(3, PackBlosc(inner, shuffle, 4, std::string(600, 'x') + bytes + bytes));
   }
-  add(6, PackBytes("crc32c", PackBytes("zstd", ShuffledBytes(SwappedBytes("8 bytes.", 2), 4))));
+  add(7, PackBytes("crc32c", PackBytes("zstd", ShuffledBytes(SwappedBytes("8 bytes.", 2), 4))));
   return seeds;
 }
 

@@ -105,7 +105,9 @@ class WithService(unittest.TestCase):
         cls.programs.run("sphere", "--class", 1, "--size", 24, "--occupancy", 0.2, "-o", "a.nrrd")
         cls.programs.run("sphere", "--class", 2, "--size", 20, "--occupancy", 0.3, "-o", "b.nrrd")
         write_labels(cls.programs.folder)
-        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt")
+        cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "large.nrrd")
+        cls.programs.run("convert", "large.nrrd", "large.ome.zarr")
+        _, cls.endpoint = cls.programs.up("--data", "a=a.nrrd", "--data", "b=b.nrrd", "--data", "c=b.nrrd,labels=labels.nrrd:names.txt", "--data", "levels=large.ome.zarr")
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
 
@@ -200,14 +202,38 @@ class HttpTest(WithService):
         self.assertEqual(self.gateway.request("/api/v1/render.png", method="POST", body="{")[0], 400)
         self.assertEqual(self.gateway.request("/api/v1/view")[0], 426)
 
+    def datasets_with(self, loaded):
+        """The catalogue by name, once the gateway knows that this dataset is loaded."""
+        listed = lambda: {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}  # noqa: E731
+        wait_until(lambda: listed()[loaded]["state"] == "ready", f"{loaded} is loaded")
+        return listed()
+
     def test_what_the_service_has(self):
         self.get("/api/v1/render.png", dataset="a", size=16)
-        wait_until(lambda: any(d["state"] == "ready" for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "a is loaded")
-        datasets = {d["name"]: d for d in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
-        self.assertEqual(set(datasets), {"a", "b", "c"})
+        datasets = self.datasets_with("a")
+        self.assertEqual(set(datasets), {"a", "b", "c", "levels"})
         self.assertEqual(datasets["a"]["size"], [24, 24, 24])
+        self.assertEqual([level["size"] for level in datasets["a"]["levels"]], [[24, 24, 24]])
         status, service = self.gateway.json("/api/v1/status")
         self.assertEqual((status, len(service["workers"])), (200, 2))
+
+    def test_levels_are_chosen_and_told(self):
+        pictures = {}
+        for fields in ({"level": 0}, {"level": 1}, {"level": 2}, {"detail": 0.1}, {"detail": 100}):
+            status, _, pictures[str(fields)] = self.get("/api/v1/render.png", dataset="levels", size=64, renderer="raycast", **fields)
+            self.assertEqual(status, 200)
+        pixels = {name: png_pixels(picture) for name, picture in pictures.items()}
+        self.assertEqual(pixels["{'detail': 0.1}"], pixels["{'level': 0}"])
+        self.assertEqual(pixels["{'detail': 100}"], pixels["{'level': 2}"])
+        self.assertEqual(len({picture[2] for picture in pixels.values()}), 3)
+        self.assertIn(b'"levels":[2]', pictures["{'level': 2}"], "the record tells the level")
+        levels = self.datasets_with("levels")["levels"]["levels"]
+        self.assertEqual([level["size"] for level in levels], [[130] * 3, [65] * 3, [33] * 3])
+        self.assertEqual(levels[0]["voxel_bytes"], 130**3)
+        for fields, said in (({"level": 3}, "has levels 0 to 2"), ({"level": "x"}, "level"), ({"detail": 0}, "detail")):
+            status, _, body = self.get("/api/v1/render.png", dataset="levels", size=64, **fields)
+            self.assertEqual(status, 400)
+            self.assertIn(said, json.loads(body)["error"])
 
     def ask(self, question, **fields):
         status, body = self.gateway.json(f"/api/v1/{question}?" + urllib.parse.urlencode(fields))
@@ -477,6 +503,26 @@ class ViewTest(WithService):
         options.update({"size": 160, "color-bar": "", "title": "Planes", "scale-bar": "true"})
         header, data, _ = page.final(page.view(options, picture="slice"))
         self.assertEqual(whole(header, data), png_pixels(self.get("/api/v1/slice.png", **options)[2]))
+
+    def test_pictures_become_finer_until_they_are_as_asked_for(self):
+        page = self.page()
+        options = {"dataset": "levels", "size": 160, "renderer": "raycast", "detail": 0.9}
+        seq = page.view(options)
+        headers = []
+        while not headers or not headers[-1]["final"]:
+            header, data = page.picture()
+            headers.append(header)
+            page.ack(header["frame"])
+        self.assertEqual({header["seq"] for header in headers}, {seq})
+        used = [header["statistics"]["levels"][0]["level"] for header in headers]
+        self.assertGreater(used[0], used[-1], "the first picture is of a coarser level")
+        self.assertEqual(used, sorted(used, reverse=True))
+        self.assertGreater(headers[0]["coarseness"], 1)
+        self.assertEqual(headers[-1]["coarseness"], 1)
+        self.assertEqual(whole(headers[-1], data), png_pixels(self.get("/api/v1/render.png", **options)[2]))
+        # A level that the view names is drawn at once.
+        header, data, count = page.final(page.view({"dataset": "levels", "size": 160, "renderer": "raycast", "level": 2}))
+        self.assertEqual((count, header["statistics"]["levels"][0]["level"]), (2, 2))
 
     def test_moving_pictures_are_jpeg_of_what_shows(self):
         page = self.page()

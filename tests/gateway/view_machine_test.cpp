@@ -23,8 +23,8 @@ Time At(int ms) { return Time{} + milliseconds(100000 + ms); }
 
 TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
   ViewMachine machine;
-  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
-  EXPECT_THAT(machine.OnRendered(At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
+  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = kFirstCoarseness}));
+  EXPECT_THAT(machine.OnRendered(true, At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   EXPECT_THAT(machine.OnEncoded(At(35)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 1}));
   EXPECT_EQ(machine.wake_time(), At(150));
   EXPECT_THAT(machine.OnAck(1, At(45)), IsEmpty());
@@ -40,27 +40,29 @@ TEST(ViewMachineTest, TheLatestViewWins) {
   ViewMachine machine;
   machine.OnView(1, At(0));
   for (int seq = 2; seq <= 9; ++seq) EXPECT_THAT(machine.OnView(std::uint64_t(seq), At(seq)), IsEmpty());
-  EXPECT_THAT(machine.OnRendered(At(30)), ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 9}));
+  EXPECT_THAT(machine.OnRendered(true, At(30)),
+              ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 9, .coarseness = kFirstCoarseness}));
   EXPECT_THAT(machine.OnView(9, At(31)), IsEmpty());  // not newer
 }
 
 TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(At(30));
+  machine.OnRendered(true, At(30));
   machine.OnEncoded(At(31));
   machine.OnAck(1, At(40));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
-  EXPECT_THAT(machine.OnView(2, At(160)), ElementsAre(Is(Kind::kCancelEncode), ViewAction{.kind = Kind::kRender, .seq = 2}));
+  EXPECT_THAT(machine.OnView(2, At(160)),
+              ElementsAre(Is(Kind::kCancelEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = kFirstCoarseness}));
 }
 
 TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(At(30));
+  machine.OnRendered(true, At(30));
   machine.OnEncoded(At(31));
   EXPECT_THAT(machine.OnView(2, At(40)), ElementsAre(Is(Kind::kRender)));  // no round trip is known yet
-  EXPECT_THAT(machine.OnRendered(At(70)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_THAT(machine.OnRendered(true, At(70)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(75)), IsEmpty());
   EXPECT_THAT(machine.OnView(3, At(80)), IsEmpty());  // it would wait behind the second
   EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());   // of no frame that was sent
@@ -70,18 +72,18 @@ TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
 TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(At(10));
+  machine.OnRendered(true, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));  // the lossless picture is being encoded meanwhile
   EXPECT_EQ(machine.Quality(), 50);
   machine.OnTime(At(410));
   const auto actions = machine.OnView(2, At(500));
   ASSERT_FALSE(actions.empty());
-  EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 0.5}));
-  EXPECT_THAT(machine.OnRendered(At(510)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 0.5, .coarseness = kFirstCoarseness / 2}));
+  EXPECT_THAT(machine.OnRendered(true, At(510)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(511)), ElementsAre(Is(Kind::kSend)));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 1}));
-  EXPECT_THAT(machine.OnRendered(At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnRendered(true, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
   EXPECT_THAT(machine.OnEncoded(At(670)), IsEmpty());
   EXPECT_THAT(machine.OnAck(2, At(900)), ElementsAre(Is(Kind::kSend)));
 }
@@ -89,14 +91,58 @@ TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) 
 TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(At(10));
+  machine.OnRendered(true, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));
   machine.OnView(2, At(500));
-  machine.OnRendered(At(510));
+  machine.OnRendered(true, At(510));
   machine.OnEncoded(At(511));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(Is(Kind::kRender)));
   EXPECT_THAT(machine.OnView(3, At(660)), testing::Contains(Is(Kind::kCancelRender)));
+}
+
+TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAskedFor) {
+  ViewMachine machine;
+  const auto render = [](double coarseness) { return ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = coarseness}; };
+  EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(render(4)));
+  EXPECT_THAT(machine.OnRendered(false, At(100)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
+  machine.OnEncoded(At(101));
+  EXPECT_THAT(machine.OnAck(1, At(110)), IsEmpty());
+  EXPECT_EQ(machine.wake_time(), At(150));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(render(2)));  // it takes long: there is one between
+  EXPECT_THAT(machine.OnRendered(false, At(400)), ElementsAre(Is(Kind::kEncode), render(1)));
+  EXPECT_THAT(machine.OnEncoded(At(401)), ElementsAre(Is(Kind::kSend)));
+  machine.OnAck(2, At(410));
+  EXPECT_THAT(machine.OnRendered(true, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnEncoded(At(950)), ElementsAre(Is(Kind::kSend)));
+  EXPECT_EQ(machine.wake_time(), std::nullopt);
+}
+
+TEST(ViewMachineTest, WhatIsRenderedQuicklyIsAsAskedForAtOnce) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(false, At(10));
+  machine.OnEncoded(At(11));
+  machine.OnAck(1, At(20));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
+  machine.OnRendered(true, At(160));
+  EXPECT_THAT(machine.OnView(2, At(170)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 2}));
+}
+
+TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnView(2, At(10));
+  EXPECT_THAT(machine.OnRendered(false, At(300)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 8}));
+  machine.OnEncoded(At(301));
+  machine.OnAck(1, At(310));
+  EXPECT_THAT(machine.OnRendered(false, At(600)),
+              ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 4}));
+  machine.OnEncoded(At(601));
+  machine.OnAck(2, At(610));
+  // The finer picture is given up for a new view.
+  EXPECT_THAT(machine.OnView(3, At(620)), ElementsAre(ViewAction{.kind = Kind::kCancelRender},
+                                                      ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
 }
 
 TEST(ViewMachineTest, ARefusedViewIsDoneWith) {
@@ -112,7 +158,7 @@ TEST(ViewMachineTest, WhenTheServiceIsBackTheViewIsRendered) {
   machine.OnView(1, At(0));
   EXPECT_THAT(machine.OnUnavailable(At(10)), IsEmpty());
   EXPECT_THAT(machine.OnView(2, At(20)), IsEmpty());
-  EXPECT_THAT(machine.OnServiceBack(At(30)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2}));
+  EXPECT_THAT(machine.OnServiceBack(At(30)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = kFirstCoarseness}));
   EXPECT_THAT(machine.OnServiceBack(At(31)), IsEmpty());
 }
 
@@ -124,6 +170,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
     ViewMachine machine;
     const int render = random.Integer(1, 300), encode = random.Integer(1, 60), trip = random.Integer(1, 400), views = random.Integer(1, 60);
     const int pace = random.Integer(1, 40);
+    const double finest_from = double(1 << random.Integer(0, 5));  // coarseness up to which level 0 is drawn
     struct Event {
       enum { kView, kRendered, kEncoded, kAck } kind;
       std::uint64_t number = 0;
@@ -132,6 +179,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
     for (int i = 1; i <= views; ++i) events.emplace(At(i * pace), Event{Event::kView, std::uint64_t(i)});
     std::uint64_t order = 0, encoding = 0, rendering_seq = 0, rendered_seq = 0, encoding_seq = 0, last_sent_seq = 0;
     bool renders = false, encodes = false, unacknowledged = false, encoding_final = false, last_final = false;
+    double coarseness = 0, rendered_coarseness = 0;
     int sent = 0;
     Time now = At(0);
     const auto apply = [&](const ViewMachine::Actions& actions) {
@@ -142,6 +190,8 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
             ASSERT_GE(action.seq, rendering_seq);
             renders = true;
             rendering_seq = action.seq;
+            coarseness = action.coarseness;
+            ASSERT_TRUE(coarseness >= 1 && coarseness <= kMostCoarseness);
             events.emplace(now + milliseconds(render), Event{Event::kRendered, ++order});
             break;
           case Kind::kCancelRender:
@@ -154,6 +204,9 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
             encodes = true;
             encoding_seq = rendered_seq;
             encoding_final = action.final;
+            if (encoding_final) {
+              ASSERT_EQ(rendered_coarseness, 1);
+            }
             events.emplace(now + milliseconds(encode), Event{Event::kEncoded, ++encoding});
             break;
           case Kind::kCancelEncode:
@@ -190,7 +243,8 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
           if (event.number != order || !renders) break;
           renders = false;
           rendered_seq = rendering_seq;
-          apply(machine.OnRendered(now));
+          rendered_coarseness = coarseness <= finest_from ? 1 : coarseness;
+          apply(machine.OnRendered(rendered_coarseness == 1, now));
           break;
         case Event::kEncoded:
           if (event.number != encoding || !encodes) break;
@@ -206,7 +260,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
     }
     EXPECT_EQ(last_sent_seq, std::uint64_t(views));
     EXPECT_TRUE(last_final);
-    EXPECT_LE(sent, views * pace / trip + 4 + views * pace / std::max(1, render)) << "frames for nothing";
+    EXPECT_LE(sent, views * pace / trip + 8 + views * pace / std::max(1, render)) << "frames for nothing";
   }
 }
 

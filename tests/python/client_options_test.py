@@ -290,6 +290,7 @@ class Requests(unittest.TestCase):
             ({"labels_shown": [1, range(5, 7)]}, {"labels_shown": "1,5-6"}),
             ({"labels_shown": ["Temporal_*", 3, "5-6"]}, {"labels_shown": "Temporal_*,3,5-6"}),
             ({"groups": 4, "zoom": np.float32(0.5)}, {"groups": "4", "zoom": "0.5"}),
+            ({"detail": "auto", "groups": "auto"}, {"detail": "0", "groups": "0"}),
             ({"light": np.eye(3)}, {"light": ["1,0,0", "0,1,0", "0,0,1"]}),
         ):
             self.assertEqual(draft_of("a", python), draft_of("a", text))

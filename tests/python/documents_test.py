@@ -5,11 +5,12 @@ import contextlib
 import io
 import os
 import re
+import subprocess
 import unittest
 
 import numpy as np
 
-from client_support import ROOT, InAFolder, RunningService, volume_arrays, write_volumes
+from client_support import PROGRAM, ROOT, InAFolder, RunningService, volume_arrays, write_volumes
 
 import slabstream as ss  # noqa: E402
 from slabstream.volumes import volume_of, write_nrrd  # noqa: E402
@@ -49,6 +50,7 @@ class Documents(InAFolder):
     def test_the_tutorial_runs(self) -> None:
         running = self.start(f"brain={self.brain()}")
         self.addCleanup(ss.shutdown)
+        self.write_scan()
         code = "\n".join(blocks_of("python.md"))
         printed = "tcp://127.0.0.1:7420"
         self.assertEqual(code.count(printed), 4)
@@ -64,6 +66,11 @@ class Documents(InAFolder):
             self.assertGreater(np.asarray(names[name])[..., :3].max(), 50, name)
             if KEEP:
                 names[name].save(f"{KEEP}/{name}.png")
+
+    def write_scan(self) -> None:
+        """scan.ome.zarr, with two levels."""
+        write_nrrd(volume_of(np.kron(volume_arrays()[0], np.ones((4, 4, 4), np.uint8))), self.folder / "scan.nrrd")
+        subprocess.run([PROGRAM, "convert", self.folder / "scan.nrrd", self.folder / "scan.ome.zarr"], check=True, stdout=subprocess.DEVNULL)
 
     def brain(self) -> str:
         write_nrrd(volume_of(volume_arrays()[0], spacing=(2, 1.5, 1.25)), self.folder / "brain.nrrd")

@@ -309,6 +309,15 @@ TEST_F(VoxelServerTest, AConnectionThatAsksAndNeverReadsCostsLittleMemory) {
   EXPECT_LT(ResidentBytes() - std::min(before, ResidentBytes()), std::size_t{3} * kMaxQueuedChunks * kChunkBytes);
 }
 
+constexpr std::uint64_t kMost = std::uint64_t{1} << 30;
+
+// Of a volume that is read as a whole.
+Result<LoadedSource> LoadWhole(const DataSource& source) {
+  Result<ReadableSource> read = ReadSource(source, kMost);
+  if (!read.ok()) return read.status();
+  return std::get<LoadedSource>(*std::move(read));
+}
+
 class CatalogueTest : public testing::Test {
  protected:
   void Touch(const std::string& name) { std::ofstream(directory_ / name) << "x"; }
@@ -346,7 +355,7 @@ TEST_F(CatalogueTest, NamesComeFromArgumentsAndStems) {
   EXPECT_THAT(found.folders, testing::ElementsAre(directory_.string()));
   EXPECT_EQ(found.datasets.at("head").folder, directory_.string());
   EXPECT_EQ(found.datasets.at("other").folder, "");
-  EXPECT_FALSE(LoadSource(found.datasets.at("head")).ok()) << "loading a file that is no volume fails when it is tried, not before";
+  EXPECT_FALSE(ReadSource(found.datasets.at("head"), kMost).ok()) << "loading a file that is no volume fails when it is tried, not before";
 }
 
 TEST_F(CatalogueTest, WhatAFolderHoldsBeyondTheLimitIsLeftOut) {
@@ -454,7 +463,7 @@ TEST_F(CatalogueTest, ANamedVolumeIsCheckedAndReadWithItsOptions) {
   ASSERT_EQ(found.errors.size(), 2U);
   EXPECT_THAT(found.errors[0].message(), testing::AllOf(testing::StartsWith("dataset \"long\": "), HasSubstr("truncated")));
   EXPECT_THAT(found.errors[1].message(), testing::AllOf(testing::StartsWith("dataset \"none\": "), HasSubstr("--dims")));
-  const Result<LoadedSource> loaded = LoadSource(found.datasets.at("b"));
+  const Result<LoadedSource> loaded = LoadWhole(found.datasets.at("b"));
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_THAT(loaded->volume->block.bytes, testing::AllOf(testing::SizeIs(8), testing::Each(std::byte{'b'})));
   ExpectError({"a=" + file + "?dims=2,2"}, StatusCode::kInvalidArgument, "dims");
@@ -471,7 +480,7 @@ TEST_F(CatalogueTest, TimesOfAFileAreDatasets) {
   CheckFiles(found);
   ASSERT_THAT(found.errors, testing::IsEmpty());
   EXPECT_THAT(NamesOf(found), testing::ElementsAre("beat@1", "beat@2", "beat@3"));
-  const Result<LoadedSource> loaded = LoadSource(found.datasets.at("beat@2"));
+  const Result<LoadedSource> loaded = LoadWhole(found.datasets.at("beat@2"));
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_THAT(loaded->volume->block.bytes, testing::Each(std::byte{'c'}));
   EXPECT_EQ(loaded->volume->description.geometry.spacing, (Vec3{1, 1, 2}));
@@ -514,26 +523,26 @@ TEST_F(CatalogueTest, LayersFollowANamedVolume) {
   }
   // Other layers, other ids; a layer that is replaced is noticed.
   const DataSource source(volume, "", {.overlay = layer});
-  const Result<LoadedSource> loaded = LoadSource(source);
+  const Result<LoadedSource> loaded = LoadWhole(source);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ASSERT_NE(loaded->layers.overlay, nullptr);
   EXPECT_NE(IdOf("a", *loaded->volume, loaded->layers), IdOf("a", *loaded->volume));
   EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
   Write("layer.nrrd", 6);
   EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
-  EXPECT_NE(IdOf("a", *loaded->volume, LoadSource(source)->layers), IdOf("a", *loaded->volume, loaded->layers));
+  EXPECT_NE(IdOf("a", *loaded->volume, LoadWhole(source)->layers), IdOf("a", *loaded->volume, loaded->layers));
 }
 
 TEST_F(CatalogueTest, ALoadedFileHasAStampThatTellsOfEveryChange) {
   const std::string file = Write("ball.nrrd", 8);
   const DataSource source(file, "");
-  const Result<LoadedSource> loaded = LoadSource(source);
+  const Result<LoadedSource> loaded = LoadWhole(source);
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   ASSERT_NE(loaded->stamp, nullptr);
   EXPECT_FALSE(HaveChanged(*loaded->stamp).value());
   Write("ball.nrrd", 9);  // in its place
   EXPECT_TRUE(HaveChanged(*loaded->stamp).value());
-  EXPECT_EQ(LoadSource(source)->volume->description.geometry.size, (Index3{9, 9, 9}));
+  EXPECT_EQ(LoadWhole(source)->volume->description.geometry.size, (Index3{9, 9, 9}));
   std::filesystem::remove(file);
   EXPECT_EQ(HaveChanged(*loaded->stamp).status().code(), StatusCode::kNotFound);
 }
@@ -570,7 +579,7 @@ TEST_F(CatalogueTest, AFileThatIsWrittenAgainAndAgainIsReadAsAWholeOrNotAtAll) {
   int told = 0;
   for (int i = 0; i < 20; ++i) {
     const int rests_before = rests;
-    const Result<LoadedSource> loaded = LoadSource(DataSource(file, ""));
+    const Result<LoadedSource> loaded = LoadWhole(DataSource(file, ""));
     if (loaded.ok()) {
       for (const int seen = slices; slices == seen;) std::this_thread::yield();  // the writer has counted a rest that it had meanwhile
       EXPECT_TRUE(is_whole(*loaded) || rests > rests_before) << "bytes of two files";
@@ -583,7 +592,7 @@ TEST_F(CatalogueTest, AFileThatIsWrittenAgainAndAgainIsReadAsAWholeOrNotAtAll) {
   EXPECT_GT(told, 0) << "the writer was never met at work";
   done = true;
   writer.join();
-  const Result<LoadedSource> loaded = LoadSource(DataSource(file, ""));
+  const Result<LoadedSource> loaded = LoadWhole(DataSource(file, ""));
   ASSERT_TRUE(loaded.ok()) << loaded.status().message();
   EXPECT_TRUE(is_whole(*loaded));
 }

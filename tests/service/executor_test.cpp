@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstring>
 #include <semaphore>
 
 #include "common/mesh/lattice.h"
@@ -16,6 +17,7 @@
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 #include "worker/renderers/for_each_piece.h"
+#include "worker/stored_box.h"
 
 namespace slabstream {
 namespace {
@@ -244,6 +246,27 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
 }
 
+TEST(StoredBoxTest, WhatIsFilledHasItsSampleAndSoHasThePaddingBesideIt) {
+  const Box whole = {{0, 0, 0}, {40, 20, 10}}, read = {{8, 0, 0}, {32, 20, 10}};
+  const BoxKey key{.dataset = 1, .box = whole, .types = ScalarType::kUint16};
+  StoredBox box(key, {}, true, {{{{0, 0, 0}, {8, 20, 10}}, 0}, {{{32, 0, 0}, {40, 20, 10}}, 300}});
+  constexpr std::uint16_t kRead = 0x0909;
+  Chunk chunk{.epoch = 1, .dataset = 1, .box = read, .chunk = 0};
+  std::vector<std::byte> samples(std::size_t(read.voxel_count()) * sizeof(kRead), std::byte{9});
+  const Bytes payload = PackChunk(Bytes(std::move(samples)), Codec::kRaw, chunk);
+  ASSERT_TRUE(box.Store(chunk, payload).ok());
+  EXPECT_FALSE(box.Assemble()) << "nothing is copied";
+  const StoredBox::Lease lease = box.Lend(1);
+  ASSERT_NE(lease.data().padded(), nullptr);
+  for (const std::int32_t y : {-2, 0, 19, 21}) {
+    for (std::int32_t x = -kPad; x < whole.end.x + kPad; ++x) {
+      std::uint16_t sample = 0;
+      std::memcpy(&sample, lease.data().padded()->At({x, y, 5}), sizeof(sample));
+      EXPECT_EQ(sample, x < 8 ? 0 : x < 32 ? kRead : 300) << x << ", " << y;
+    }
+  }
+}
+
 // Renders small frames at once. Larger ones have three pieces, each of which says that it has begun and then waits until it may end.
 class StepwiseRenderer : public Renderer {
  public:
@@ -252,7 +275,7 @@ class StepwiseRenderer : public Renderer {
   };
   explicit StepwiseRenderer(Steps& steps) : steps_(steps) {}
 
-  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
+  Result<LocalImage> Render(BoxData&, const LevelBox&, const FrameSetup& setup, const OcclusionMask&, const RenderControl& control,
                             RankReport&) override {
     if (FrameBounds(setup).pixel_count() >= 64 * 64) {
       ForEachPiece(3, control, [this](std::int32_t) {
@@ -408,25 +431,27 @@ TEST_F(ExecutorTest, WhatIsCopiedFromOtherBoxesIsWhatWouldHaveArrived) {
     const RankReport expected = render(direct, 1);
     EXPECT_GT(expected.image_pixels, 0U);
 
-    // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
-    executor_.Perform(OpenBox{lower, {}});
-    store(lower, lower.box);
-    executor_.Perform(OpenBox{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}});
-    store(side, {{20, 0, 30}, {60, 60, 50}});
-    executor_.Perform(OpenBox{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}});
-    store(put_together, {{0, 0, 30}, {20, 60, 50}});
-    store(put_together, {{0, 0, 50}, {60, 60, 60}});
-    store_cells(put_together);
-    executor_.Perform(DropBox{lower});
-    executor_.Perform(DropBox{side});
-    const RankReport report = render(put_together, 2);
-    EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
-    EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
-    EXPECT_EQ(report.image_bounds, expected.image_bounds);
-    EXPECT_EQ(report.image_pixels, expected.image_pixels);
-    for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
+    for (const bool stored : {false, true}) {  // voxels that are read in parts are stored in another way
+      // One source is itself a copy in part and was not rendered from; both are dropped before the first render.
+      executor_.Perform(OpenBox{lower, {}, stored});
+      store(lower, lower.box);
+      executor_.Perform(OpenBox{side, {{lower, {{20, 0, 0}, {60, 60, 30}}}}, stored});
+      store(side, {{20, 0, 30}, {60, 60, 50}});
+      executor_.Perform(OpenBox{put_together, {{lower, lower.box}, {side, {{20, 0, 30}, {60, 60, 50}}}}, stored});
+      store(put_together, {{0, 0, 30}, {20, 60, 50}});
+      store(put_together, {{0, 0, 50}, {60, 60, 60}});
+      store_cells(put_together);
+      executor_.Perform(DropBox{lower});
+      executor_.Perform(DropBox{side});
+      const RankReport report = render(put_together, 2);
+      EXPECT_EQ(report.occupied_voxels, expected.occupied_voxels);
+      EXPECT_EQ(report.drawn_voxels, expected.drawn_voxels);
+      EXPECT_EQ(report.image_bounds, expected.image_bounds);
+      EXPECT_EQ(report.image_pixels, expected.image_pixels);
+      for (const ImageHandle image : {1, 2}) executor_.Perform(ReleaseImage{image});
+      executor_.Perform(DropBox{put_together});
+    }
     executor_.Perform(DropBox{direct});
-    executor_.Perform(DropBox{put_together});
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -11,11 +12,14 @@
 #include "coordinator/catalogue.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/unchanged_source.h"
 #include "data/sources/memory_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/volume_reader.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
@@ -131,6 +135,88 @@ TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
   }
 }
 
+// ---------------------------------------------------------------- compressed streams
+
+class StreamsInPartsTest : public InPartsTest {
+ protected:
+  StreamsInPartsTest() { ::setenv("XDG_CACHE_HOME", (directory_ / "cache").c_str(), 1); }
+
+  // The ball as a compressed stream: a file for each format.
+  std::vector<std::string> Streams() const {
+    const auto* const bytes = reinterpret_cast<const char*>(ball_->block.bytes.data());
+    const FileBytes samples(bytes, ball_->block.bytes.size()), zlib = Zlib(samples);
+    const FileSpec spec{.size = ball_->description.geometry.size, .spacing = {1, 1, 1}};
+    const std::pair<std::string, FileBytes> files[] = {{"ball.nii.gz", Gzip(NiftiHeader(spec) + samples)},
+                                                       {"ball.nrrd", NrrdHeader(spec, "gzip") + Gzip(samples)},
+                                                       {"ball.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())) + zlib}};
+    std::vector<std::string> paths;
+    for (const auto& [name, file] : files) {
+      paths.push_back((directory_ / name).string());
+      WriteFile(paths.back(), file);
+    }
+    return paths;
+  }
+  fs::path StoreOf(const std::string& path) const {
+    for (const auto& each : fs::directory_iterator(directory_ / "cache/slabstream/streams")) {
+      if (each.is_directory() && each.path().filename().string().starts_with(fs::path(path).stem().stem().string())) return each.path();
+    }
+    return {};
+  }
+};
+
+TEST_F(StreamsInPartsTest, PicturesAreThoseOfVoxelsInMemory) {
+  for (const std::string& path : Streams()) {
+    const Volume whole = *ReadVolume(path)->volume;
+    ASSERT_EQ(whole.block.bytes, ball_->block.bytes);
+    for (const bool first : {true, false}) {
+      Start(path);
+      for (const RendererKind* renderer : VoxelRenderers()) {
+        FrameRequest request = RequestsFor(renderer)[first ? 0 : 3];
+        SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name());
+        ExpectPictureOf(request, whole);  // it has one level, as in memory
+        request.level = "1";
+        EXPECT_THAT(Render(request).status().message(), HasSubstr("has level 0 alone"));
+      }
+      ExpectNothingHeld();
+    }
+    fs::remove_all(directory_ / "cache");
+  }
+}
+
+TEST_F(StreamsInPartsTest, AStoreThatIsRemovedIsNoticedAndMadeAgain) {
+  const std::string path = Streams().front();
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  ExpectPictureOf(request, *ball_);
+  // What is not there would be zeros.
+  for (const auto& each : fs::directory_iterator(StoreOf(path) / "0/c")) fs::remove_all(each);
+  const Result<Picture> without = Render(request);
+  if (without.ok()) {
+    ExpectPictureOf(request, *ball_);
+  } else {
+    EXPECT_EQ(std::ranges::count(without.status().message(), '\n'), 0);
+  }
+  fs::remove_all(StoreOf(path));
+  for (int attempt = 0; attempt < 3 && !Render(request).ok(); ++attempt) {
+  }
+  ExpectPictureOf(request, *ball_);
+  EXPECT_TRUE(fs::exists(StoreOf(path) / "zarr.json"));
+}
+
+TEST_F(StreamsInPartsTest, AStreamThatChangesIsReadAgain) {
+  const std::string path = Streams().front();
+  Start(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  ExpectPictureOf(request, *ball_);
+  const std::shared_ptr<const Volume> smaller = TestSphere(90);
+  const FileSpec spec{.size = smaller->description.geometry.size, .spacing = {1, 1, 1}};
+  WriteFile(path,
+            Gzip(NiftiHeader(spec) + FileBytes(reinterpret_cast<const char*>(smaller->block.bytes.data()), smaller->block.bytes.size())));
+  ExpectPictureOf(request, *smaller);
+}
+
+// ---------------------------------------------------------------- workers
+
 TEST_F(InPartsTest, WorkersComeAndGo) {
   Start(Zarr(ball_), 3);
   FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
@@ -237,6 +323,50 @@ TEST_F(InPartsTest, LevelsChangeNeitherPlaceNorScale) {
         EXPECT_NEAR(found.x_end, expected.x_end, most);
         EXPECT_NEAR(found.y_begin, expected.y_begin, most);
         EXPECT_NEAR(found.y_end, expected.y_end, most);
+      }
+    }
+  }
+}
+
+// Of one picture in perspective: the near side of the ball is drawn from the finest level, the far side from coarser ones.
+TEST_F(InPartsTest, LevelsOfOnePictureAreTheSameHoweverMuchIsHeldByHoweverManyWorkers) {
+  const std::string path = Zarr(ball_);
+  std::vector<FrameRequest> requests;
+  for (const char* const renderer : {"raycast", "mip", "xray"}) {
+    FrameRequest request = TestRequest(FindRenderer(renderer), 0);
+    request.view.projection = Projection::kPerspective;
+    request.view.fov_degrees = 50;
+    request.view.distance = 75;
+    request.detail = 3;
+    requests.push_back(request);
+    request.view.azimuth_degrees = 3;
+    request.clipping.box = ClipBox{{0, 0, 0}, {60, 100, 75}, ClipUnit::kVoxels};
+    requests.push_back(request);
+  }
+  std::vector<LocalImage> held;
+  constexpr std::uint64_t kNoLimit = 0;
+  Start(path, 1, kNoLimit);
+  for (const FrameRequest& request : requests) {
+    SCOPED_TRACE(request.renderer);
+    FrameRequest finest = request;
+    finest.level = "0";
+    const Result<Picture> mixed = Render(request), of_finest = Render(finest);
+    ASSERT_TRUE(mixed.ok() && of_finest.ok()) << mixed.status().message() << of_finest.status().message();
+    EXPECT_GT(HighestAlpha(mixed->image), 0.1);
+    const float difference = LargestDifference(mixed->image, of_finest->image, request.size);
+    EXPECT_GT(difference, AllowedDifference(request)) << "drawn from the finest level alone";
+    EXPECT_LT(difference, 0.35) << "a shift, or a hole";
+    held.push_back(mixed->image);
+  }
+  EXPECT_GT(client_->QueryStatus(seconds(30))->datasets.at(0).memory_bytes, 100U * 100 * 100) << "more than one level";
+  for (const int workers : {1, 3}) {
+    Start(path, workers);
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+      for (const char* const decomposition : {"slab", "kd-tree"}) {
+        SCOPED_TRACE(testing::Message() << requests[i].renderer << ", " << workers << " workers, " << decomposition);
+        FrameRequest request = requests[i];
+        request.policy.decomposition = decomposition;
+        Expect(request, held[i], 0);
       }
     }
   }
@@ -392,6 +522,47 @@ TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
     EXPECT_EQ(in_parts.range, summary.range);
     EXPECT_EQ(in_parts.histogram, summary.histogram);
     EXPECT_EQ(in_parts.transfer, summary.transfer);
+    ExpectNothingHeld();
+  }
+}
+
+TEST_F(InPartsTest, WhatAPixelShowsIsFoundInVoxelsThatAreReadForIt) {
+  for (const std::string& path : {Nrrd(*ball_), Zarr(ball_)}) {
+    const auto pick = [&](const RendererKind* renderer, double x, double y) -> Result<PickReply> {
+      FrameRequest frame = TestRequest(renderer, 30);
+      frame.level = "0";
+      const RequestId asked = client_->Submit(Question(PickQuery{.frame = frame, .x = x, .y = y}), seconds(60));
+      while (const auto event = client_->Next(seconds(60))) {
+        if (event->request != asked) continue;
+        if (const auto* reply = std::get_if<QuestionReply>(&event->what)) {
+          PickReply picked = std::get<PickReply>(*reply);
+          picked.nonce = 0;
+          return picked;
+        }
+        return std::get<Status>(event->what);
+      }
+      return Status::Internal("no answer");
+    };
+    std::vector<PickReply> held;
+    for (const bool in_parts : {false, true}) {
+      constexpr std::uint64_t kNoLimit = 0, kLittle = std::uint64_t{512} << 10;
+      Start(path, 1, in_parts ? kLittle : kNoLimit);
+      std::size_t next = 0, hits = 0;
+      for (const RendererKind* renderer : VoxelRenderers()) {
+        for (const double x : {5.5, 40.5, 48.25}) {
+          SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name() << ", x " << x);
+          const Result<PickReply> picked = pick(renderer, x, 40.5);
+          ASSERT_TRUE(picked.ok()) << picked.status().message();
+          hits += picked->sample ? 1 : 0;
+          if (!in_parts) {
+            held.push_back(*picked);
+          } else {
+            EXPECT_EQ(*picked, held[next++]);
+          }
+        }
+      }
+      EXPECT_GT(hits, 5U);
+    }
     ExpectNothingHeld();
   }
 }

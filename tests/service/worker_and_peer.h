@@ -27,7 +27,8 @@ inline LocalImage Picture(std::uint64_t seed) {
 // The worker's part of every frame.
 class FixedPicture : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData&, const Box&, const FrameSetup&, const OcclusionMask&, const RenderControl&, RankReport&) override {
+  Result<LocalImage> Render(BoxData&, const LevelBox&, const FrameSetup&, const OcclusionMask&, const RenderControl&,
+                            RankReport&) override {
     return Picture(1);
   }
 };

@@ -7,7 +7,7 @@
 namespace slabstream {
 
 // So few lost messages must not cost a frame: it is handed out again.
-inline constexpr double kRareLoss = 0.002;
+inline constexpr double kRareLoss = 0.001;
 
 struct Faults {
   // ---- messages, until the world heals
@@ -38,6 +38,11 @@ struct Faults {
   int clock_jumps = 0;  // of the coordinator's clock, forward
   double cancel = 0;    // share of requests
   double vanish = 0;    // share of clients
+  // ---- stores, of volumes that are read in parts, until the world heals
+  double slow_read = 0;   // share of reads that take seconds
+  double lost_read = 0;   // that never end
+  double fail_read = 0;   // that fail; another one may not
+  double bad_blocks = 0;  // share of blocks that are damaged, for whoever reads them
   // ---- files
   int file_changes = 0;  // of the volume's
   int data_orders = 0;   // of a client that is an admin
@@ -49,25 +54,28 @@ struct Faults {
   bool none() const { return !reorder && cuts == 0 && lose + duplicate + delay == 0 && failures() == 0; }
   // True if every frame must be finished, as long as there is a worker and the deadline is kept.
   bool harmless() const {
-    return lose <= kRareLoss && delay + fail_render + damage_chunk + fail_combine + fail_load + slow + without_memory +
+    return lose <= kRareLoss && delay + fail_render + damage_chunk + fail_combine + fail_load + slow + without_memory + reads() +
                                         coordinator_restarts + cuts + hostile_workers ==
                                     0;
   }
+  // True if nothing but stores misbehaves.
+  bool only_stores() const { return reads() > 0 && reads() == failures() && !reorder && cuts == 0 && lose + duplicate + delay == 0; }
+  double reads() const { return slow_read + lost_read + fail_read + bad_blocks; }
   // True if no box of a frame may be rendered twice: at most, workers leave with notice.
   bool gentle() const { return !reorder && cuts == 0 && lose + duplicate + delay == 0 && failures() == workers_leaving; }
   bool only_stops_time() const { return stops() > 0 && stops() == failures() && !reorder && cuts == 0 && lose + duplicate + delay == 0; }
   double stops() const { return worker_pauses + coordinator_pauses + suspensions + clock_jumps; }
   // Beside messages.
   double failures() const {
-    return fail_render + damage_chunk + fail_combine + fail_load + slow + without_memory + worker_kills + preemptions + workers_joining +
-           workers_leaving + coordinator_restarts + stops() + cancel + vanish + file_changes + data_orders + hostile_clients + strangers +
-           hostile_workers;
+    return fail_render + damage_chunk + fail_combine + fail_load + slow + without_memory + reads() + worker_kills + preemptions +
+           workers_joining + workers_leaving + coordinator_restarts + stops() + cancel + vanish + file_changes + data_orders +
+           hostile_clients + strangers + hostile_workers;
   }
 };
 
 // Some worlds are free of faults. In some, workers leave with notice and nothing else happens. In others there is only one kind of what
 // must cost no frame: workers that come and go and messages that overtake each other; processes and clocks that stop and go on; peers that
-// keep to no protocol. The others have any mixture.
+// keep to no protocol. In some, only stores misbehave. The others have any mixture.
 inline Faults RandomFaults(Random& random) {
   Faults faults;
   const double kind = random.Real(0, 1);
@@ -81,6 +89,13 @@ inline Faults RandomFaults(Random& random) {
     faults.workers_leaving = random.Integer(1, 6);
     faults.restart = one_of(0, 0.5, 1);
     return faults;
+  }
+  if (kind < 0.25 || mixture) {
+    faults.slow_read = one_of(0, 0.02, 0.2);
+    faults.lost_read = one_of(0, 0, 0.02);
+    faults.fail_read = one_of(0, 0.01, 0.1);
+    faults.bad_blocks = one_of(0, 0, 0.01, 0.1);
+    if (!mixture) return faults;
   }
   if (kind < 0.35 || mixture) {
     faults.duplicate = one_of(0, 0.02, 0.2);

@@ -78,6 +78,10 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
   for (const Placement& placement : assignment.group.placements) {
     boxes.push_back(placement.id);
     frame.boxes[placement.id] = placement.box;
+    if (assignment.setup.stored && ReachOf(placement.box, assignment.setup).empty()) {
+      frame.outside.insert(placement.id);
+      continue;
+    }
     Box& last = last_boxes_.try_emplace(placement.id, placement.box).first->second;
     if (faultless_ && last != placement.box) tally_.Add(Count::kMovedBoxes);
     last = placement.box;
@@ -86,7 +90,7 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
       tally_.Add(Count::kHiddenBoxes);
       continue;
     }
-    const std::pair<WorkerId, Box> padded{placement.worker, PaddedBox(placement.box, assignment.setup)};
+    const std::pair<WorkerId, Box> padded{placement.worker, PaddedBox(placement.at(), assignment.setup)};
     frame.padded_boxes.insert(padded);
     if (fetched_.count(padded) == 0) frame.all_cached = false;
   }
@@ -105,7 +109,8 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
   const FrameWindow window = WindowFor(workers, std::uint32_t(teams), FrameBytes(assignment.setup));
   if (of_client > 1) {  // the first one may be beyond the window, as may be those of others
     const std::size_t beyond = OthersThan(assignment.client);
-    EXPECT_LE(unfinished, std::size_t(faultless_ ? window.groups : window.groups * window.frames) + beyond);
+    const std::size_t counted = std::size_t(window.groups), waiting = std::size_t(window.frames) - 1 + beyond;
+    EXPECT_LE(unfinished, counted + (faultless_ ? 0 : counted * waiting) + beyond);
   }
   if (faultless_ && UsesOcclusion(assignment.setup)) {
     EXPECT_LE(frame.unfinished(), std::size_t(kMaskedGroups));
@@ -146,7 +151,7 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
   for (std::uint32_t group = 0; group < reply.groups_done; ++group) {
     const auto seen = frame->second.groups.find(group);
     ASSERT_TRUE(seen != frame->second.groups.end()) << "group " << group << " was never handed out";
-    expected.insert(expected.end(), seen->second.begin(), seen->second.end());
+    std::ranges::copy_if(seen->second, std::back_inserter(expected), [&](BoxId box) { return !frame->second.outside.contains(box); });
   }
   const Camera& camera = frame->second.setup.camera;
   EXPECT_EQ(reply.size, (ImageSize{camera.width, camera.height}));

@@ -126,8 +126,8 @@ double ModelWorker::Begin(Job&, const StartRender& action) {
     tally_.Add(Count::kRendersBesideOthers);
   }
   EXPECT_TRUE(Complete(action.padded)) << "a padded box is rendered from before it is complete";
-  EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.box, *action.setup))) << "a padded box without the voxels of its box";
-  EXPECT_EQ(action.padded.dataset, action.setup->dataset);
+  EXPECT_TRUE(action.padded.box.Contains(PaddedBox(action.placement.at(), *action.setup))) << "a padded box without the voxels of its box";
+  EXPECT_EQ(action.padded.dataset, DatasetOf(*action.setup, action.placement.level));
   if (slowness_ != 1) tally_.Add(Count::kSlowRenders);
   const bool large = std::uint64_t(FrameBounds(*action.setup).pixel_count()) >= kLargePixels;
   const double seconds = speed_.render * random_.Real(0.5, 2) * (large ? speed_.large : 1);

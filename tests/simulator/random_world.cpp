@@ -64,6 +64,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
   world.worker_config.chunk_attempts = 6;
   world.worker_config.credit_bytes = std::uint64_t{kChunkBytes} * random.Integer<std::uint64_t>(1, 4);
   if (!faults.none() && random.Chance(0.3)) world.worker_config.cache_bytes = std::uint64_t{4} << 20;
+  world.in_parts = !cells.present() && random.Chance(faults.only_stores() ? 1 : 0.25);
   world.policy.groups = random.Integer(1, 6);
   world.policy.axis = AxisChoice(random.Integer(0, 4));
   const auto one_of = [&](const auto& entries) { return std::string(entries[random.Integer<std::size_t>(0, entries.size() - 1)].name); };

@@ -19,6 +19,7 @@ namespace slabstream {
 struct SimulatedWorld {
   std::shared_ptr<const VolumeSummary> summary;
   std::shared_ptr<const OccupancyGrid> occupied;
+  bool in_parts = false;  // nobody holds the volume
   WorkerConfig worker_config;
   WorkerSpeed speed;
   Policy policy;

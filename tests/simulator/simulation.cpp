@@ -22,6 +22,8 @@ constexpr Duration kTroubled = seconds(5);                            // request
 constexpr Duration kSettleSlowly = seconds(90);                       // and for what was begun slowly
 constexpr RequestId kRequestAfterHealing = 1000;
 constexpr Duration kSettle = seconds(14);  // long enough for every time-out of the machines below
+constexpr char kFile[] = "/data/volume";
+constexpr Index3 kBlock = {32, 32, 32};  // of a volume that is read in parts
 
 }  // namespace
 
@@ -80,7 +82,7 @@ void Simulation::StartCoordinator() {
   planner_.emplace();
   witness_.OnRestart();
   datasets_wake_ = {};
-  datasets_.emplace(DatasetConfig{.datasets = {{"volume", DataSource("/data/volume", "")}}, .folders = {"/data"}});
+  datasets_.emplace(DatasetConfig{.datasets = {{"volume", DataSource(kFile, "")}}, .folders = {"/data"}});
   service_.StartCoordinator(std::move(config));
   StepDatasets(DatasetTick{});
 }
@@ -109,6 +111,7 @@ void Simulation::RunUntil(Duration from_now, bool until_idle) {
 void Simulation::Run() {
   tally_.Add(Count::kWorlds);
   if (cells_.present()) tally_.Add(Count::kGrids);
+  if (world_.in_parts) tally_.Add(Count::kWorldsInParts);
   StartCoordinator();
   const int workers = random_.Integer(1, 8);
   for (int i = 0; i < workers; ++i) AddWorker(faults_.none() ? Duration{} : Duration(milliseconds(random_.Integer(0, 500))));
@@ -162,7 +165,9 @@ void Simulation::CheckOutcome() {
         }
         continue;
       }
-      tally_.Add(ended.given_up                           ? Count::kGivenUp
+      const bool of_store = ended.status.message().find(kFile) != std::string::npos;
+      tally_.Add(of_store                                 ? Count::kErrorsOfStores
+                 : ended.given_up                         ? Count::kGivenUp
                  : code == StatusCode::kCancelled         ? Count::kCancelled
                  : code == StatusCode::kDeadlineExceeded  ? Count::kErrorsOfDeadline
                  : code == StatusCode::kResourceExhausted ? Count::kErrorsOfMemory
@@ -173,10 +178,15 @@ void Simulation::CheckOutcome() {
       // Three workers that are killed by chance may have had the same box of a frame.
       const bool died_alike = faults_.worker_kills + 2 * faults_.preemptions >= 3 &&
                               ended.status.message().find("as two workers before it") != std::string::npos;
-      const bool excused =
-          !faults_.harmless() || workerless_ || out_of_time || stood_still || died_alike || client->cancelled().count(request) > 0;
+      const bool replaced = of_store && faults_.file_changes > 0;
+      const bool excused = !faults_.harmless() || replaced || workerless_ || out_of_time || stood_still || died_alike ||
+                           client->cancelled().count(request) > 0;
       EXPECT_TRUE(excused) << "a frame failed although there was a worker all the time: " << ended.status.message();
       EXPECT_FALSE(ended.status.message().empty());
+      if (faults_.only_stores()) {
+        const bool stalls = ended.status.message().find("no progress") != std::string::npos;  // reads that take long
+        EXPECT_TRUE(of_store || stalls) << ended.status.message();
+      }
       EXPECT_TRUE(code != StatusCode::kInternal && code != StatusCode::kInvalidArgument) << ended.status.message();
       if (code == StatusCode::kCancelled) {
         EXPECT_EQ(client->cancelled().count(request), 1U) << "cancelled, but not by the client";
@@ -321,7 +331,9 @@ void Simulation::Perform(const LoadDataset& action) {
   service_.queue().At(when, [this, epoch = epoch_, voxels = voxels_] {
     if (epoch == epoch_) published_.insert(voxels);
   });
-  TellDatasets(when, DatasetLoaded{action.name, action.load, voxels_, world_.summary, 0, stamp});
+  auto summary = std::make_shared<VolumeSummary>(*world_.summary);
+  if (world_.in_parts) summary->stored = StoredAt{.source = kFile, .level = 0, .version = voxels_, .block = {{0, 0, 0}, kBlock}};
+  TellDatasets(when, DatasetLoaded{action.name, action.load, voxels_, std::move(summary), 0, stamp});
 }
 
 void Simulation::Perform(const CheckDatasetFiles& action) {
@@ -459,10 +471,21 @@ Arrivals Simulation::ToPeer(Node to, Job& sends) {
 
 void Simulation::Perform(Node node, SendChunkRequest& action) {
   workers_[node].OnRequest(action.request);
+  if (action.stored != nullptr && ReadsItself(node, *action.stored)) {
+    tally_.Add(Count::kOwnReads);
+    const std::optional<double> seconds = SecondsToRead();
+    if (!seconds) return;
+    service_.queue().At(service_.now() + *seconds, [this, node, request = action.request] {
+      service_.StepWorker(node, MessageReceived{Widen<MessageToWorker>(ReadOf(request)), {}});
+    });
+    return;
+  }
   const auto request = std::get<ChunkRequest>(OnTheWay(WorkerToVoxels(action.request)));
   const Arrivals asked = network_.Send({int(node), kVoxelServerEnd}, service_.now());
   for (int i = 0; i < asked.count; ++i) {
-    service_.queue().At(asked.times[i], [this, node, request] {
+    const std::optional<double> seconds = world_.in_parts ? SecondsToRead() : 0;
+    if (!seconds) continue;
+    service_.queue().At(asked.times[i] + *seconds, [this, node, request] {
       if (!service_.coordinator_runs() || request.epoch != epoch_) return;
       const auto answer = Widen<MessageToWorker>(OnTheWay(AnswerOf(request)));
       const Arrivals answered = network_.Send({kVoxelServerEnd, int(node)}, service_.now());
@@ -473,10 +496,50 @@ void Simulation::Perform(Node node, SendChunkRequest& action) {
   }
 }
 
+// A worker sees the file or does not, and needs a while to find out. One that opens it after it was replaced finds another one.
+bool Simulation::ReadsItself(Node node, const StoredAt& stored) {
+  const auto [place, is_new] = places_.try_emplace({node, stored.version});
+  if (is_new && random_.Chance(0.7) && stored.version == voxels_) place->second = service_.now() + random_.Real(0.001, 0.5);
+  return place->second && service_.now() >= *place->second;
+}
+
+std::optional<double> Simulation::SecondsToRead() {
+  if (random_.Chance(current_.lost_read)) {
+    tally_.Add(Count::kLostReads);
+    return std::nullopt;
+  }
+  if (!random_.Chance(current_.slow_read)) return random_.Real(10e-6, 5e-3);
+  tally_.Add(Count::kSlowReads);
+  return random_.Real(0.1, 5);
+}
+
+// What a read gives of a file that holds the voxels that are asked for, or held them.
+VoxelsToWorker Simulation::ReadOf(const ChunkRequest& request) {
+  const auto refused = [&](Count count, Status why) {
+    tally_.Add(count);
+    return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, std::move(why)};
+  };
+  if (request.dataset != voxels_) {
+    return refused(Count::kReadsOfOtherFiles, Status::Unavailable(std::string(kFile) + ": has changed since it was opened"));
+  }
+  if (random_.Chance(current_.fail_read)) {
+    return refused(Count::kFailedReads, Status::Unavailable(std::string(kFile) + ": cannot be read: Input/output error"));
+  }
+  const std::size_t block = NumberIn(world_.summary->brick_counts, request.box.begin / kBrick);
+  if (double(block * 7919 % 1000) < 1000 * current_.bad_blocks) {
+    return refused(Count::kBadBlocks, Status::DataLoss(std::string(kFile) + ": a block is damaged"));
+  }
+  return ChunkOf(request);
+}
+
 VoxelsToWorker Simulation::AnswerOf(const ChunkRequest& request) {
   if (!published_.contains(request.dataset)) {
     return ChunkRefused{request.epoch, request.dataset, request.box, request.chunk, Status::NotFound("no such dataset")};
   }
+  return world_.in_parts ? ReadOf(request) : ChunkOf(request);
+}
+
+Chunk Simulation::ChunkOf(const ChunkRequest& request) {
   Chunk chunk;
   chunk.epoch = request.epoch;
   chunk.dataset = request.dataset;

@@ -6,6 +6,7 @@
 //   some may be left out, but only where the frame's termination allows it
 //   a mask of hidden tiles tells only of tiles that the groups in front hide, as the display worker at hand has accumulated them
 //   all groups of a frame are of the same voxels, in every attempt, and those stay until its end, whatever becomes of the file
+//   where only stores misbehave, errors say which store, and why
 //   no image is left, read after its release or released twice; no padded box is rendered from before it is complete; credits are kept
 //   no more groups are unfinished at a time than the window allows, but for one of each other client, nor of one frame with masks
 //   where only workers come and go, processes and clocks stop, strangers talk, and few messages are lost: every frame is finished, as long
@@ -105,6 +106,10 @@ class Simulation : private Conditions {
   void FromClientNode(std::size_t client, const ClientToFrames& message);
   void AskDatasets(PeerToken client, const ClientToDatasets& message, const Bytes& payload = {});
   VoxelsToWorker AnswerOf(const ChunkRequest& request);
+  bool ReadsItself(Node node, const StoredAt& stored);
+  std::optional<double> SecondsToRead();  // none: the read never ends
+  VoxelsToWorker ReadOf(const ChunkRequest& request);
+  Chunk ChunkOf(const ChunkRequest& request);
 
   // ---- Conditions
   using Conditions::Perform;
@@ -180,6 +185,8 @@ class Simulation : private Conditions {
   };
   std::map<UploadId, Stored> stored_;
   std::set<DatasetId> published_;  // by the voxel server
+  // Of a volume that is read in parts: who sees which version of its file, and from when on it is open there.
+  std::map<std::pair<Node, std::uint64_t>, std::optional<double>> places_;
 };
 
 }  // namespace slabstream

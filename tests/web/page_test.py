@@ -74,7 +74,9 @@ class PageTest(unittest.TestCase):
         # Half a gigabyte of zeros, of which a file takes little: it is read long enough to be seen.
         big = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 1024 1024 {BIG_MEGABYTES}\nencoding: gzip\n\n".encode()
         (cls.programs.folder / "big.nrrd").write_bytes(big + gzip.compress(bytes(1 << 20), 1) * BIG_MEGABYTES)
-        cls.data = ("--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "big=big.nrrd")
+        cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "v.nrrd")
+        cls.programs.run("convert", "v.nrrd", "v.ome.zarr")
+        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "big=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -158,6 +160,32 @@ class PageTest(unittest.TestCase):
         viewer.keys("r")
         back = viewer.final(f"o.azimuth === {before['azimuth']} && o.roll === 0 && o['look-at']")
         self.assertAlmostEqual(back["options"]["zoom"], before["zoom"], places=4)
+
+    def test_the_picture_sharpens_and_a_badge_tells_its_level(self):
+        viewer = self.viewer(dataset="levels", renderer="raycast", zoom=0.5, layout="quad")
+        badge = "document.querySelector('[data-pane=\"3d\"] .pane-level:not([hidden])')?.textContent"
+        drawn = viewer.settled()
+        first = viewer.js("window.drawn.find(d => d.pane === '3d')")
+        self.assertFalse(first["final"])
+        self.assertGreater(first["header"]["coarseness"], 1)
+        self.assertGreater(first["header"]["statistics"]["levels"][0]["level"], drawn["header"]["statistics"]["levels"][0]["level"])
+        self.assertEqual(drawn["header"]["coarseness"], 1)
+        viewer.until(f"{badge} === 'Level {drawn['header']['statistics']['levels'][0]['level']} of 0–2'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelectorAll('.pane-level:not([hidden])').length === 4")
+        viewer.final("true", "z")
+        viewer.open_section("Dataset")
+        viewer.until("[...document.querySelectorAll('.facts dd')].some(d => d.textContent === '3, down to 33 × 33 × 33')")
+        viewer.until("document.querySelector('.dataset option[value=levels]').textContent === 'levels (130 × 130 × 130, 3 levels)'")
+        viewer.save(SHOTS, "levels")
+        narrow = self.viewer(width=360, height=640, mobile=True, theme="light", dataset="levels", renderer="raycast", zoom=0.1)
+        self.assertEqual(narrow.settled()["header"]["statistics"]["levels"][0]["level"], 2)
+        narrow.until(f"{badge} === 'Level 2 of 0–2'")
+        narrow.save(SHOTS, "levels-narrow")
+        one = self.viewer()
+        one.settled()
+        one.until("document.querySelector('.facts dd') !== null")
+        self.assertTrue(one.js("document.querySelector('.pane-level').hidden"), "it has one level")
 
     def test_the_right_button_changes_window_and_level(self):
         viewer = self.viewer(scalar_range="50:150")

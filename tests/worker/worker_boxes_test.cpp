@@ -139,6 +139,23 @@ TEST_F(WorkerBoxesTest, KeepsBoxesForTheNextFrame) {
   EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second)[0]))[0].reports.at(0).voxel_bytes, 0U);
 }
 
+TEST_F(WorkerBoxesTest, ReportsAddUpWhatWasReadFromStores) {
+  const auto requests = All<SendChunkRequest>(Tell(Assignment(1, {kSelf})));
+  ASSERT_THAT(requests, SizeIs(2));
+  Actions last;
+  for (const SendChunkRequest& request : requests) {
+    Chunk chunk = Answer(request.request);
+    chunk.stored_bytes = 1000;
+    const auto stores = All<StoreChunk>(Tell(chunk));
+    ASSERT_THAT(stores, SizeIs(1));
+    last = Tell(ChunkStored{stores[0].padded, chunk.box, chunk.chunk, {}});
+  }
+  ASSERT_THAT(All<StartRender>(last), SizeIs(1));
+  EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(last)[0])).at(0).reports.at(0).stored_bytes, 2000U);
+  const Actions second = Tell(Assignment(2, {kSelf}));
+  EXPECT_EQ(Sent<GroupDone>(Rendered(All<StartRender>(second).at(0)))[0].reports.at(0).stored_bytes, 0U) << "all was cached";
+}
+
 TEST_F(WorkerBoxesTest, ALargerHaloReplacesTheBoxOnceItIsCopied) {
   const auto first = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}))));
   Rendered(first.at(0));
@@ -320,6 +337,34 @@ TEST_F(WorkerBoxesTest, AsksForStoredVoxelsInPiecesThatEndAtBlocks) {
   }
   EXPECT_EQ(voxels, padded.voxel_count());
   EXPECT_GT(requests.size(), 1U);
+}
+
+TEST_F(WorkerBoxesTest, AsksForPartsOfLargeBlocksEachOfWhichIsOneChunk) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  StoreAt(StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 512}}}, assignment);
+  assignment.group.placements[0].box = {{0, 0, 100}, {128, 128, 340}};
+  std::int64_t voxels = 0;
+  for (const SendChunkRequest& request : All<SendChunkRequest>(Tell(assignment))) {
+    EXPECT_EQ(request.request.chunk, 0U);
+    EXPECT_LE(request.request.box.voxel_count(), kChunkBytes);
+    voxels += request.request.box.voxel_count();
+  }
+  EXPECT_EQ(voxels, 128 * 128 * 256);
+}
+
+TEST_F(WorkerBoxesTest, VoxelsThatItReadsItselfNeedNoChunk) {
+  GroupAssignment assignment = Assignment(1, {kSelf});
+  StoreAt(StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {128, 128, 64}}}, assignment);
+  assignment.group.placements[0].box = {{0, 0, 64}, {128, 120, 128}};
+  const Actions told = Tell(assignment);
+  EXPECT_TRUE(All<OpenBox>(told).at(0).stored);
+  Actions last;
+  for (const SendChunkRequest& request : All<SendChunkRequest>(told)) {
+    EXPECT_THAT(All<StartRender>(last), IsEmpty());
+    last = Tell(ChunkStored{request.padded, request.request.box, request.request.chunk, {}});
+    EXPECT_THAT(All<StoreChunk>(last), IsEmpty());
+  }
+  EXPECT_THAT(All<StartRender>(last), SizeIs(1));
 }
 
 TEST_F(WorkerBoxesTest, AsksForSmallBlocksTogether) {

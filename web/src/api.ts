@@ -7,10 +7,11 @@ export class ApiError extends Error {
   constructor(readonly status: number, message: string) { super(message); }
 }
 
+export interface Level { size: [number, number, number]; spacing: [number, number, number]; voxel_bytes: number }
 export interface Dataset {
   name: string; state: "unloaded" | "loading" | "ready" | "failed"; error?: string;
   size?: [number, number, number]; type?: string; spacing?: [number, number, number]; memory_bytes?: number;
-  layers?: { labels: number; overlay: boolean }; cells?: number; range?: { min: number; max: number };
+  layers?: { labels: number; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface LabelName { value: number; name: string; color?: string }

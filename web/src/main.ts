@@ -146,8 +146,9 @@ class Page {
       element.hidden = !volume;
       if (!volume) return;
       const fact = (name: string, value: string): HTMLElement => h("div", {}, h("dt", {}, name), h("dd", {}, value));
+      const coarsest = volume.levels.length > 1 ? volume.levels[volume.levels.length - 1] : undefined;
       const unit = volume.unit === "voxel" || volume.unit === "unknown" ? "" : ` ${volume.unit}`;
-      list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), ...(volume.cells > 0 ? [fact("Cells", `${volume.cells}`)] : []), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`),
+      list.replaceChildren(fact("Size", `${volume.size.join(" × ")} voxels`), ...(coarsest ? [fact("Levels", `${volume.levels.length}, down to ${coarsest.size.join(" × ")}`)] : []), ...(volume.cells > 0 ? [fact("Cells", `${volume.cells}`)] : []), fact("Spacing", `${volume.spacing.map(s => Number(s.toPrecision(4))).join(" × ")}${unit}`), fact("Values", `${volume.type}, ${volume.range.join(" to ")}`),
         fact("World", volume.world === "patient" ? "a patient’s (R, A, S)" : volume.world === "scene" ? "a scene’s" : "the voxels’"), fact("Memory", `${(volume.memoryBytes / 1e6).toFixed(1)} MB`));
     };
     this.volumeListeners.push(update);

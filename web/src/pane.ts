@@ -1,6 +1,7 @@
 // A pane: a canvas with the pictures of one session, at the screen's own pixels, and a drawing over it.
 import { Drawing } from "./annotations";
 import { h, put } from "./dom";
+import { LevelBadge } from "./level_badge";
 import { type Connection, type Frame, type Progress, type ServiceStatus, Session, type View } from "./session";
 
 export interface Shown { frame: Frame; cssWidth: number; cssHeight: number } // cssWidth: what the picture's width is on the page
@@ -19,6 +20,7 @@ const LEAST_SIDE = 16, MOST_SIDE = 8192;
 export class Pane {
   readonly canvas = h("canvas", { width: LEAST_SIDE, height: LEAST_SIDE });
   readonly drawing = new Drawing();
+  readonly level = new LevelBadge();
   readonly element: HTMLElement;
   shown: Shown | null = null;
   private readonly context = this.canvas.getContext("2d", { alpha: false }) as CanvasRenderingContext2D;
@@ -31,7 +33,7 @@ export class Pane {
     this.canvas.setAttribute("tabindex", "0");
     this.canvas.setAttribute("role", "application");
     this.canvas.setAttribute("aria-label", label);
-    this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing.element);
+    this.element = h("section", { class: `pane pane-${name}`, "data-pane": name, "aria-label": name }, this.canvas, this.drawing.element, this.level.element);
     this.session = new Session(token, { ...events, frame: frame => this.draw(frame) });
     this.watcher = new ResizeObserver(entries => {
       const exact = entries[entries.length - 1]?.devicePixelContentBoxSize?.[0];

@@ -1,4 +1,5 @@
 // One stream of pictures: a WebSocket of docs/http.md with one view that changes. It connects again by itself.
+import type { Dataset } from "./api";
 import type { Options } from "./options";
 import type { Vec3 } from "./vec";
 
@@ -9,11 +10,11 @@ export interface Geometry {
 export interface Span { worker: number; group: number; stage: string; begin_ms: number; end_ms: number }
 export interface Statistics {
   latency_ms: number; queued_ms: number; encode_ms: number; round_trip_ms: number; attempts: number; workers: number; groups: number;
-  imbalance: number; idle_share: number; bytes: { voxels: number; images: number; picture: number };
+  imbalance: number; idle_share: number; bytes: { voxels: number; stored: number; images: number; picture: number }; levels: { level: number; boxes: number; voxels: number }[];
   stages_ms: Record<string, number>; plan: Record<string, string>; timeline?: Span[];
 }
 export interface FrameHeader {
-  frame: number; seq: number; final: boolean; type: string; size: [number, number]; scale: number; bounds: [number, number, number, number];
+  frame: number; seq: number; final: boolean; type: string; size: [number, number]; scale: number; coarseness: number; bounds: [number, number, number, number];
   background: [number, number, number, number]; geometry: Geometry; statistics: Statistics;
 }
 export interface WorkerStatus {
@@ -22,7 +23,7 @@ export interface WorkerStatus {
 }
 export interface ServiceStatus {
   service: "ready" | "no-workers" | "gone"; reason: string; workers: WorkerStatus[]; workers_lost: number; queued: number; running: number;
-  frames_done: number; datasets: { name: string; state: string; error?: string }[];
+  frames_done: number; datasets: Dataset[];
 }
 export interface Progress { seq: number; phase: "queued" | "loading" | "running"; queue_position: number; groups_done: number; group_count: number; attempt: number; workers: number; read_percent?: number }
 

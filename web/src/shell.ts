@@ -1,10 +1,17 @@
 // The frame of the page: the bar above, the stage with the pictures, the panel beside it.
+import type { Dataset } from "./api";
 import { button, choice, iconButton, menu, menuItem } from "./controls";
 import { h, put } from "./dom";
 
 export interface Actions {
   dataset(name: string): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
   copyLink(withToken: boolean): void; command(): void; screenshot(): void; movie(): void; projection(): void;
+}
+
+// In the list of datasets: its name, and what is known of its size.
+function entryText({ name, size, levels }: Dataset): string {
+  if (!size) return name;
+  return `${name} (${size.join(" × ")}${levels && levels.length > 1 ? `, ${levels.length} levels` : ""})`;
 }
 
 export class Shell {
@@ -38,12 +45,12 @@ export class Shell {
     document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
   }
 
-  showDatasets(list: readonly { name: string; state: string }[], current: string): void {
-    const names = JSON.stringify([list.map(d => d.name), current]);
+  showDatasets(list: readonly Dataset[], current: string): void {
+    const entries = list.map(d => [d.name, entryText(d)] as const), names = JSON.stringify([entries, current]);
     if (names === this.names) return;
     this.names = names;
-    const known = list.some(d => d.name === current) || current === "" ? list : [{ name: current, state: "" }, ...list];
-    this.datasets.fill(known.map(d => [d.name, d.name] as const));
+    const known = list.some(d => d.name === current) || current === "" ? entries : [[current, current] as const, ...entries];
+    this.datasets.fill(known);
     this.datasets.set(current);
   }
 

@@ -71,6 +71,7 @@ export class Slices {
     if (!pane.shown) return;
     const { scaleBar } = this.context.store.state;
     pane.drawing.draw(pane.shown, { marker: false, scaleBar, sides: true, crosshair: { at: this.at(), lines: true }, measures: this.measuring.drawn(), legend: [], slice: this.plane(pane) });
+    pane.level.show(pane.shown.frame.header, this.context.volume()?.levels.length ?? 0);
   }
 
   // The point below the pointer, in the plane that is shown.

@@ -115,6 +115,7 @@ export class Viewer {
     const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
     this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.labels.legend() });
     this.handles.update(shown, state.clipBox, this.context.volume());
+    this.pane.level.show(shown.frame.header, this.context.volume()?.levels.length ?? 0);
   }
 
   // What the pane shows, for a file.

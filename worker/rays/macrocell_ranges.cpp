@@ -34,8 +34,12 @@ class ColumnRanges {
     }
   }
   MacrocellRange Of(std::size_t begin, std::size_t end) const {
-    return {float(*std::min_element(low_.begin() + std::ptrdiff_t(begin), low_.begin() + std::ptrdiff_t(end))),
-            float(*std::max_element(high_.begin() + std::ptrdiff_t(begin), high_.begin() + std::ptrdiff_t(end)))};
+    T low = low_[begin], high = high_[begin];
+    for (std::size_t x = begin + 1; x < end; ++x) {
+      low = std::min(low, low_[x]);
+      high = std::max(high, high_[x]);
+    }
+    return {float(low), float(high)};
   }
 
  private:

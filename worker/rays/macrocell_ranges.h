@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/math/vec.h"
-#include "worker/rays/padded_voxels.h"
+#include "worker/renderers/padded_voxels.h"
 
 namespace slabstream {
 

@@ -123,14 +123,15 @@ template <class T, bool kNearest>
 HWY_INLINE bool ExtremeOfPacket(const ProjectWork& work, const RayPacket& packet, Hint& hint, float* HWY_RESTRICT pixels) {
   const FloatTag df;
   const SampleInterval owned = OwnedSamples(packet, *work.box);
+  const RayPacket among = AmongVoxels(packet, *work.box);
   const auto one = Set(1);
   Findings found = {Set(std::numeric_limits<float>::lowest()), owned.begin, hn::Lt(one, hn::Zero(df))};
   if (work.rays->clip.empty()) {
-    SearchSamples<T, kNearest>(work, packet, owned, hint, found);
+    SearchSamples<T, kNearest>(work, among, owned, hint, found);
   } else {
     PacketPart parts[2];
     PartsOf(work.rays->clip, packet, parts);
-    for (const PacketPart& part : parts) SearchSamples<T, kNearest>(work, packet, part.Of(owned), hint, found);
+    for (const PacketPart& part : parts) SearchSamples<T, kNearest>(work, among, part.Of(owned), hint, found);
   }
   // One hint for all: rays that stay together read the same memory.
   const auto mean = hn::Floor(hn::Mul(hn::SumOfLanes(df, found.at), Set(1.0F / float(kLanes))));
@@ -149,6 +150,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
   const IntTag di;
   const RayBox& box = *work.box;
   const SampleInterval whole = OwnedSamples(packet, box);
+  const RayPacket among = AmongVoxels(packet, box);
   Ints high = hn::Zero(di), middle = high, low = high, count = high;
   const auto byte = SetInt(0xFF), one = SetInt(1);
   const auto sum = [&](const SampleInterval& owned) HWY_ATTR {
@@ -158,7 +160,7 @@ HWY_INLINE bool SumOfPacket(const ProjectWork& work, const RayPacket& packet, fl
     for (float k = begin; k < end; k += 1) {
       const auto sample = Set(k);
       const auto active = hn::And(hn::Ge(sample, owned.begin), hn::Lt(sample, owned.end));
-      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceSample(packet, box, sample), active);
+      const ProjectedSamples samples = SamplesAt<T, kNearest>(box, PlaceSample(among, box, sample), active);
       const auto valid = hn::RebindMask(di, samples.valid);
       const auto value = hn::ConvertTo(di, hn::Mul(ValueOf(work, samples.values), Set(0x1p24F)));
       const auto fixed = hn::IfThenElseZero(valid, hn::Min(value, SetInt(0xFFFFFF)));

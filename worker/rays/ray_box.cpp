@@ -4,8 +4,8 @@
 
 namespace slabstream {
 
-RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
-                  const Camera& camera) {
+RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const SampledRegion& owned, const SampledRegion& sampled,
+                  const ViewRays& rays, const Camera& camera, const GridMap& map) {
   RayBox result;
   result.type = voxels.type;
   result.samples = voxels.samples.get();
@@ -13,16 +13,17 @@ RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Box& bo
   result.row = voxels.row;
   result.slice = std::int32_t(voxels.slice);
   result.cells = cells;
-  const SampledRegion owned = WholeBox(box);
+  result.scale = ToFloat3(map.scale);
+  result.offset = ToFloat3(map.offset);
   Vec3 low, high;
   bool empty = false;
   for (const Axis axis : kAxes) {
     const auto i = std::size_t(Number(axis));
     result.low[i] = float(owned.low[axis]);
     result.high[i] = float(owned.high[axis]);
-    result.at_border = result.at_border || box.begin[axis] == 0 || result.high[i] >= rays.volume_end[i];
-    low[axis] = std::max(owned.low[axis], sampled.low[axis]);
-    high[axis] = std::min(owned.high[axis], sampled.high[axis]);
+    result.at_border = result.at_border || result.low[i] <= -0.5F || result.high[i] >= rays.volume_end[i];
+    low[axis] = std::max(owned.low[axis], map.From(sampled.low[axis], axis));
+    high[axis] = std::min(owned.high[axis], map.From(sampled.high[axis], axis));
     empty = empty || !(low[axis] < high[axis]);
   }
   if (!empty) result.reach = ReachOfBox(rays, camera, low, high);

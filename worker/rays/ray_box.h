@@ -1,9 +1,10 @@
 // RayBox: one box for the ray kernels. Neither copies nor owns.
 #pragma once
 
+#include "common/volume/grid_map.h"
 #include "worker/rays/macrocell_ranges.h"
-#include "worker/rays/padded_voxels.h"
 #include "worker/rays/view_rays.h"
+#include "worker/renderers/padded_voxels.h"
 
 namespace slabstream {
 
@@ -13,7 +14,8 @@ struct RayBox {
   Index3 origin;                       // of the voxels' box, less 1: no sample has a floor below
   std::int32_t row = 0, slice = 0;     // samples from voxel to voxel along y and z
   Index3 cells;                        // MacrocellRanges::counts
-  Float3 low{}, high{};                // the box owns the positions p with low <= p < high on every axis
+  Float3 low{}, high{};                // the box owns the positions p of the frame with low <= p < high on every axis
+  Float3 scale{1, 1, 1}, offset{};     // p lies at scale * p + offset among the voxels
   RayReach reach;                      // of the positions that may matter
   bool at_border = false;              // the box touches the volume's border
 };
@@ -21,17 +23,20 @@ struct RayBox {
 // The largest array of padded samples that kernels can address, in bytes.
 inline constexpr std::size_t kMostRayBytes = (std::size_t{1} << 31) - 1;
 
-// `box` lies in the box of the voxels. Samples of the box outside `sampled` need not be visited.
+// Positions p with low <= p < high on every axis.
 struct SampledRegion {
   Vec3 low, high;
 };
-RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Box& box, const SampledRegion& sampled, const ViewRays& rays,
-                  const Camera& camera);
-
-// All positions that the box owns.
+// All positions that a box owns.
 inline SampledRegion WholeBox(const Box& box) {
   const Vec3 half = {0.5, 0.5, 0.5};
   return {ToVec3(box.begin) - half, ToVec3(box.end) - half};
 }
+inline constexpr SampledRegion kEverywhere = {{-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9}};
+
+// `owned`: positions of the frame, which lie in the box of the voxels. `map`: from them to positions among the voxels. Samples outside
+// `sampled`, of positions among the voxels, need not be visited.
+RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const SampledRegion& owned, const SampledRegion& sampled,
+                  const ViewRays& rays, const Camera& camera, const GridMap& map = {});
 
 }  // namespace slabstream

@@ -29,7 +29,7 @@ void AddGradientOpacity(const TransferFunction& transfer, const VolumeDescriptio
 }  // namespace
 
 RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,
-                    const Camera& camera, const Shading& shading, double steps_per_voxel) {
+                    const Camera& camera, const Shading& shading, double steps_per_voxel, const Vec3& spacing) {
   RayLook look;
   const bool exact = description.type != ScalarType::kFloat32 && table.bin_from_stored_scale == 1;  // a bin for each stored value
   const int fine = exact ? kMaxBins / table.size() : 1;  // entries from one bin to the next: 16 for 8-bit volumes
@@ -61,9 +61,9 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   const Phong phong(shading, camera.view_direction);
   const Vec3 to_viewer = -camera.view_direction;
   look.phong = shading.model == ShadingModel::kPhong;
-  look.inverse_spacing = Divided({1, 1, 1}, camera.spacing);
-  look.viewer = Divided(to_viewer, camera.spacing);
-  for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, camera.spacing), float(Dot(light, to_viewer))});
+  look.inverse_spacing = Divided({1, 1, 1}, spacing);
+  look.viewer = Divided(to_viewer, spacing);
+  for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, spacing), float(Dot(light, to_viewer))});
   look.ambient = shading.ambient;
   look.diffuse = shading.diffuse;
   look.specular = shading.specular;

@@ -46,9 +46,13 @@ struct RayLook {
 // If each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as fit into
 // kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if a bin
 // between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
-// `table`: of `transfer`.
+// `table`: of `transfer`. `spacing`: of the voxels that are sampled.
 RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,
-                    const Camera& camera, const Shading& shading, double steps_per_voxel);
+                    const Camera& camera, const Shading& shading, double steps_per_voxel, const Vec3& spacing);
+inline RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,
+                           const Camera& camera, const Shading& shading, double steps_per_voxel) {
+  return MakeRayLook(table, transfer, description, camera, shading, steps_per_voxel, camera.spacing);
+}
 
 // True if a sample between two stored ones may have an opacity above 0 or lie on an isosurface.
 class VisibleSamples {

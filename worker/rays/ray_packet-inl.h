@@ -202,12 +202,23 @@ HWY_INLINE void PartsOf(const RayClip& clip, const RayPacket& packet, PacketPart
   }
 }
 
-// The samples that the box owns and that may matter.
+// The samples that the box owns and that may matter. Boxes of different levels agree on whose a sample is: positions are the frame's.
 HWY_INLINE SampleInterval OwnedSamples(const RayPacket& packet, const RayBox& box) {
   return SamplesInside(packet, box.low, box.high, box.reach.begin, box.reach.end);
 }
 
-// The position of sample k of each ray in the box. If the box does not own a ray's sample, the ray's indices are arbitrary.
+// The packet among the voxels of the box.
+HWY_INLINE RayPacket AmongVoxels(const RayPacket& packet, const RayBox& box) {
+  RayPacket among = packet;
+  for (std::size_t i = 0; i < 3; ++i) {
+    among.first[i] = hn::Add(hn::Mul(packet.first[i], Set(box.scale[i])), Set(box.offset[i]));
+    among.move[i] = hn::Mul(packet.move[i], Set(box.scale[i]));
+  }
+  return among;
+}
+
+// The position of sample k of each ray in the box. `packet`: AmongVoxels. If the box does not own a ray's sample, the ray's indices are
+// arbitrary.
 struct SamplePlace {
   Floats position[3];
   Floats fraction[3];  // position - floor

@@ -22,9 +22,11 @@ std::vector<Box> CutIntoLayers(const Box& box, ScalarType type, std::size_t most
 const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
   if (!pieces_.empty()) return pieces_;
   const VoxelBricks bricks = data.bricks();
-  for (const Box& layer : CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes)) {
+  const PaddedVoxels* const padded = data.padded();
+  const std::vector<Box> layers = CutIntoLayers(bricks.box(), data.widest_type(), kMostRayBytes);
+  for (const Box& layer : layers) {
     RayPiece piece;
-    piece.voxels = Pad(bricks, layer);
+    piece.voxels = padded != nullptr && layers.size() == 1 ? *padded : Pad(bricks, layer);
     piece.cells = FindMacrocellRanges(piece.voxels);
     pieces_.push_back(std::move(piece));
   }
@@ -33,11 +35,14 @@ const std::vector<RayPiece>& RayVolume::PiecesOf(const BoxData& data) {
 
 std::size_t RayVolume::bytes() const {
   std::size_t total = 0;
-  for (const RayPiece& piece : pieces_) total += piece.voxels.bytes() + piece.cells.bytes();
+  for (const RayPiece& piece : pieces_) {
+    const bool shared = piece.voxels.samples.use_count() > 1;  // with the padded box, which counts them
+    total += (shared ? 0 : piece.voxels.bytes()) + piece.cells.bytes();
+  }
   return total;
 }
 
-std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera) {
+std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Camera& camera, const GridMap& map) {
   std::vector<std::size_t> order(pieces.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   if (camera.projection == Projection::kOrthographic) {
@@ -45,12 +50,20 @@ std::vector<std::size_t> NearestFirst(std::span<const RayPiece> pieces, const Ca
     return order;
   }
   // A ray meets only pieces on one side of the eye, so the order between pieces on different sides does not matter.
+  const double eye = map.To(camera.eye.z, Axis::kZ);
   const auto distance = [&](std::size_t piece) {
     const Box& box = pieces[piece].voxels.box;
-    return std::abs(std::clamp(camera.eye.z, box.begin.z - 0.5, box.end.z - 0.5) - camera.eye.z);
+    return std::abs(std::clamp(eye, box.begin.z - 0.5, box.end.z - 0.5) - eye);
   };
   std::ranges::stable_sort(order, {}, distance);
   return order;
+}
+
+SampledRegion PartIn(const RayPiece& piece, std::span<const RayPiece> pieces, const Box& box, const GridMap& map) {
+  SampledRegion part = WholeBox(box);
+  if (&piece != &pieces.front()) part.low.z = std::max(part.low.z, map.From(piece.voxels.box.begin.z - 0.5, Axis::kZ));
+  if (&piece != &pieces.back()) part.high.z = std::min(part.high.z, map.From(piece.voxels.box.end.z - 0.5, Axis::kZ));
+  return part;
 }
 
 }  // namespace slabstream

@@ -13,7 +13,7 @@ namespace slabstream {
 
 // What is rendered (Renderer::Render), and its rays.
 struct RayFrame {
-  const Box& box;
+  const LevelBox& at;
   const FrameSetup& setup;
   const ViewRays& rays;
   const OcclusionMask& hidden;
@@ -21,17 +21,19 @@ struct RayFrame {
   RankReport& report;
 };
 
-// Renders the box's part in each piece and combines their images. region_of(number of the piece): the positions whose samples may matter.
+// Renders the box's part in each piece and combines their images. region_of(number of the piece): the positions among the voxels whose
+// samples may matter.
 // render(number, ray box, tile, pixels, floats a row) renders a tile, as RenderTiles says.
 template <class RegionOf, class Render>
 LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame, RegionOf&& region_of, Render&& render) {
   const FrameSetup& setup = frame.setup;
+  const GridMap map = MapTo(setup, frame.at.level);
   LocalImage image = MakeLocalImage(setup.format, {});
-  for (const std::size_t number : NearestFirst(pieces, setup.camera)) {
+  for (const std::size_t number : NearestFirst(pieces, setup.camera, map)) {
     const RayPiece& piece = pieces[number];
-    const Box part = Intersection(frame.box, piece.voxels.box);
-    if (part.empty()) continue;
-    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera);
+    const SampledRegion part = PartIn(piece, pieces, frame.at.box, map);
+    if (!(part.low.z < part.high.z)) continue;
+    const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera, map);
     LocalImage layer = MakeLocalImage(setup.format, box.reach.pixels);
     RenderTiles(layer, frame.hidden, frame.control, frame.report,
                 [&](const PixelBounds& tile, float* pixels, std::size_t floats_a_row) { render(number, box, tile, pixels, floats_a_row); });

@@ -34,9 +34,10 @@ class BoxData {
   BoxData(const BoxData&) = delete;
   BoxData& operator=(const BoxData&) = delete;
 
-  // All voxels as one block. If there are only bricks, the first call turns them into a block; after that any thread may call.
+  // All voxels as one block. The first call turns them into one if they are stored in another way; after that any thread may call.
   const VoxelBlock& voxels() const;
   VoxelBricks bricks() const { return samples_.view(); }
+  const PaddedVoxels* padded() const { return samples_.padded.get(); }  // null: they are stored in another way
   // Between renders it lets go of the voxels, so that another BoxData may have them stored in the other way.
   void TakeVoxels() { samples_ = voxels_->samples(); }
   void LeaveVoxels() { samples_ = {}; }

@@ -5,17 +5,19 @@ namespace slabstream {
 BoxVoxels::Samples BoxVoxels::Block() {
   const std::lock_guard lock(mutex_);
   if (samples_.block == nullptr) {
-    const VoxelBricks bricks(*samples_.bricks);
+    const VoxelBricks bricks = samples_.view();
     VoxelBlock block = MakeVoxelBlock(bricks.box(), bricks.type());
     bricks.Read(block.box, 0, block.bytes);
-    samples_ = {std::make_shared<const VoxelBlock>(std::move(block)), nullptr};
+    samples_ = {std::make_shared<const VoxelBlock>(std::move(block)), nullptr, nullptr};
   }
   return samples_;
 }
 
 std::size_t BoxVoxels::bytes() const {
   const Samples stored = samples();
-  std::size_t total = stored.block != nullptr ? stored.block->bytes.capacity() : stored.bricks->bytes();
+  std::size_t total = stored.block != nullptr    ? stored.block->bytes.capacity()
+                      : stored.bricks != nullptr ? stored.bricks->bytes()
+                                                 : stored.padded->bytes();
   for (const auto* layer : {&layers_.labels, &layers_.overlay}) total += *layer ? (*layer)->bytes() : 0;
   return total + (layers_.cells != nullptr ? layers_.cells->bytes() : 0);
 }

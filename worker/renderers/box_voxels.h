@@ -10,6 +10,7 @@
 
 #include "common/mesh/mesh.h"
 #include "common/volume/bricks.h"
+#include "worker/renderers/padded_voxels.h"
 
 namespace slabstream {
 
@@ -21,24 +22,29 @@ struct BoxLayers {
 
 class BoxVoxels {
  public:
-  // Samples, stored in one of two ways; the pointer of the other way is null. Whoever holds a Samples may read them.
+  // Samples, stored in one of three ways; the pointers of the others are null. Whoever holds a Samples may read them.
   struct Samples {
     std::shared_ptr<const VoxelBlock> block;
     std::shared_ptr<const BrickedVoxels> bricks;
+    std::shared_ptr<const PaddedVoxels> padded;
 
-    VoxelBricks view() const { return block != nullptr ? VoxelBricks(*block) : VoxelBricks(*bricks); }
+    VoxelBricks view() const {
+      return block != nullptr ? VoxelBricks(*block) : bricks != nullptr ? VoxelBricks(*bricks) : padded->bricks();
+    }
   };
 
   BoxVoxels(VoxelBlock voxels, BoxLayers layers)
-      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr}, layers_(std::move(layers)) {}
+      : samples_{std::make_shared<const VoxelBlock>(std::move(voxels)), nullptr, nullptr}, layers_(std::move(layers)) {}
   BoxVoxels(BrickedVoxels voxels, BoxLayers layers)
-      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels))}, layers_(std::move(layers)) {}
+      : samples_{nullptr, std::make_shared<const BrickedVoxels>(std::move(voxels)), nullptr}, layers_(std::move(layers)) {}
+  BoxVoxels(PaddedVoxels voxels, BoxLayers layers)
+      : samples_{nullptr, nullptr, std::make_shared<const PaddedVoxels>(std::move(voxels))}, layers_(std::move(layers)) {}
 
   Samples samples() const {
     const std::lock_guard lock(mutex_);
     return samples_;
   }
-  // As one block. If there are only bricks, the first call turns them into a block.
+  // As one block. The first call turns samples into one that are stored in another way.
   Samples Block();
   const BoxLayers& layers() const { return layers_; }
   std::size_t bytes() const;  // memory

@@ -22,11 +22,12 @@ class Renderer {
  public:
   virtual ~Renderer() = default;
 
-  // Local image of `box` in setup.format. `data` holds the voxels and halo (PaddedBox) of the box. Pixels that `hidden` hides may be left
+  // Local image of a box in setup.format. `data` holds the voxels and halo (PaddedBox) of the box. Its level is 0, unless the renderer
+  // has Ability::kLevels. Pixels that `hidden` hides may be left
   // empty. Adds stage times, spans and counts to `report`; a stage's time is the sum over all threads, without pauses. If it is cancelled
   // it stops soon and returns Cancelled; it pauses between pieces (`control`). Called within the task arena of the worker's render threads:
   // parallel algorithms of oneTBB use as many threads as the worker has.
-  virtual Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  virtual Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                                     const RenderControl& control, RankReport& report) = 0;
 };
 

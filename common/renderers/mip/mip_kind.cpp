@@ -51,7 +51,7 @@ class MipKind : public ProjectionKind {
                         .title = "intensity projection",
                         .purpose = "the largest, least or mean value along each ray, for vessels",
                         .format = PixelFormat::kMaximum,
-                        .abilities = {Ability::kPerspective, Ability::kTransfer},
+                        .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",
                                         .purpose = "Value of a pixel: the largest, the least or the mean sample along its ray",

@@ -28,7 +28,7 @@ class XrayKind : public ProjectionKind {
                         .title = "radiography",
                         .purpose = "a radiograph: line integrals of X-ray attenuation, in grey; for CT",
                         .format = PixelFormat::kSum,
-                        .abilities = {Ability::kPerspective},
+                        .abilities = {Ability::kPerspective, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "energy",
                                         .purpose = "Energy of the X-rays in keV, which decides how much water attenuates",

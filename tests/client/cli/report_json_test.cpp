@@ -29,6 +29,7 @@ std::vector<FrameRecord> TwoFrames() {
     frame.statistics.assignment = "greedy";
     frame.statistics.balance = "dynamic";
     frame.statistics.combine = "fan-in";
+    frame.statistics.levels = {{1, 3, 4096}, {2, 1, 64}};
     frame.statistics.begin_ns = 5'000'000'000 + std::int64_t(i) * 10'000'000;
     frame.statistics.end_ns = frame.statistics.begin_ns + 30'000'000;
     for (std::uint32_t rank = 0; rank < 2; ++rank) {
@@ -40,6 +41,7 @@ std::vector<FrameRecord> TwoFrames() {
       report.spans = {{Stage::kRender, frame.statistics.begin_ns, frame.statistics.begin_ns + 8'000'000},
                       {Stage::kCombine, frame.statistics.begin_ns + 8'000'000, frame.statistics.begin_ns + 9'000'000}};
       report.voxel_bytes = i == 0 ? 1000 : 0;
+      report.stored_bytes = i == 0 ? 300 : 0;
       report.image_bytes = 50;
       frame.statistics.reports.push_back(report);
     }
@@ -75,11 +77,12 @@ TEST(StatsJsonTest, HasThePromisedFields) {
                                  {"balance", "dynamic"},
                                  {"combine", "fan-in"}}));
   EXPECT_EQ(stats["renderer"], "shear") << "which the request left to the service";
-  EXPECT_EQ(stats["bytes"], (json{{"voxels", 2000}, {"images", 200}}));
+  EXPECT_EQ(stats["bytes"], (json{{"voxels", 2000}, {"stored", 600}, {"images", 200}}));
   ASSERT_EQ(stats["frames"].size(), 2U);
   const json& second = stats["frames"][1];
   EXPECT_EQ(second["latency_ms"], 40.0);
   EXPECT_EQ(second["bytes"]["voxels"], 0);
+  EXPECT_EQ(second["levels"], json::array({{{"level", 1}, {"boxes", 3}, {"voxels", 4096}}, {{"level", 2}, {"boxes", 1}, {"voxels", 64}}}));
   EXPECT_EQ(second["stages_ms"]["render"], 16.0);
   EXPECT_EQ(second["stages_ms"].size(), std::size_t(kStageCount));
   EXPECT_EQ(second["imbalance"], 1.0);

@@ -161,6 +161,18 @@ TEST(PictureRecordTest, TheTextIsAsciiAndNamesNoPlace) {
   for (const char* place : {"7420", "127.0.0.1", "dataset", "a.png", "threads"}) EXPECT_THAT(text, Not(HasSubstr(place)));
 }
 
+TEST(PictureRecordTest, CoarseLevelsAreNamed) {
+  const FrameOptions options = Parse({"-o", "a.png", "brain"});
+  const auto text = [&](const std::vector<LevelUse>& levels) {
+    return RecordText("brain", options.request, options.format, SomeGeometry(), {}, levels);
+  };
+  EXPECT_EQ(text({{.level = 0}}), text({})) << "most volumes have no other one";
+  const Result<PictureRecord> record = ParseRecord(text({{.level = 0}, {.level = 2}}));
+  ASSERT_TRUE(record.ok()) << record.status().message();
+  EXPECT_EQ(record->json["levels"], Json::array({0, 2}));
+  EXPECT_EQ(Joined(RenderArguments(*record, "b.png")), "render brain -o b.png") << "the same level follows from the same request";
+}
+
 TEST(PictureRecordTest, BadRecordsAreNamed) {
   const FrameOptions options = Parse({"-o", "a.png", "brain"});
   const Json good = Json::parse(RecordText("brain", options.request, options.format, SomeGeometry()));

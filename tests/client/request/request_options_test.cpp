@@ -184,6 +184,22 @@ TEST(RequestOptionsTest, LimitsHoldForTextsAndForRequests) {
   }
 }
 
+TEST(RequestOptionsTest, NumbersWithAutoMayBeLeftToTheService) {
+  const auto set = [](const char* name, const std::string& text, FrameRequest& request) {
+    return SetOption(*FindRequestOption(name), name, std::vector{text}, ColorMaps::kTexts, request);
+  };
+  FrameRequest request;
+  EXPECT_TRUE(set("detail", "auto", request).ok());
+  EXPECT_EQ(request.detail, 0);
+  EXPECT_TRUE(set("detail", "2.5", request).ok());
+  EXPECT_EQ(request.detail, 2.5);
+  request.policy.groups = 3;
+  EXPECT_TRUE(set("groups", "auto", request).ok());
+  EXPECT_EQ(request.policy.groups, 0);
+  EXPECT_FALSE(set("zoom", "auto", request).ok());
+  EXPECT_FALSE(set("teams", "auto", request).ok());
+}
+
 // The message of the field at `path`, and the field.
 std::pair<Message*, const FieldDescriptor*> FieldAt(Message& whole, const std::string& path) {
   Message* message = &whole;

@@ -211,6 +211,14 @@ TEST(KdTree, ShapesDifferInHowThinBoxesAreAlongTheFirstAxis) {
   EXPECT_EQ(thinnest, (std::set<std::int32_t>{10, 20, 40}));
 }
 
+TEST(KdTree, CutsOtherAxesWhereTheFirstOneHasOneSlice) {
+  const WorkField work = WorkField::Uniform({4, 4, 2});
+  for (const int boxes : {3, 8, 32}) {
+    const Partition partition = MakeKdTree({.work = &work, .boxes = boxes, .most_boxes = 64, .axis = Axis::kZ});
+    EXPECT_EQ(partition.boxes().size(), std::size_t(boxes));
+  }
+}
+
 TEST(KdTree, HugsWhatIsOccupied) {
   // One occupied cell in the middle of 160^3 voxels.
   OccupancyGrid grid{{160, 160, 160}, std::vector<CellOccupancy>(20 * 20 * 20)};

@@ -22,6 +22,7 @@ using testing::HasSubstr;
 FrameRequest SomeRequest() {
   FrameRequest request;
   request.dataset = "head";
+  request.renderer = "splat";
   request.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
   return request;
 }
@@ -93,6 +94,7 @@ TEST(AtLevelTest, PointsOfTheWorldFallOnTheSamePixels) {
       const double near = 1e-7 * (1 + std::abs(at.x) + std::abs(at.y));
       ASSERT_NEAR(at.x, same.x, near) << "round " << round << ", " << NameOf(request.view.projection);
       ASSERT_NEAR(at.y, same.y, near) << "round " << round << ", " << NameOf(request.view.projection);
+      ASSERT_NEAR(at.depth, same.depth, 1e-7 * (1 + std::abs(at.depth))) << "round " << round << ", " << NameOf(request.view.projection);
     }
   }
 }
@@ -213,6 +215,16 @@ double NearestPixel(const FrameRequest& request, const VolumeGeometry& geometry)
   return nearest * std::tan(view.fov_degrees * std::numbers::pi / 360) / (view.zoom * half_side);
 }
 
+// Of a picture of one level.
+int LevelOf(const FrameRequest& request, const VolumeLevels& levels) {
+  const Result<LevelMap> map = LevelsOf(request, levels);
+  EXPECT_TRUE(map.ok()) << map.status().message();
+  if (!map.ok()) return -1;
+  EXPECT_TRUE(map->one_level());
+  EXPECT_THAT(map->levels, testing::SizeIs(1));
+  return map->levels.front();
+}
+
 TEST(LevelOfTest, IsTheCoarsestWhoseVoxelsAreNotWiderThanDetail) {
   Random random(325);
   SCOPED_TRACE(random.trace());
@@ -232,10 +244,9 @@ TEST(LevelOfTest, IsTheCoarsestWhoseVoxelsAreNotWiderThanDetail) {
       if (width <= most) expected = level;
     }
     if (on_the_border) continue;
-    const Result<int> level = LevelOf(request, levels);
-    ASSERT_TRUE(level.ok()) << level.status().message();
-    ASSERT_EQ(*level, expected) << "round " << round << ", " << NameOf(request.view.projection);
-    ++seen.at(std::size_t(*level));
+    const int level = LevelOf(request, levels);
+    ASSERT_EQ(level, expected) << "round " << round << ", " << NameOf(request.view.projection);
+    ++seen.at(std::size_t(level));
   }
   for (const int count : seen) EXPECT_GT(count, 0);
 }
@@ -250,14 +261,14 @@ TEST(LevelOfTest, IsNeverFinerWithMoreDetailPixelsNorCoarserWithMoreZoom) {
     const FrameRequest asked = request;
     int before = 0;
     for (request.detail = 0.01; request.detail <= 1000; request.detail *= 1.7) {
-      const int level = LevelOf(request, levels).value();
+      const int level = LevelOf(request, levels);
       ASSERT_GE(level, before);
       before = level;
     }
     request = asked;
     before = 3;
     for (request.view.zoom = 1e-2; request.view.zoom <= 100; request.view.zoom *= 1.7) {
-      const int level = LevelOf(request, levels).value();
+      const int level = LevelOf(request, levels);
       ASSERT_LE(level, before);
       before = level;
     }
@@ -271,9 +282,9 @@ TEST(LevelOfTest, AxesThatKeepTheirSpacingDoNotCount) {
   FrameRequest request = SomeRequest();
   const double pixel = NearestPixel(request, levels.levels[0].geometry);
   request.detail = 2.1 / pixel;
-  EXPECT_EQ(LevelOf(request, levels).value(), 1) << "slices are 20 apart in the finest level, too";
+  EXPECT_EQ(LevelOf(request, levels), 1) << "slices are 20 apart in the finest level, too";
   request.detail = 1.9 / pixel;
-  EXPECT_EQ(LevelOf(request, levels).value(), 0);
+  EXPECT_EQ(LevelOf(request, levels), 0);
 }
 
 TEST(LevelOfTest, ANamedLevelIsTakenOrRefused) {
@@ -281,10 +292,10 @@ TEST(LevelOfTest, ANamedLevelIsTakenOrRefused) {
   FrameRequest request = SomeRequest();
   for (int level = 0; level < 3; ++level) {
     request.level = std::to_string(level);
-    EXPECT_EQ(LevelOf(request, levels).value(), level);
+    EXPECT_EQ(LevelOf(request, levels), level);
   }
   request.level = "3";
-  const Status refused = LevelOf(request, levels).status();
+  const Status refused = LevelsOf(request, levels).status();
   EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(refused.message(), "level is 3, but dataset \"head\" has levels 0 to 2");
 }
@@ -295,11 +306,126 @@ TEST(LevelOfTest, ASliceThatTheFinestLevelDoesNotHaveIsRefusedAtEveryLevel) {
   for (const char* const level : {"auto", "0", "2"}) {
     request.level = level;
     request.clipping.slab = ClipSlab{.index = 63, .thickness = 4};
-    EXPECT_TRUE(LevelOf(request, levels).ok()) << level;
+    EXPECT_TRUE(LevelsOf(request, levels).ok()) << level;
     request.clipping.slab->index = 64;
-    const Status refused = LevelOf(request, levels).status();
+    const Status refused = LevelsOf(request, levels).status();
     EXPECT_EQ(refused.code(), StatusCode::kInvalidArgument) << level;
     EXPECT_THAT(refused.message(), HasSubstr("clip.slab.index is 64, but the volume has slices 0 to 63 along z")) << level;
+  }
+}
+
+// A picture of several levels, in perspective, of a volume with cubic voxels.
+struct MixedCase {
+  VolumeLevels levels;
+  FrameRequest request;
+  LevelMap map;
+};
+MixedCase RandomMixed(Random& random) {
+  for (;;) {
+    MixedCase mixed;
+    VolumeGeometry finest = RandomGeometry(random);
+    for (const Axis axis : kAxes) finest.size[axis] = 16 * random.Integer(8, 80) + random.Integer(0, 7);
+    finest.spacing = random.Real(0.1, 4) * Vec3{1, 1, 1};
+    mixed.levels = HalvedLevels(finest, 4);
+    FrameRequest& request = mixed.request = RandomRequestOf(random, finest, mixed.levels.levels.back().geometry);
+    request.renderer = std::array{"raycast", "mip", "xray"}.at(random.Integer<std::size_t>(0, 2));
+    request.size = {random.Integer(16, 400), random.Integer(16, 400)};
+    request.view.projection = Projection::kPerspective;
+    request.view.fov_degrees = random.Real(20, 100);
+    request.view.eye.reset();
+    request.view.distance = random.Real(0.8, 1.6) * BoundingRadius(finest);
+    if (!CheckView(AtLevel(request, finest, mixed.levels.levels.back().geometry).view, mixed.levels.levels.back().geometry).ok()) continue;
+    if (!CheckView(request.view, finest).ok()) continue;
+    request.detail = std::exp(random.Real(-1, 3));
+    Result<LevelMap> map = LevelsOf(request, mixed.levels);
+    if (!map.ok() || map->one_level()) continue;
+    mixed.map = *std::move(map);
+    return mixed;
+  }
+}
+
+// The finest level of the zones that touch a zone at a side.
+int LeastBeside(const LevelMap& map, const Index3& zone) {
+  int least = std::numeric_limits<int>::max();
+  for (const Axis axis : kAxes) {
+    for (const int step : {-1, 1}) {
+      Index3 beside = zone;
+      beside[axis] += step;
+      if (beside[axis] < 0 || beside[axis] == map.counts[axis] || map.Of(beside) == LevelMap::kOutside) continue;
+      least = std::min(least, map.levels.at(map.Of(beside)));
+    }
+  }
+  return least;
+}
+
+TEST(LevelsOfTest, EachPartIsDrawnFromTheCoarsestLevelThatIsFineEnough) {
+  Random random(327);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 60; ++round) {
+    const auto [levels, request, map] = RandomMixed(random);
+    const VolumeGeometry& grid = levels.levels[std::size_t(map.levels.front())].geometry;
+    const Camera camera = MakeCamera(AtLevel(request, levels.levels.front().geometry, grid).view, request.size, grid);
+    const auto width_of = [&](int level) { return levels.levels[std::size_t(level)].geometry.spacing.x; };
+    const auto too_wide = [&](int level, double depth) {
+      return width_of(level) > (1 + 1e-6) * request.detail * camera.PixelSizeAt(depth);
+    };
+    ASSERT_TRUE(std::ranges::is_sorted(map.levels));
+    ASSERT_EQ(map.of_zone.size(), CountIn(map.counts));
+    map.ForEachZone([&](const Index3& zone) {
+      const Box box = map.BoxOf(zone, grid.size);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (int corner = 0; corner < 8; ++corner) {
+        Vec3 p;
+        for (const Axis axis : kAxes) p[axis] = ((corner >> int(axis) & 1) != 0 ? box.end[axis] : box.begin[axis]) - 0.5;
+        nearest = std::min(nearest, camera.Project(p).depth);
+      }
+      Vec3 inside;
+      for (const Axis axis : kAxes) inside[axis] = random.Real(box.begin[axis] - 0.5, box.end[axis] - 0.5);
+      const Camera::ImagePoint seen = camera.Project(inside);
+      if (map.Of(zone) == LevelMap::kOutside) {
+        ASSERT_FALSE(seen.x > 0 && seen.y > 0 && seen.x < camera.width && seen.y < camera.height) << "what the picture shows is drawn";
+        return;
+      }
+      const int level = map.levels.at(map.Of(zone));
+      ASSERT_FALSE(level != map.levels.front() && too_wide(level, nearest));
+      const bool coarsest = level == 3 || width_of(level + 1) > (1 - 1e-6) * request.detail * camera.PixelSizeAt(nearest);
+      ASSERT_TRUE(coarsest || LeastBeside(map, zone) < level) << "only beside a finer zone";
+    });
+  }
+}
+
+TEST(LevelsOfTest, NeighbouringZonesDifferByALevelAtMost) {
+  Random random(328);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 60; ++round) {
+    const auto [levels, request, map] = RandomMixed(random);
+    map.ForEachZone([&](const Index3& zone) {
+      if (map.Of(zone) == LevelMap::kOutside) return;
+      ASSERT_GE(LeastBeside(map, zone), map.levels.at(map.Of(zone)) - 1) << "round " << round;
+    });
+  }
+}
+
+TEST(LevelsOfTest, WhatCannotBeMixedIsDrawnFromOneLevel) {
+  Random random(329);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 20; ++round) {
+    const MixedCase mixed = RandomMixed(random);
+    const auto drawn = [&](const FrameRequest& request, const VolumeLevels& levels) { return LevelsOf(request, levels).value(); };
+    FrameRequest request = mixed.request;
+    request.renderer = "splat";
+    EXPECT_TRUE(drawn(request, mixed.levels).one_level());
+    request = mixed.request;
+    request.renderer = "raycast";
+    request.transfer.isosurfaces = {{.value = 100, .color = {1, 1, 1}, .opacity = 1}};
+    EXPECT_TRUE(drawn(request, mixed.levels).one_level());
+    VolumeLevels shifted = mixed.levels;
+    for (std::size_t level = 1; level < shifted.levels.size(); ++level)
+      shifted.levels[level].geometry.size.x = std::max(shifted.levels[level].geometry.size.x >> level, 1);
+    EXPECT_TRUE(drawn(mixed.request, shifted).one_level());
+    VolumeLevels others = mixed.levels;
+    for (std::size_t level = 1; level < others.levels.size(); ++level) others.levels[level].mapping.scale = 2 + double(level);
+    EXPECT_TRUE(drawn(mixed.request, others).one_level());
   }
 }
 

@@ -1,6 +1,8 @@
 // Layouts of volumes that nobody holds: boxes that fit a target, and end near the blocks in which the source is read.
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
 #include "tests/common/planning/plan_support.h"
@@ -139,7 +141,7 @@ TEST(IndexedLayout, OnlyWhatIsFarFromAllThatIsDrawnIsFilled) {
     const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(2), 1 << 20).value();
     const std::int32_t reach = plan.setup.renderer->reach();
     for (const Placement& placement : PlacementsOf(plan)) {
-      const Box padded = PaddedBox(placement.box, plan.setup);
+      const Box padded = PaddedBox(placement.at(), plan.setup);
       EXPECT_EQ(placement.filled, plan.layout->filled[placement.id]);
       for (const FilledBox& part : placement.filled) {
         EXPECT_TRUE(padded.Contains(part.box));
@@ -167,6 +169,48 @@ TEST(IndexedLayout, SamplesOfWhatIsFilledAreStoredOnes) {
     ASSERT_FALSE(placements.empty());
     EXPECT_FALSE(placements[0].filled.empty());
     for (const FilledBox& part : placements[0].filled) EXPECT_EQ(part.sample, 7);
+  }
+}
+
+TEST(IndexedLayout, BoxesOfEachLevelOfAPictureAreLeftOut) {
+  const VolumeSummary fine = StoredSummary({512, 64, 64}, Uniform(16));
+  VolumeSummary coarse = StoredSummary({256, 32, 32}, Uniform(16));
+  coarse.description.geometry.spacing = {2, 2, 2};
+  coarse.description.geometry.orientation.origin = {0.5, 0.5, 0.5};
+  // Zones 0 to 3 are drawn from the fine level, whose first voxels show; zones 4 to 7 from the coarse one, whose last voxels do.
+  constexpr std::int32_t kZone = 64, kFineEnd = 32, kCoarseBegin = 240;
+  const LevelMap map = {.levels = {0, 1}, .side = Uniform(kZone), .counts = {8, 1, 1}, .of_zone = {0, 0, 0, 0, 1, 1, 1, 1}};
+  const auto layout_of = [&](const VolumeSummary& finer, const VolumeSummary& coarser) {
+    FrameRequest request = SomeRequest();
+    request.renderer = "raycast";
+    const ResolvedRequest resolved = Resolved(request, finer);
+    const std::vector<CoarserVolume> levels = {{2, std::make_shared<const VolumeSummary>(coarser)}};
+    return MakeLayout({.summary = &finer,
+                       .volume = &resolved.volume,
+                       .policy = &*resolved.policy,
+                       .slots = 2,
+                       .box_bytes_target = 48 << 10,
+                       .map = &map,
+                       .coarser = levels});
+  };
+  const Layout without = layout_of(fine, coarse);
+  const Layout with = layout_of(Indexed(fine, [](const Index3& at) { return at.x < kFineEnd ? kBody : kAir; }),
+                                Indexed(coarse, [](const Index3& at) { return at.x >= kCoarseBegin ? kBody : kAir; }));
+  EXPECT_EQ(with.partition, without.partition);
+  EXPECT_TRUE(with.filled.empty());
+  const std::int32_t reach = FindRenderer("raycast")->reach();
+  std::array<int, 2> shown{}, left_out{};
+  for (BoxId id = 0; id < with.owners.size(); ++id) {
+    ASSERT_NE(without.owners[id], kNoSlot);
+    const Box& box = with.partition.boxes()[id];
+    const std::size_t level = without.levels[id];
+    const bool shows = level == 0 ? box.begin.x - reach < kFineEnd : (box.end.x + 1) / 2 + reach > kCoarseBegin;
+    EXPECT_EQ(with.owners[id] != kNoSlot, shows) << "box " << id << " of level " << level;
+    ++(shows ? shown : left_out).at(level);
+  }
+  for (const std::size_t level : {0, 1}) {
+    EXPECT_GT(shown.at(level), 0);
+    EXPECT_GT(left_out.at(level), 0);
   }
 }
 

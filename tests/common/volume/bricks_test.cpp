@@ -121,6 +121,11 @@ TEST(BrickedVoxels, AreThoseOfABlockThroughEitherView) {
     const Volume volume = PatchyVolume(random, {51, 40, 37}, type);
     const VoxelBlock block = Cut(volume.block, {{5, 0, 9}, {51, 38, 37}});
     const BrickedVoxels bricked(block);
+    // The same samples within a larger array.
+    const Index3 whole = volume.block.box.size();
+    const VoxelBricks apart(block.box, type,
+                            volume.block.bytes.data() + std::size_t(volume.block.Offset(block.box.begin)) * BytesPerSample(type), whole.x,
+                            std::ptrdiff_t{whole.x} * whole.y);
     const BrickGrid& grid = bricked.grid();
     VisitScalarType(type, [&]<class T>(const T*) {
       for (Index3 v = block.box.begin; v.z < block.box.end.z; ++v.z) {
@@ -131,6 +136,7 @@ TEST(BrickedVoxels, AreThoseOfABlockThroughEitherView) {
             const T expected = block.samples<T>()[block.Offset(v)];
             ASSERT_EQ(VoxelBricks(block).View<T>(brick).Row(v.y, v.z)[x], expected);
             ASSERT_EQ(VoxelBricks(bricked).View<T>(brick).Row(v.y, v.z)[x], expected);
+            ASSERT_EQ(apart.View<T>(brick).Row(v.y, v.z)[x], expected);
           }
         }
       }

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/volume/filled_box.h"
 #include "common/wire/about.h"
 #include "common/wire/any_message.h"
 #include "common/wire/limits.h"
@@ -155,7 +156,7 @@ TEST(Malformed, ARefusalIsOneLineWhateverItQuotes) {
 }
 
 TEST(Malformed, EveryTextIsBounded) {
-  constexpr std::size_t kTooLong = std::max(kMaxTextBytes, kMaxDataItemBytes) + 1;
+  constexpr std::size_t kTooLong = std::max({kMaxTextBytes, kMaxDataItemBytes, kMaxSourceBytes}) + 1;
   AlterEachField(
       [&](const Place& place) {
         if (place.field->cpp_type() != FieldDescriptor::CPPTYPE_STRING || !IsItem(place)) return false;
@@ -183,6 +184,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"opacities", kMaxTransferPoints},
       {"lights", kMaxLights},
       {"placements", kMaxRanks},
+      {"filled", kMaxFilled},
+      {"coarser", kMaxLevels - 1},
       {"peers", kMaxPeers},
       {"reports", kMaxReports},
       {"spans", kMaxSpans},

@@ -25,7 +25,8 @@ RankReport FullReport() {
   RankReport report{.worker = kMax32, .group = 1023, .rank = 65535, .box = kMax32};
   for (int i = 0; i < kStageCount; ++i) report.stage_ns[static_cast<std::size_t>(i)] = i % 2 == 0 ? kMaxTime - i : -i;
   for (int i = 0; i < kMaxSpans; ++i) report.spans.push_back({Stage(i % kStageCount), kMaxTime - i, -kMaxTime});
-  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = kMax64;
+  report.occupied_voxels = report.drawn_voxels = report.voxel_bytes = report.image_bytes = report.image_pixels = report.stored_bytes =
+      kMax64;
   report.image_bounds = {0, 1, 16384, 16384};
   return report;
 }
@@ -71,7 +72,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   }
   if (ranks > 1) {
     setup.stored = StoredAt{.source = "/data/scan.ome.zarr?channel=1", .level = 2, .version = kMax64, .block = {{0, 0, 0}, {64, 32, 1}}};
-    message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {1 << 20, 32, 2}}, -1e30F}};
+    message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {kMaxVolumeSide, 32, 2}}, -1e30F}};
   }
   message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
   message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
@@ -106,6 +107,24 @@ GroupAssignment WithLayers() {
   message.setup.layers = {.labels = ScalarType::kUint16, .overlay = ScalarType::kFloat32, .cells = true};
   message.setup.looks.labels = LabelLook{.mode = LabelMode::kSurface, .tint = 0, .entries = {{{0, 0.5F, 1}, 0.25F, false}, {{1, 1, 1}}}};
   message.setup.looks.overlay = OverlayLook{.transfer = Curve(), .range = {-2, 3}, .weight = 0.125};
+  return message;
+}
+
+GroupAssignment OfLevels() {
+  GroupAssignment message = Assignment(3, {}, FindRenderer("raycast"));
+  FrameSetup& setup = message.setup;
+  setup.stored = StoredAt{"/data/scan.ome.zarr?t=3", 1, kMax64, {{0, 0, 0}, {64, 64, 1}}};
+  VolumeDescription coarser = setup.description;
+  for (const Axis axis : kAxes) {
+    coarser.geometry.size[axis] = (coarser.geometry.size[axis] + 1) / 2;
+    coarser.geometry.orientation.origin =
+        coarser.geometry.orientation.origin +
+        0.5 * coarser.geometry.spacing[axis] * coarser.geometry.orientation.axes[std::size_t(Number(axis))];
+    coarser.geometry.spacing[axis] *= 2;
+  }
+  setup.coarser = {{kMax64 - 1, coarser, setup.stored}, {1, coarser}};
+  for (std::size_t rank = 0; rank < 3; ++rank) message.group.placements[rank].level = std::uint8_t(rank);
+  std::swap(message.group.placements[0].filled, message.group.placements[1].filled);  // only placements of level 0 may have some
   return message;
 }
 
@@ -170,7 +189,8 @@ std::vector<GroupAssignment> SamplesOf() {
           BehindOthers(),
           Clipped(),
           WithSurfaces(),
-          WithLayers()};
+          WithLayers(),
+          OfLevels()};
 }
 
 template <>
@@ -303,7 +323,7 @@ std::vector<SubmitFrame> SamplesOf() {
 
 template <>
 std::vector<FrameProgress> SamplesOf() {
-  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2, 100}};
+  return {{}, {kMax64, FramePhase::kRunning, kMax32, 1024, 1024, kMax32, kMax32}, {1, FramePhase::kLoading, 0, 0, 7, 1, 2, 100, kMax64}};
 }
 
 template <>
@@ -312,6 +332,8 @@ std::vector<FrameReply> SamplesOf() {
                                    kLongName, kUmlaut, kLongName, -kMaxTime, kMaxTime, kMaxTime,   {FullReport()}};
   FrameStatistics predicted = statistics;
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
+  predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
+  predicted.lowered = kUmlaut;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
@@ -367,6 +389,7 @@ std::vector<StatusReply> SamplesOf() {
                    {kLongName, DatasetState::kLoading, {}, {}, ""},
                    {kUmlaut, DatasetState::kReady, Description(), {-3, 4}, ""},
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
+  full.datasets[2].levels = {Description(), Description()};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
   full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};
   return {{}, full};

@@ -50,6 +50,7 @@ const std::vector<Case>& Cases() {
        }},
       {"blosc", BloscCodec(), [](const std::string& bytes) { return PackBytes("blosc", bytes, 2); }},
       {"lz4", Lz4Codec(), [](const std::string& bytes) { return PackBytes("lz4", bytes); }},
+      {"lzf", LzfCodec(), [](const std::string& bytes) { return PackBytes("lzf", bytes); }, false},
       {"crc32c", Crc32cCodec(), [](const std::string& bytes) { return PackBytes("crc32c", bytes); }},
       {"swap", SwapBytesCodec(4), [](const std::string& bytes) { return SwappedBytes(bytes, 4); }, false},
       {"shuffle", ShuffleCodec(8), [](const std::string& bytes) { return ShuffledBytes(bytes, 8); }, false}};

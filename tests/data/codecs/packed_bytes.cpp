@@ -2,6 +2,7 @@
 
 #include <blosc.h>
 #include <lz4.h>
+#include <lzf.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -50,6 +51,11 @@ std::string PackBytes(const std::string& codec, const std::string& bytes, std::s
     std::string packed(std::size_t(LZ4_compressBound(int(bytes.size()))), '\0');
     packed.resize(std::size_t(LZ4_compress_default(bytes.data(), packed.data(), int(bytes.size()), int(packed.size()))));
     return Little32(std::uint32_t(bytes.size())) + packed;
+  }
+  if (codec == "lzf") {
+    std::string packed(bytes.size() + bytes.size() / 16 + 64, '\0');
+    packed.resize(lzf_compress(bytes.data(), unsigned(bytes.size()), packed.data(), unsigned(packed.size())));
+    return packed;
   }
   CHECK(codec.empty()) << codec;
   return bytes;

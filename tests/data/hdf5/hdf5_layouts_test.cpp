@@ -121,12 +121,15 @@ TEST_F(Hdf5LayoutsTest, ImarisFilesHaveLevelsWithoutTheirPadding) {
   EXPECT_THAT(samples, testing::Each(testing::Lt(10000)));
 }
 
-TEST_F(Hdf5LayoutsTest, ImarisFilesAskForAChannelAndATime) {
+TEST_F(Hdf5LayoutsTest, ImarisFilesShowTheFirstChannelAndAskForATime) {
   const std::string path = WriteImaris(directory_ / "cells.ims");
-  ExpectRefused(path, {.time = TimeRange{0, 0}}, "cells.ims: has 2 channels, of which --channel takes one: 0 to 1 (0: DAPI, 1: GFP)");
+  const auto first = Open(path, {.time = TimeRange{0, 0}}), named = Open(path, {.time = TimeRange{0, 0}, .channel = 0});
+  ASSERT_TRUE(first.ok()) << first.status().message();
+  EXPECT_EQ((*first)->info().channel, 0);
+  EXPECT_EQ(SamplesOf<std::uint16_t>(**first).value(), SamplesOf<std::uint16_t>(**named).value());
   ExpectRefused(path, {.channel = 0}, "cells.ims: holds 2 volumes, of which --time takes one: 0 to 1");
   ExpectRefused(path, {.time = TimeRange{2, 2}, .channel = 0}, "time is 2, must be in [0, 1]");
-  ExpectRefused(path, {.time = TimeRange{0, 0}, .channel = 2}, "has 2 channels");
+  ExpectRefused(path, {.time = TimeRange{0, 0}, .channel = 2}, "cells.ims: has 2 channels, so channel must be 0 to 1 (0: DAPI, 1: GFP)");
   ExpectRefused(path, {.spacing = Vec3{1, 1, 1}}, "takes no option spacing");
 }
 
@@ -155,7 +158,8 @@ TEST_F(Hdf5LayoutsTest, BigDataViewerFilesHaveSetupsAndUnsignedSamples) {
       <attributes><channel>1</channel></attributes></ViewSetup>
   </ViewSetups></SequenceDescription></SpimData>)")
                   .ok());
-  ExpectRefused(path, {}, "has 2 channels, of which --channel takes one: 0 to 1 (0: first, 1: green)");
+  ExpectRefused(path, {.channel = 2}, "has 2 channels, so channel must be 0 to 1 (0: first, 1: green)");
+  EXPECT_EQ((*Open(path))->info().channel, 0);
   const auto source = Open(path, {.channel = 1});
   ASSERT_TRUE(source.ok()) << source.status().message();
   const SourceInfo& info = (*source)->info();

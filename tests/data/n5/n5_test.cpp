@@ -136,9 +136,9 @@ class N5Test : public testing::Test {
  protected:
   Result<std::shared_ptr<ChunkedArray>> OpenArray() {
     const auto store = FolderStore(root_);
-    const Result<std::optional<zarr::Json>> json = zarr::ReadJson(*store, "attributes.json");
+    const Result<std::optional<metadata::Json>> json = metadata::ReadJson(*store, "attributes.json");
     if (!json.ok()) return json.status();
-    return n5::OpenArray(store, "", zarr::Field("attributes.json", **json), context_);
+    return n5::OpenArray(store, "", metadata::Field("attributes.json", **json), context_);
   }
   Result<std::shared_ptr<VolumeSource>> Open(const ReadOptions& options = {}) { return OpenSource(root_, options, context_); }
   void ExpectRefused(const ReadOptions& options, const std::string& why) { ExpectRefusal(Open(options), why); }
@@ -241,7 +241,8 @@ TEST_F(N5Test, ViewsOfBigStitcher) {
   WriteText(directory_ / "scan.xml",
             "<SpimData><SequenceDescription><ViewSetups><ViewSetup><id>2</id><name>green</name>"
             "<voxelSize><unit>um</unit><size>0.5 0.5 2</size></voxelSize></ViewSetup></ViewSetups></SequenceDescription></SpimData>");
-  ExpectRefused({}, "scan.n5: has 2 channels, of which --channel takes one: 0 to 1 (0, 1: green)");
+  ExpectRefused({.channel = 2}, "scan.n5: has 2 channels, so channel must be 0 to 1 (0, 1: green)");
+  ExpectRefused({}, "setup0: holds 2 volumes, of which --time takes one");  // of the first channel
   ExpectRefused({.channel = 1}, "setup2: holds 2 volumes, of which --time takes one");
   const auto source = Open({.time = TimeRange{1, 1}, .channel = 1});
   ASSERT_TRUE(source.ok()) << source.status().message();

@@ -3,9 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
+#include "common/volume/box_assembly.h"
 #include "data/positional/slice_stream.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/more_files.h"
@@ -17,43 +19,52 @@ namespace {
 
 using testing::HasSubstr;
 
-SliceStream OpenedStream(const std::string& path, const ReadOptions& options = {}) {
-  Result<SliceStream> stream = SliceStream::Open(path, options);
+std::shared_ptr<SliceStream> OpenedStream(const std::string& path, const ReadOptions& options = {}) {
+  static const SourceContext kContext = std::make_shared<ReadContext>(ReadContext::Limits{});
+  Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(path, options, kContext);
   CHECK(stream.ok()) << stream.status().message();
   return *std::move(stream);
 }
 
-// All boxes put together. Each lies at a multiple of `slices` along the axis of the slices.
-VoxelBlock Collect(const SliceStream& stream, std::int32_t slices) {
+// Boxes of `slices` slices, in the order of the file.
+std::vector<Box> InOrder(const SliceStream& stream, std::int32_t slices) {
+  const Box bounds = stream.info().levels[0].description.geometry.bounds();
+  Index3 step = bounds.end;
+  step[stream.along()] = slices;
+  std::vector<Box> boxes = CutAtBlocks(bounds, step);
+  if (stream.from_end()) std::ranges::reverse(boxes);
+  return boxes;
+}
+
+// All boxes put together.
+VoxelBlock Collect(SliceStream& stream, const std::vector<Box>& boxes) {
   const VolumeDescription& description = stream.info().levels[0].description;
   VoxelBlock all = MakeVoxelBlock(description.geometry.bounds(), description.type);
-  std::int64_t voxels = 0;
-  const Status status = stream.Read(slices, [&](const Box& box, std::span<const std::byte> samples) {
-    EXPECT_EQ(box.begin[stream.along()] % slices, 0);
-    EXPECT_EQ(samples.size(), std::size_t(box.voxel_count()) * BytesPerSample(description.type));
-    voxels += box.voxel_count();
-    const std::size_t row = std::size_t(box.size().x) * BytesPerSample(description.type);
+  for (const Box& box : boxes) {
+    VoxelBlock part = MakeVoxelBlock(box, description.type);
+    const Status status = stream.ReadNow(0, box, part.bytes);
+    EXPECT_TRUE(status.ok()) << status.message();
+    const std::size_t sample = BytesPerSample(description.type), row = std::size_t(box.size().x) * sample;
+    const std::byte* from = part.bytes.data();
     for (int z = box.begin.z; z < box.end.z; ++z) {
-      for (int y = box.begin.y; y < box.end.y; ++y) {
-        std::memcpy(all.bytes.data() + std::size_t(all.Offset({box.begin.x, y, z})) * BytesPerSample(description.type), samples.data(),
-                    row);
-        samples = samples.subspan(row);
+      for (int y = box.begin.y; y < box.end.y; ++y, from += row) {
+        std::memcpy(all.bytes.data() + std::size_t(all.Offset({box.begin.x, y, z})) * sample, from, row);
       }
     }
-    return Status::Ok();
-  });
-  EXPECT_TRUE(status.ok()) << status.message();
-  EXPECT_EQ(voxels, description.geometry.bounds().voxel_count());
+  }
   return all;
 }
 
 void ExpectStreamLikeWhole(const std::string& path, const ReadOptions& options = {}) {
   const Result<LoadedVolume> whole = ReadVolume(path, options);
   ASSERT_TRUE(whole.ok()) << whole.status().message();
-  EXPECT_TRUE(SliceStream::Recognises(path));
-  const SliceStream stream = OpenedStream(path, options);
-  EXPECT_EQ(stream.info().levels[0].description, whole->info.description);
-  for (const std::int32_t slices : {1, 2, 3, 64}) EXPECT_TRUE(Collect(stream, slices).bytes == whole->volume->block.bytes) << slices;
+  EXPECT_TRUE(SliceStream::Recognises(path, options));
+  for (const std::int32_t slices : {1, 2, 3, 64}) {
+    const std::shared_ptr<SliceStream> stream = OpenedStream(path, options);
+    EXPECT_EQ(stream->info().levels[0].description, whole->info.description);
+    EXPECT_TRUE(Collect(*stream, InOrder(*stream, slices)).bytes == whole->volume->block.bytes) << slices;
+    EXPECT_EQ(stream->counts().stored_bytes % std::size_t(whole->info.description.geometry.bounds().voxel_count()), 0U);
+  }
 }
 
 TEST(SliceStream, GivesTheVolumeOfEveryFormatTypeAndByteOrder) {
@@ -102,6 +113,31 @@ TEST(SliceStream, TakesOneOfSeveralTimesAndComponents) {
   for (int channel = 0; channel < 3; ++channel) ExpectStreamLikeWhole(directory / "v.nrrd", {.channel = channel});
 }
 
+TEST(SliceStream, ReadsInOrderOnceAndAnyBoxFromTheBeginning) {
+  const TemporaryDirectory directory;
+  const std::string path = directory / "v.nii.gz";
+  constexpr std::size_t kSlice = 40 * 30;
+  FileBytes samples;
+  Random random(53);
+  for (std::size_t i = 0; i < kSlice * 20; ++i) samples += char(random.Integer(0, 255));
+  WriteFile(path, Gzip(NiftiHeader({.size = {40, 30, 20}}) + samples));
+  const VoxelBlock whole = ReadVolume(path)->volume->block;
+  std::vector<int> percents;
+  ReadProgress progress([&](const ReadShare& read) { percents.push_back(read.percent); });
+  const std::shared_ptr<SliceStream> stream = OpenedStream(path, {.progress = &progress});
+  EXPECT_EQ(stream->info().levels[0].block, (Index3{40, 30, 1}));
+  EXPECT_TRUE(Collect(*stream, InOrder(*stream, 6)).bytes == whole.bytes);
+  EXPECT_EQ(stream->counts().stored_bytes, kSlice * 20);
+  EXPECT_EQ(percents.back(), 100);
+  const std::size_t told = percents.size();
+  // Any boxes, in any order.
+  std::vector<Box> boxes = CutAtBlocks({{0, 0, 0}, {40, 30, 20}}, {17, 13, 7});
+  std::ranges::reverse(boxes);
+  EXPECT_TRUE(Collect(*stream, boxes).bytes == whole.bytes);
+  EXPECT_GT(stream->counts().stored_bytes, kSlice * 40) << "it was read from its beginning several times";
+  EXPECT_EQ(percents.size(), told) << "each slice is told once";
+}
+
 TEST(SliceStream, EndsWithWhatIsWrong) {
   const TemporaryDirectory directory;
   const FileSpec spec{.size = {50, 40, 30}};
@@ -110,30 +146,32 @@ TEST(SliceStream, EndsWithWhatIsWrong) {
   Random random(52);
   for (int i = 0; i < 60000; ++i) samples += char(random.Integer(0, 255));
   const FileBytes bytes = Gzip(NiftiHeader(spec) + samples);
-  const auto read = [&](const FileBytes& file, const SliceStream::Take& take, std::stop_token stop = {}) {
-    WriteFile(path, file);
-    return OpenedStream(path).Read(4, take, std::move(stop));
-  };
   int boxes = 0;
-  const SliceStream::Take count = [&](const Box&, std::span<const std::byte>) {
-    ++boxes;
-    return Status::Ok();
+  const auto read = [&](const FileBytes& file, std::stop_token stop = {}) {
+    WriteFile(path, file);
+    const std::shared_ptr<SliceStream> stream = OpenedStream(path);
+    Status status;
+    for (const Box& box : InOrder(*stream, 4)) {
+      VoxelBlock part = MakeVoxelBlock(box, ScalarType::kUint8);
+      status = stream->ReadNow(0, box, part.bytes, stop);
+      if (!status.ok()) break;
+      ++boxes;
+    }
+    return status;
   };
-  const Status cut = read(bytes.substr(0, 40000), count);
+  const Status cut = read(bytes.substr(0, 40000));
   EXPECT_EQ(cut.code(), StatusCode::kDataLoss);
   EXPECT_THAT(cut.message(), HasSubstr("v.nii.gz: truncated"));
   EXPECT_GT(boxes, 2);
   FileBytes damaged = bytes;
   damaged[damaged.size() - 6] ^= 1;  // of the checksum
-  EXPECT_THAT(read(damaged, count).message(), HasSubstr("damaged"));
-  const Status full = read(bytes, [](const Box&, std::span<const std::byte>) { return Status::Unavailable("the disk is full"); });
-  EXPECT_EQ(full, Status::Unavailable("the disk is full"));
+  EXPECT_THAT(read(damaged).message(), HasSubstr("damaged"));
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_EQ(read(bytes, count, stop.get_token()).code(), StatusCode::kCancelled);
+  EXPECT_EQ(read(bytes, stop.get_token()).code(), StatusCode::kCancelled);
   WriteFile(directory / "v.nii", NiftiHeader(spec) + samples);
   EXPECT_FALSE(SliceStream::Recognises(directory / "v.nii"));
-  EXPECT_THAT(SliceStream::Open(directory / "v.nii", {}).status().message(), HasSubstr("not compressed"));
+  EXPECT_THAT(SliceStream::Open(directory / "v.nii", {}, nullptr).status().message(), HasSubstr("not compressed"));
 }
 
 }  // namespace

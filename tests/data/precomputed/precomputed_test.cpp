@@ -171,10 +171,12 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
       }
     }
   }
-  ExpectRefused({}, "em: has 2 channels, of which --channel takes one: 0 to 1");
+  ExpectRefused({.channel = 2}, "em: has 2 channels, so channel must be 0 to 1");
+  EXPECT_EQ((*Open({}))->info().channel, 0);
   const auto source = Open({.channel = 1});
   ASSERT_TRUE(source.ok()) << source.status().message();
   const SourceInfo& info = (*source)->info();
+  EXPECT_EQ(info.channel, 1);
   EXPECT_EQ(info.format, "Neuroglancer precomputed");
   EXPECT_FALSE(info.labels);
   ASSERT_EQ(info.levels.size(), 2U);

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "tests/data/sources/memory_array.h"
+#include "tests/data/sources/opened_source.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
@@ -113,6 +114,8 @@ void ExpectBox(VolumeSource& source, const RandomPyramid& random, const Box& box
       }
     }
   }
+  const AlignedVector<std::byte> apart = ReadBoxApart(source, 0, box, 2);
+  EXPECT_TRUE(std::ranges::equal(apart, out));
 }
 
 TEST(ChunkedSourceTest, EveryBoxHoldsTheElementsOfTheArray) {
@@ -143,6 +146,25 @@ std::shared_ptr<VolumeSource> SourceOf(const std::shared_ptr<ChunkedArray>& arra
 }
 
 constexpr Box kCube = {{0, 0, 0}, {8, 8, 8}};
+
+TEST(ChunkedSourceTest, ZerosAreNotWrittenWhereAllIsZero) {
+  for (const std::byte fill : {std::byte{0}, std::byte{9}}) {
+    const ArrayShape shape = {.size = {8, 8, 8}, .chunk = {4, 4, 4}, .type = SampleType::kUint8, .fill = {fill}};
+    const auto array = std::make_shared<MemoryArray>(shape, std::vector<std::byte>(512, std::byte{5}));
+    array->missing = {0, 3};
+    const auto source = SourceOf(array, Context());
+    for (const bool zeroed : {false, true}) {
+      std::vector<std::byte> out(512, std::byte{7});  // what is said to be zero is not looked at
+      BoxRoom room = BoxRoom::Dense(kCube, out.data());
+      room.zeroed = zeroed;
+      std::promise<Status> end;
+      source->Read(0, kCube, room, {}, [&end](Status status) { end.set_value(std::move(status)); });
+      EXPECT_TRUE(end.get_future().get().ok());
+      EXPECT_EQ(out[0], zeroed && fill == std::byte{0} ? std::byte{7} : fill);
+      EXPECT_EQ(out[511], std::byte{5});
+    }
+  }
+}
 
 struct RunningRead {
   RunningRead(VolumeSource& source, const Box& box, std::stop_token stop = {}) : out(std::size_t(box.voxel_count())) {
@@ -180,6 +202,18 @@ TEST(ChunkedSourceTest, ChunksArriveInAnyOrder) {
     EXPECT_EQ(source->counts().chunks, 8U);
     EXPECT_EQ(source->counts().stored_bytes, 56U);
   }
+}
+
+TEST(ChunkedSourceTest, StoredBytesAreTakenOnce) {
+  const auto source = SourceOf(SmallCube(), Context({.decode_threads = 1, .cache_bytes = 0}));
+  std::vector<std::byte> out(512);
+  EXPECT_EQ(source->TakeStoredBytes(), 0U);
+  ASSERT_TRUE(source->ReadNow(0, kCube, out).ok());
+  EXPECT_EQ(source->TakeStoredBytes(), 56U);
+  EXPECT_EQ(source->TakeStoredBytes(), 0U);
+  ASSERT_TRUE(source->ReadNow(0, kCube, out).ok());
+  EXPECT_EQ(source->TakeStoredBytes(), 56U);
+  EXPECT_EQ(source->counts().stored_bytes, 112U);
 }
 
 TEST(ChunkedSourceTest, ChunksAreAskedForInTheOrderOfTheStore) {

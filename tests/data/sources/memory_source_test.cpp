@@ -4,6 +4,8 @@
 
 #include <vector>
 
+#include "data/sources/part_source.h"
+
 namespace slabstream {
 namespace {
 
@@ -24,6 +26,24 @@ TEST(MemorySourceTest, BoxesAreThoseOfTheVolume) {
   std::stop_source stop;
   stop.request_stop();
   EXPECT_EQ(source->ReadNow(0, box, out, stop.get_token()).code(), StatusCode::kCancelled);
+}
+
+TEST(PartSourceTest, ItsVoxelsAreThoseOfTheBoxAndLieWhereTheyLay) {
+  auto volume = std::make_shared<Volume>();
+  VolumeGeometry& geometry = volume->description.geometry;
+  geometry = {.size = {70, 5, 6}, .spacing = {1, 2, 3}, .orientation = {.world = World::kScene, .origin = {10, 20, 30}}};
+  geometry.orientation.axes = {Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}};
+  volume->block = MakeVoxelBlock(geometry.bounds(), ScalarType::kUint8);
+  for (int i = 0; i < 70 * 5 * 6; ++i) volume->block.samples<std::uint8_t>()[i] = std::uint8_t(i % 251);
+  const Box box = {{3, 1, 2}, {66, 4, 6}};
+  const auto part = MakePartSource(MakeMemorySource(volume, {.format = "NRRD"}), 0, box);
+  const VolumeGeometry& of_part = part->info().levels.at(0).description.geometry;
+  EXPECT_EQ(of_part.size, box.size());
+  EXPECT_EQ(of_part.ToWorld({1, 1, 1}), geometry.ToWorld({4, 2, 3}));
+  EXPECT_EQ(part->info().levels[0].block, Min(Uniform(64), box.size()));
+  AlignedVector<std::byte> out(2 * 3 * 4);
+  ASSERT_TRUE(part->ReadNow(0, {{0, 0, 0}, {2, 3, 4}}, out).ok());
+  EXPECT_EQ(out, CutBlock(volume->block, {{3, 1, 2}, {5, 4, 6}}).bytes);
 }
 
 }  // namespace

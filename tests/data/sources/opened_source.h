@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <future>
 #include <memory>
 #include <span>
 #include <string>
@@ -34,6 +35,28 @@ inline AlignedVector<std::byte> ReadBox(VolumeSource& source, int level, const B
   AlignedVector<std::byte> bytes(std::size_t(box.voxel_count()) * BytesPerSample(type), std::byte{0xa5});
   const Status status = source.ReadNow(level, box, bytes);
   EXPECT_TRUE(status.ok()) << status.message();
+  return bytes;
+}
+
+// The same, read to where `gap` samples lie between rows, and a row between slices: nothing is written there.
+inline AlignedVector<std::byte> ReadBoxApart(VolumeSource& source, int level, const Box& box, std::int64_t gap) {
+  const std::size_t sample = BytesPerSample(source.info().levels[std::size_t(level)].description.type);
+  const Index3 size = box.size();
+  const std::int64_t row = size.x + gap, slice = row * (size.y + 1);
+  std::vector<std::byte> room(std::size_t(slice * size.z) * sample, std::byte{0x5a});
+  std::promise<Status> end;
+  source.Read(level, box, BoxRoom{room.data(), row, slice}, {}, [&end](Status status) { end.set_value(std::move(status)); });
+  const Status status = end.get_future().get();
+  EXPECT_TRUE(status.ok()) << status.message();
+  AlignedVector<std::byte> bytes;
+  for (std::int64_t i = 0; i < slice * size.z; ++i) {
+    const auto first = room.begin() + i * std::ptrdiff_t(sample);
+    if (i % row < size.x && i % slice / row < size.y) {
+      bytes.insert(bytes.end(), first, first + std::ptrdiff_t(sample));
+    } else {
+      EXPECT_EQ(*first, std::byte{0x5a}) << "between the rows";
+    }
+  }
   return bytes;
 }
 

@@ -41,7 +41,7 @@ class ScriptedSource : public VolumeSource {
  public:
   explicit ScriptedSource(const Index3& size) { info_.levels = {{{.geometry = {size}}, size}}; }
   const SourceInfo& info() const override { return info_; }
-  void Read(int, const Box& box, std::span<std::byte>, std::stop_token, ReadDone done) override {
+  void Read(int, const Box& box, const BoxRoom&, std::stop_token, ReadDone done) override {
     asked = box;
     done(Status::DataLoss("c/0/0/0: damaged"));
   }

@@ -69,7 +69,7 @@ class StoppedSource : public VolumeSource {
  public:
   StoppedSource(std::shared_ptr<VolumeSource> source, int reads) : source_(std::move(source)), left_(reads) {}
   const SourceInfo& info() const override { return source_->info(); }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     if (left_-- <= 0) return done(Status::Cancelled("reading was stopped"));
     voxels_ += box.voxel_count();
     source_->Read(level, box, out, stop, std::move(done));

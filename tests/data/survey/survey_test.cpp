@@ -28,7 +28,8 @@ TEST(SurveyTest, OfWhatIsNotLargeIsThatOfAllItsVoxels) {
     for (const Index3& size : {Index3{1, 1, 1}, Index3{150, 70, 33}, Index3{17, 400, 65}}) {
       const std::shared_ptr<const Volume> volume = SomeVolume(random, size, type);
       std::vector<int> percents;
-      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), [&](int percent) { percents.push_back(percent); });
+      ReadProgress progress([&](const ReadShare& read) { percents.push_back(read.percent); });
+      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), &progress);
       ASSERT_TRUE(survey.ok()) << survey.status().message();
       EXPECT_EQ(survey->level, 0);
       EXPECT_EQ(*survey->summary, Summarize(*volume));
@@ -49,13 +50,13 @@ class ComputedSource : public VolumeSource {
     read_.resize(sizes.size());
   }
   const SourceInfo& info() const override { return info_; }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token, ReadDone done) override {
     const std::lock_guard lock(mutex_);
     read_[std::size_t(level)] += box.voxel_count();
     for (const Axis axis : kAxes) starts_at_blocks_ &= box.begin[axis] % info_.levels[std::size_t(level)].block[axis] == 0;
     if (fails_) return done(Status::DataLoss("1/0: damaged"));
     const int step = info_.levels[0].description.geometry.size.x / info_.levels[std::size_t(level)].description.geometry.size.x;
-    auto* const samples = reinterpret_cast<std::uint16_t*>(out.data());
+    auto* const samples = reinterpret_cast<std::uint16_t*>(out.first);
     const std::int32_t row = box.size().x;
     for (std::int64_t i = 0; i < box.voxel_count(); ++i) samples[i] = std::uint16_t((box.begin.x + std::int32_t(i % row)) * step);
     done(Status::Ok());

@@ -9,8 +9,8 @@
 namespace slabstream {
 namespace {
 
+using metadata::Field;
 using testing::HasSubstr;
-using zarr::Field;
 
 struct Wrong {
   std::string at;     // JSON pointer into right metadata
@@ -178,12 +178,12 @@ TEST(ZarrMetadataTest, AnImageHasTheTransformationsOfItsLevelAndThenItsOwn) {
 }
 
 TEST(ZarrMetadataTest, WhatIsNoJsonIsDamaged) {
-  EXPECT_EQ(zarr::ParseJson("object", "{\"shape\": [1,").status(), Status::DataLoss("object: damaged: not JSON"));
-  EXPECT_EQ(zarr::ParseJson("object", "").status().code(), StatusCode::kDataLoss);
-  const Status deep = zarr::ParseJson("object", std::string(1'000'000, '[')).status();
+  EXPECT_EQ(metadata::ParseJson("object", "{\"shape\": [1,").status(), Status::DataLoss("object: damaged: not JSON"));
+  EXPECT_EQ(metadata::ParseJson("object", "").status().code(), StatusCode::kDataLoss);
+  const Status deep = metadata::ParseJson("object", std::string(1'000'000, '[')).status();
   EXPECT_EQ(deep.code(), StatusCode::kDataLoss);
-  EXPECT_TRUE(zarr::ParseJson("object", std::string(60, '[') + std::string(60, ']')).ok());
-  EXPECT_EQ(zarr::ParseJson("object", std::string(80, '[') + std::string(80, ']')).status(),
+  EXPECT_TRUE(metadata::ParseJson("object", std::string(60, '[') + std::string(60, ']')).ok());
+  EXPECT_EQ(metadata::ParseJson("object", std::string(80, '[') + std::string(80, ']')).status(),
             Status::DataLoss("object: values nest more than 64 deep"));
 }
 

@@ -68,6 +68,8 @@ Case RandomCase(Random& random, const Index3& size) {
   made.options.shard_side = 8 * random.Integer(1, 3);
   made.options.version = random.Chance(0.5) ? OmeZarrVersion::k04 : OmeZarrVersion::k05;
   made.options.source = "scan.nrrd";
+  if (random.Chance(0.4)) made.options.slices = SliceOrder{kAxes[std::size_t(random.Integer(0, 2))], random.Chance(0.5)};
+  if (random.Chance(0.4)) made.options.coarsest_side = 16;
   return made;
 }
 
@@ -129,7 +131,7 @@ void ExpectLevels(const Case& made, const std::string& folder) {
   const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}));
   ASSERT_TRUE(read.ok()) << read.status().message();
   const VolumeDescription& description = made.volume->description;
-  const std::vector<WrittenLevel> plan = PlanLevels(description.geometry, made.options.chunk_side);
+  const std::vector<WrittenLevel> plan = PlanLevels(description.geometry, made.options.coarsest_side > 0 ? made.options.coarsest_side : 8);
   const SourceInfo& info = (*read)->info();
   ASSERT_EQ(info.levels.size(), plan.size());
   EXPECT_EQ(info.file_type, made.info.file_type);
@@ -298,9 +300,9 @@ class CountedSource : public VolumeSource {
  public:
   explicit CountedSource(std::shared_ptr<VolumeSource> source) : source_(std::move(source)) {}
   const SourceInfo& info() const override { return source_->info(); }
-  void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) override {
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
     ++reads;
-    largest = std::max(largest, out.size());
+    largest = std::max(largest, std::size_t(box.voxel_count()) * BytesPerSample(info().levels[0].description.type));
     source_->Read(level, box, out, std::move(stop), std::move(done));
   }
   Counts counts() const override { return source_->counts(); }
@@ -317,6 +319,8 @@ TEST(OmeZarrWriterTest, ReadsAheadOnlyIfThereIsMemoryForIt) {
   Random random(3);
   Case made = RandomCase(random, {50, 30, 30});
   made.options.shard_side = 16;
+  made.options.slices.reset();
+  made.options.coarsest_side = 0;
   // The least memory that is enough.
   std::uint64_t least = 1 << 30;
   const auto folder = [&] { return directory / std::to_string(made.options.memory); };
@@ -341,6 +345,63 @@ TEST(OmeZarrWriterTest, ReadsAheadOnlyIfThereIsMemoryForIt) {
     EXPECT_EQ(most_ahead, ahead ? 1 : 0);
     EXPECT_EQ(source.largest, region);
     EXPECT_EQ(source.reads, 4 * 2 * 2);  // each voxel once
+  }
+}
+
+// Boxes that are read of level 0, in their order.
+class RecordedSource : public VolumeSource {
+ public:
+  explicit RecordedSource(std::shared_ptr<VolumeSource> source) : source_(std::move(source)) {}
+  const SourceInfo& info() const override { return source_->info(); }
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
+    boxes.push_back(box);
+    source_->Read(level, box, out, std::move(stop), std::move(done));
+  }
+  Counts counts() const override { return source_->counts(); }
+
+  std::vector<Box> boxes;
+
+ private:
+  const std::shared_ptr<VolumeSource> source_;
+};
+
+TEST(OmeZarrWriterTest, ReadsSlicesInTheirOrderAndOnce) {
+  const TemporaryDirectory directory;
+  for (const Axis along : kAxes) {
+    for (const bool from_end : {false, true}) {
+      SCOPED_TRACE(testing::Message() << Letter(along) << from_end);
+      Random random(6);
+      Case made = RandomCase(random, {37, 30, 45});
+      made.options.slices = SliceOrder{along, from_end};
+      made.options.version = OmeZarrVersion::k05;
+      const Index3& size = made.volume->description.geometry.size;
+      EXPECT_LT(LeastMemoryFor(made.source()->info(), made.options), made.options.memory);
+      const std::string folder = directory / (std::string(1, Letter(along)) + (from_end ? "1" : "0"));
+      std::stop_source stop;
+      made.options.stop = stop.get_token();
+      int regions = -1;
+      made.options.progress = [&](const OmeZarrProgress&) {
+        if (++regions == 4) stop.request_stop();
+      };
+      EXPECT_EQ(WriteOmeZarr(*made.source(), folder, made.options).code(), StatusCode::kCancelled);
+      made.options.stop = {};
+      // What it goes on with comes in order, too.
+      RecordedSource source(made.source());
+      ASSERT_TRUE(WriteOmeZarr(source, folder, made.options).ok());
+      ExpectLevels(made, folder);
+      ASSERT_GT(source.boxes.size(), 1U);
+      std::ranges::reverse(source.boxes);
+      if (!from_end) std::ranges::reverse(source.boxes);
+      for (std::size_t i = 0; i < source.boxes.size(); ++i) {
+        Index3 whole = size;
+        whole[along] = source.boxes[i].size()[along];
+        EXPECT_EQ(source.boxes[i].size(), whole) << "all of each slice";
+        EXPECT_EQ(source.boxes[i].begin[along] % 8, 0);
+        if (i > 0) {
+          EXPECT_EQ(source.boxes[i].begin[along], source.boxes[i - 1].end[along]);
+        }
+      }
+    }
   }
 }
 
@@ -414,6 +475,8 @@ TEST(OmeZarrWriterTest, NamesAFinishedFileThatIsDamaged) {
   Random random(8);
   Case made = RandomCase(random, {50, 30, 30});
   made.options.version = OmeZarrVersion::k05;
+  made.options.slices.reset();
+  made.options.coarsest_side = 0;
   std::stop_source stop;
   made.options.stop = stop.get_token();
   int calls = 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <random>
 #include <thread>
 
@@ -252,6 +253,52 @@ TEST(Renderers, PausesChangeNoBit) {
     EXPECT_EQ(paused.bounds, expected.bounds);
     EXPECT_TRUE(std::ranges::equal(paused.rgba, expected.rgba));
     EXPECT_TRUE(std::ranges::equal(paused.depth, expected.depth));
+  }
+}
+
+// As voxels that are read in parts arrive.
+PaddedVoxels WrittenRowByRow(const VoxelBlock& block) {
+  const PaddedVoxels padded = MakePaddedVoxels(block.box, block.type);
+  const std::size_t row = std::size_t(block.box.size().x) * BytesPerSample(block.type);
+  for (Index3 v = block.box.begin; v.z < block.box.end.z; ++v.z) {
+    for (v.y = block.box.begin.y; v.y < block.box.end.y; ++v.y) {
+      std::memcpy(padded.At(v), block.bytes.data() + std::size_t(block.Offset(v)) * BytesPerSample(block.type), row);
+    }
+  }
+  FillPadding(padded);
+  return padded;
+}
+
+TEST(PaddedVoxels, ArePaddedAlikeWhereverTheyComeFrom) {
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    for (const Index3 size : {Index3{40, 23, 17}, Index3{1, 5, 1}, Index3{3, 1, 2}}) {
+      const Volume volume = MakeBlobs({size, {1, 1, 1}}, type, 34);
+      const PaddedVoxels written = WrittenRowByRow(volume.block), padded = Pad(VoxelBricks(volume.block), volume.block.box);
+      ASSERT_EQ(written.bytes(), padded.bytes());
+      EXPECT_EQ(std::memcmp(written.samples.get(), padded.samples.get(), padded.bytes()), 0);
+    }
+  }
+}
+
+TEST(Renderers, DrawPaddedVoxelsAsAnyOthers) {
+  const Volume blobs = AsGrid(MakeBlobs({{50, 40, 30}, {1, 1, 1}}, ScalarType::kUint16, 36));
+  for (const RendererKind* kind : Renderers()) {
+    SCOPED_TRACE(kind->name());
+    SetupOptions options;
+    options.renderer = kind;
+    const FrameSetup setup = MakeSetup(blobs, options);
+    const auto render = [&](BoxData& data) {
+      RankReport report;
+      return MakeRenderer(*kind)->Render(data, blobs.block.box, setup, {}, RenderControl(), report).value();
+    };
+    BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), BoxLayers{.cells = blobs.cells}));
+    const LocalImage drawn = render(data), expected = render(*BoxFor(*kind, blobs, blobs.block.box));
+    EXPECT_EQ(drawn.bounds, expected.bounds);
+    EXPECT_TRUE(std::ranges::equal(drawn.rgba, expected.rgba));
+    EXPECT_TRUE(std::ranges::equal(drawn.depth, expected.depth));
+    if (kind->name() == "raycast") {
+      EXPECT_LT(data.derived_bytes(), blobs.block.bytes.size() / 2) << "rays read them where they are";
+    }
   }
 }
 

@@ -35,7 +35,7 @@ class BoundsCache : public BoxCache {
 
 class MipRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const ProjectionMode mode = ModeOf(setup);
@@ -50,7 +50,7 @@ class MipRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
     const ValueScale values = MakeValueScale(double(setup.range.min), double(setup.range.max), mapping);
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
           const ProjectWork work = {.rays = &rays,
                                     .box = &ray_box,

@@ -57,6 +57,8 @@ std::vector<std::uint8_t> EmptyDistances(const MacrocellRanges& cells, const Vis
 }
 
 std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance) {
+  const auto visible = std::size_t(std::ranges::count(distance, 0));
+  if (visible == 0 || visible == CountIn(counts)) return distance;  // as in most boxes of a large volume
   Sweep sweep(counts, distance.data());
   for (std::int32_t z = 0; z < counts.z; ++z) {
     for (std::int32_t y = 0; y < counts.y; ++y) sweep.Visit(y, z, -1);

@@ -184,9 +184,16 @@ HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floa
   }
 }
 
+// A packet in the frame's grid and among the voxels of the box (AmongVoxels), and its leaps there.
+struct MarchingPacket {
+  const RayPacket& of_frame;
+  const RayPacket& among;
+  const LeapScales& leaps;
+};
+
 // Samples `owned` of the rays, which lie in `part`; of kPlain it is null. Returns how many samples were shaded.
 template <class T, Samples kSamples>
-HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
+HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned,
                                       const PacketPart* part, Sums& gathered) {
   constexpr bool kAll = kSamples != Samples::kPlain;
   const FloatTag df;
@@ -199,7 +206,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   auto k = owned.begin;
   auto alive = hn::Lt(k, owned.end);
   std::uint64_t shaded = 0;
-  SurfaceWalk<T> surfaces(work, packet);
+  SurfaceWalk<T> surfaces(work, packet.among);
   const bool has_surfaces = kAll && !look.isovalues.empty();
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
@@ -209,14 +216,14 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
   if (!has_surfaces && hn::AllFalse(df, alive)) return 0;
   const bool has_ends = kAll || work.box->at_border;
   EndSamples ends{zero, zero, zero, zero};
-  if (has_ends) ends = EndSamplesOf(*work.rays, packet, leaps, part);
+  if (has_ends) ends = EndSamplesOf(*work.rays, packet.of_frame, LeapScalesOf(packet.of_frame), part);
 
   Sums sums = gathered;
   bool in_matter = false;  // most of the last samples were visible
   while (!hn::AllFalse(df, alive)) {
-    const SamplePlace place = PlaceSample(packet, *work.box, k);
+    const SamplePlace place = PlaceSample(packet.among, *work.box, k);
     Stride stride = {alive, one};
-    if (!in_matter) stride = LeapFrom(work, leaps, place, alive);
+    if (!in_matter) stride = LeapFrom(work, packet.leaps, place, alive);
     const auto this_k = k;
     k = hn::Add(k, stride.steps);
     alive = hn::And(alive, hn::Lt(k, owned.end));
@@ -236,7 +243,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   }
   if constexpr (kAll) {
-    if (has_surfaces) shaded += AddSurfaces<T>(work, packet.valid, Set(kRayEnd), surfaces, sums);
+    if (has_surfaces) shaded += AddSurfaces<T>(work, packet.of_frame.valid, Set(kRayEnd), surfaces, sums);
   }
   gathered = sums;
   return shaded;
@@ -244,31 +251,35 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const RayPacket& pa
 
 // Apart from plain frames, so that these have the registers for themselves.
 template <class T, Samples kSamples>
-HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const RayPacket& packet, const LeapScales& leaps, const SampleInterval& owned,
-                                      Sums& sums) {
+HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned, Sums& sums) {
   PacketPart parts[2];
-  PartsOf(work.rays->clip, packet, parts);
+  PartsOf(work.rays->clip, packet.of_frame, parts);
   std::uint64_t shaded = 0;
-  for (const PacketPart& part : parts) shaded += MarchSamples<T, kSamples>(work, packet, leaps, part.Of(owned), &part, sums);
+  for (PacketPart& part : parts) {
+    for (std::size_t i = 0; i < 3; ++i) part.face[i] = hn::Div(part.face[i], Set(work.box->scale[i]));  // like a gradient there
+    shaded += MarchSamples<T, kSamples>(work, packet, part.Of(owned), &part, sums);
+  }
   return shaded;
 }
 
 // The rays of one packet.
 template <class T>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& packet, float* HWY_RESTRICT rgba) {
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float* HWY_RESTRICT rgba) {
   const auto zero = hn::Zero(FloatTag());
-  const SampleInterval owned = OwnedSamples(packet, *work.box);
-  const LeapScales leaps = LeapScalesOf(packet);
+  const SampleInterval owned = OwnedSamples(of_frame, *work.box);
+  const RayPacket among = AmongVoxels(of_frame, *work.box);
+  const LeapScales leaps = LeapScalesOf(among);
+  const MarchingPacket packet = {of_frame, among, leaps};
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
   const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty();
   if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
-    shaded = MarchSamples<T, Samples::kPlain>(work, packet, leaps, owned, nullptr, sums);
+    shaded = MarchSamples<T, Samples::kPlain>(work, packet, owned, nullptr, sums);
   } else if (work.layers == nullptr) {
-    shaded = MarchParts<T, Samples::kAll>(work, packet, leaps, owned, sums);
+    shaded = MarchParts<T, Samples::kAll>(work, packet, owned, sums);
   } else {
-    shaded = MarchParts<T, Samples::kLayered>(work, packet, leaps, owned, sums);
+    shaded = MarchParts<T, Samples::kLayered>(work, packet, owned, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;

@@ -134,13 +134,13 @@ class VisibilityCache : public BoxCache {
 
 class RaycastRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
-    const RayLook look =
-        MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel);
+    const RayLook look = MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading,
+                                     samples_per_voxel, GeometryOf(setup, at.level).spacing);
     const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
     const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
     clock.Charge(Stage::kPrepare);
@@ -148,7 +148,7 @@ class RaycastRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
     std::atomic<std::uint64_t> shaded = 0;
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
+        pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
           const std::optional<RayLayers> layers = shown.Of(piece);
           const MarchWork work = {.rays = &rays,

@@ -89,8 +89,9 @@ std::uint64_t RenderTiles(const ShearWork& work, LocalImage& image, const Render
 
 class ShearRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
+    const Box& box = at.box;
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const VolumeGeometry& geometry = setup.description.geometry;

@@ -34,8 +34,9 @@ RayReach SetBox(const Box& box, SliceWork& work) {
 
 class SliceRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
+    const Box& box = at.box;
     if (data.layers().cells == nullptr) {
       return Status::InvalidArgument("renderer slice draws the cells of unstructured grids, but the dataset has none");
     }

@@ -31,8 +31,9 @@ void AddTo(RankReport& sum, const RankReport& part) {
 
 class SplattingRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
+    const Box& box = at.box;
     StageClock clock(report);
     const ClassificationTable& table = data.Classification(setup);
     const OccupiedVoxels& cells = data.CacheOf<SplatCache>().Occupied(data, setup, box);

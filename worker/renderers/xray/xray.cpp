@@ -11,7 +11,7 @@ namespace {
 
 class XrayRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& hidden,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
                             const RenderControl& control, RankReport& report) override {
     StageClock clock(report);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
@@ -21,7 +21,7 @@ class XrayRenderer : public Renderer {
     const ViewRays rays = MakeViewRays(setup.camera, volume.geometry, setup.parameters.at(0), setup.clip);
     const auto values = MakeValueScale(AttenuationOf(setup).clear, double(setup.range.max), volume.mapping);
     LocalImage image = RenderPieces(
-        pieces, {box, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return WholeBox(box); },
+        pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
           ProjectTile({.rays = &rays, .box = &ray_box, .values = values}, tile, pixels, floats_a_row);
         });

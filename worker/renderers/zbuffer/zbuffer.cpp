@@ -169,8 +169,9 @@ std::size_t DrawBand(const Surface& surface, const Scene& scene, const BrickProj
 
 class ZBufferRenderer : public Renderer {
  public:
-  Result<LocalImage> Render(BoxData& data, const Box& box, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
+  Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& /*hidden*/,
                             const RenderControl& control, RankReport& report) override {
+    const Box& box = at.box;
     StageClock clock(report);
     const ClassificationTable& table = data.Classification(setup);
     auto& cache = data.CacheOf<SurfaceCache>();

@@ -22,7 +22,7 @@ struct Scene {
         rays(MakeViewRays(camera, volume.description.geometry, rate, clip)),
         padded(Pad(VoxelBricks(volume.block), Grown(box, 3, volume.block.box))),
         cells(FindMacrocellRanges(padded)),
-        ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)),
+        ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)),
         bounds(BoundSamples(cells, mode == Mode::kMinimum ? -1 : 1)) {
     work = {.rays = &rays, .box = &ray_box, .values = {10, 1.0F / 180}};
     if (mode != Mode::kMean) work.bounds = &bounds;

@@ -336,7 +336,7 @@ TEST(Layers, AgreeWithTheReference) {
     // Nothing is leapt over.
     std::vector<std::uint8_t> distances(pieces[0].cells.ranges.size() + kEmptyDistancePadding, 0);
     const RayBox box =
-        MakeRayBox(pieces[0].voxels, pieces[0].cells.counts, volume.block.box, WholeBox(volume.block.box), rays, c.setup.camera);
+        MakeRayBox(pieces[0].voxels, pieces[0].cells.counts, WholeBox(volume.block.box), WholeBox(volume.block.box), rays, c.setup.camera);
     const MarchWork work = {.rays = &rays, .box = &box, .look = &look, .empty_distance = distances.data(), .layers = &layers};
     const PixelBounds all = {0, 0, c.setup.camera.width, c.setup.camera.height};
     const auto marched = [&](auto&& march) {

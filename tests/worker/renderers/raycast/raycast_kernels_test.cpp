@@ -26,7 +26,7 @@ struct Scene {
         look(MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description, camera, setup.shading,
                          rate)),
         distances(EmptyDistances(cells, VisibleSamples(look))),
-        ray_box(MakeRayBox(padded, cells.counts, box, WholeBox(box), rays, camera)) {}
+        ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)) {}
 
   MarchWork Work(float termination = 0) const { return {&rays, &ray_box, &look, distances.data(), termination}; }
 

@@ -1,4 +1,4 @@
-#include "data/zarr/metadata.h"
+#include "data/metadata/json_fields.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include "common/base/printable.h"
 #include "data/sources/chunked_array.h"
 
-namespace slabstream::zarr {
+namespace slabstream::metadata {
 namespace {
 
 constexpr int kMostDepth = 64;
@@ -93,4 +93,4 @@ Status Field::Wrong(std::string_view must_be) const {
   return Printable(Status::InvalidArgument(fmt::format("{}: {} is {}, must be {}", object_, place, shown, must_be)));
 }
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream::metadata

@@ -1,4 +1,5 @@
-// Metadata of Zarr: JSON from anywhere, read field by field. Every field knows its place, so that a message names store, object and field.
+// Metadata of stores: JSON from anywhere, read field by field. Every field knows its place, so that a message names store, object and
+// field.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 #include "common/base/status.h"
 #include "data/stores/store.h"
 
-namespace slabstream::zarr {
+namespace slabstream::metadata {
 
 using Json = nlohmann::json;
 
@@ -60,4 +61,4 @@ class Field {
   const Json* value_;  // null: there is none
 };
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream::metadata

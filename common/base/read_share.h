@@ -1,0 +1,13 @@
+// ReadShare: how far a long read has come, and how fast it is.
+#pragma once
+
+#include <cstdint>
+
+namespace slabstream {
+
+struct ReadShare {
+  int percent = 0;                     // of the samples, [0, 100]; 0: not known
+  std::uint64_t bytes_per_second = 0;  // of samples
+};
+
+}  // namespace slabstream

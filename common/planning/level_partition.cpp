@@ -1,0 +1,196 @@
+#include "common/planning/level_partition.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <queue>
+#include <tuple>
+#include <utility>
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMostShown = std::size_t{1} << 16;
+
+struct Cut {
+  Axis axis = Axis::kX;
+  std::int32_t position = 0;
+};
+
+// Numbers of zones by level.
+using Counts = std::array<std::int64_t, 256>;
+
+std::int64_t Minority(const Counts& counts) {
+  std::int64_t all = 0, most = 0;
+  for (const std::int64_t count : counts) {
+    all += count;
+    most = std::max(most, count);
+  }
+  return all - most;
+}
+
+class Divider {
+ public:
+  explicit Divider(const LevelPartitionRequest& request) : request_(request), map_(*request.map) {}
+
+  LevelPartition Divide() {
+    const Box bounds = {{0, 0, 0}, request_.size};
+    nodes_.resize(1);
+    PartLevels(0, bounds);
+    std::size_t shown = leaves_.size();
+    while (!leaves_.empty() && shown < kMostShown) {
+      const Leaf largest = leaves_.top();
+      if (largest.bytes <= request_.most_bytes && shown >= std::size_t(request_.least_boxes)) break;
+      leaves_.pop();
+      const std::optional<Cut> cut = Middle(largest);
+      if (!cut) {
+        done_.push_back(largest);
+        if (largest.bytes > request_.most_bytes) continue;
+        break;  // the others are no larger
+      }
+      const auto [lower, upper] = Split(largest.node, largest.box, *cut);
+      Keep(lower.node, lower.box, largest.level);
+      Keep(upper.node, upper.box, largest.level);
+      ++shown;
+    }
+    return Finish(bounds);
+  }
+
+ private:
+  struct Leaf {
+    std::int64_t bytes = 0;
+    std::uint32_t node = 0;
+    Box box;
+    std::uint8_t level = 0;
+    // Which one is divided next: the largest, or the first of them.
+    friend bool operator<(const Leaf& a, const Leaf& b) { return std::tuple(a.bytes, b.node) < std::tuple(b.bytes, a.node); }
+  };
+  struct Part {
+    std::uint32_t node = 0;
+    Box box;
+  };
+
+  // Zones whose voxels begin in the box, which ends between zones.
+  Box ZonesIn(const Box& box) const {
+    Box zones;
+    for (const Axis axis : kAxes) {
+      zones.begin[axis] = box.begin[axis] / map_.side[axis];
+      zones.end[axis] = (box.end[axis] - 1) / map_.side[axis] + 1;
+    }
+    return zones;
+  }
+
+  template <class Function>
+  void Visit(const Box& zones, Function&& function) const {
+    for (Index3 zone = zones.begin; zone.z < zones.end.z; ++zone.z) {
+      for (zone.y = zones.begin.y; zone.y < zones.end.y; ++zone.y) {
+        for (zone.x = zones.begin.x; zone.x < zones.end.x; ++zone.x) function(zone, map_.Of(zone));
+      }
+    }
+  }
+
+  // The plane between zones that leaves the fewest zones among those of another level; of equal ones, the one that halves best. None: all
+  // zones are of one level.
+  std::optional<Cut> BetweenLevels(const Box& box) const {
+    const Box zones = ZonesIn(box);
+    Counts all{};
+    Visit(zones, [&](const Index3&, std::uint8_t level) { ++all[level]; });
+    if (Minority(all) == 0) return std::nullopt;
+    std::optional<Cut> best;
+    auto least = std::tuple(std::numeric_limits<std::int64_t>::max(), std::int64_t{0});
+    for (const Axis axis : kAxes) {
+      std::vector<Counts> slices(std::size_t(zones.size()[axis]));
+      Visit(zones, [&](const Index3& zone, std::uint8_t level) { ++slices[std::size_t(zone[axis] - zones.begin[axis])][level]; });
+      Counts below{}, above = all;
+      for (std::size_t i = 0; i + 1 < slices.size(); ++i) {
+        for (std::size_t level = 0; level < below.size(); ++level) {
+          below[level] += slices[i][level];
+          above[level] -= slices[i][level];
+        }
+        const auto unequal = std::int64_t(i + 1) - std::int64_t(slices.size() - i - 1);
+        const std::tuple left = {Minority(below) + Minority(above), std::abs(unequal) - std::int64_t(slices.size())};
+        if (left >= least) continue;
+        least = left;
+        best = {axis, (zones.begin[axis] + std::int32_t(i) + 1) * map_.side[axis]};
+      }
+    }
+    return best;
+  }
+
+  void PartLevels(std::uint32_t node, const Box& box) {
+    const std::optional<Cut> cut = BetweenLevels(box);
+    if (!cut) return Keep(node, box, map_.Of(ZonesIn(box).begin));
+    const auto [lower, upper] = Split(node, box, *cut);
+    PartLevels(lower.node, lower.box);
+    PartLevels(upper.node, upper.box);
+  }
+
+  void Keep(std::uint32_t node, const Box& box, std::uint8_t level) {
+    Leaf leaf{0, node, box, level};
+    if (level == LevelMap::kOutside) return done_.push_back(leaf);
+    leaf.bytes = request_.bytes_of({box, level});
+    leaves_.push(leaf);
+  }
+
+  // Of a leaf's longest side: between two zones, or two blocks, or else in the middle. None: it is one voxel.
+  std::optional<Cut> Middle(const Leaf& leaf) const {
+    const Box& box = leaf.box;
+    Axis axis = Axis::kX;
+    for (const Axis other : kAxes) {
+      if (box.size()[other] > box.size()[axis]) axis = other;
+    }
+    const std::int32_t middle = box.begin[axis] + box.size()[axis] / 2;
+    if (middle == box.begin[axis]) return std::nullopt;
+    for (const std::int32_t unit : {map_.side[axis], request_.blocks_of(leaf.level)[axis]}) {
+      if (unit < 1) continue;
+      const std::int32_t position = (middle + unit / 2) / unit * unit;
+      if (position > box.begin[axis] && position < box.end[axis]) return Cut{axis, position};
+    }
+    return Cut{axis, middle};
+  }
+
+  std::pair<Part, Part> Split(std::uint32_t node, const Box& box, const Cut& cut) {
+    const auto lower = std::uint32_t(nodes_.size());
+    nodes_.resize(nodes_.size() + 2);
+    nodes_[node] = {false, cut.axis, cut.position, lower, lower + 1, 0};
+    std::pair<Part, Part> parts = {{lower, box}, {lower + 1, box}};
+    parts.first.box.end[cut.axis] = parts.second.box.begin[cut.axis] = cut.position;
+    return parts;
+  }
+
+  // Numbers the leaves in the order of the tree.
+  LevelPartition Finish(const Box& bounds) {
+    for (; !leaves_.empty(); leaves_.pop()) done_.push_back(leaves_.top());
+    std::vector<std::uint8_t> of_node(nodes_.size());
+    for (const Leaf& leaf : done_) of_node[leaf.node] = leaf.level;
+    LevelPartition made;
+    std::vector<std::uint32_t> open = {0};
+    while (!open.empty()) {
+      const std::uint32_t number = open.back();
+      open.pop_back();
+      Partition::Node& node = nodes_[number];
+      if (node.leaf) {
+        node.box = BoxId(made.levels.size());
+        made.levels.push_back(of_node[number]);
+      } else {
+        open.push_back(node.upper);
+        open.push_back(node.lower);
+      }
+    }
+    made.partition = Partition(bounds, std::move(nodes_));
+    return made;
+  }
+
+  const LevelPartitionRequest& request_;
+  const LevelMap& map_;
+  std::vector<Partition::Node> nodes_;
+  std::priority_queue<Leaf> leaves_;
+  std::vector<Leaf> done_;
+};
+
+}  // namespace
+
+LevelPartition DivideByLevels(const LevelPartitionRequest& request) { return Divider(request).Divide(); }
+
+}  // namespace slabstream

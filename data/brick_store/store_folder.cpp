@@ -1,0 +1,159 @@
+#include "data/brick_store/store_folder.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+#include <vector>
+
+#include "common/base/cache_folder.h"
+#include "common/base/files.h"
+#include "common/base/log.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kLockEnding = ".lock";
+
+// Of the nearest folder that there is.
+struct statvfs DiskOf(const std::string& path) {
+  struct statvfs disk {};
+  for (fs::path each = path;; each = each.parent_path()) {
+    if (::statvfs(each.c_str(), &disk) == 0) return disk;
+    if (!each.has_relative_path()) return {};
+  }
+}
+
+constexpr const char* kSeal = ".slabstream-store";
+
+struct Contents {
+  std::uint64_t files = 0, bytes = 0;
+  std::string Text() const { return fmt::format("{} files, {} bytes\n", files, bytes); }
+};
+
+// But for the seal.
+Contents In(const fs::path& folder) {
+  Contents found;
+  std::error_code error;
+  for (fs::recursive_directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
+    std::error_code unreadable;
+    if (!each->is_regular_file(unreadable) || each->path().filename() == kSeal) continue;
+    ++found.files;
+    found.bytes += std::uint64_t(each->file_size(unreadable));
+  }
+  return found;
+}
+
+// Whether the descriptor is still that of the path: whoever removes a store removes its lock file, too.
+bool IsOf(const FileDescriptor& file, const std::string& path) {
+  struct stat held {
+  }, there{};
+  return ::fstat(file.number(), &held) == 0 && ::stat(path.c_str(), &there) == 0 && held.st_ino == there.st_ino &&
+         held.st_dev == there.st_dev;
+}
+
+}  // namespace
+
+Result<StoreFolder> StoreFolder::Usual() {
+  constexpr std::uint64_t kShareOfDisk = 4;
+  const Result<std::string> cache = CacheFolder();
+  if (!cache.ok()) return cache.status();
+  const struct statvfs disk = DiskOf(*cache);
+  return StoreFolder(*cache + "/streams", std::uint64_t(disk.f_blocks) * disk.f_frsize / kShareOfDisk);
+}
+
+Result<StoreFolder::Lock> StoreFolder::Wait(const std::string& name, int mode) const {
+  const std::string file = PathOf(name) + std::string(kLockEnding);
+  const auto failure = [&] { return Status::Unavailable(fmt::format("cannot write '{}': {}", file, std::strerror(errno))); };
+  std::error_code error;
+  fs::create_directories(path_, error);
+  if (error) return Status::Unavailable(fmt::format("cannot write '{}': {}", path_, error.message()));
+  while (true) {
+    Lock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    if (lock.number() < 0) return failure();
+    if (::flock(lock.number(), mode | LOCK_NB) != 0) {
+      if (errno != EWOULDBLOCK) return failure();
+      LogInfo("waits for whoever else reads or uses '" + PathOf(name) + "'");
+      while (::flock(lock.number(), mode) != 0) {
+        if (errno != EINTR) return failure();
+      }
+    }
+    if (IsOf(lock, file)) return lock;
+  }
+}
+
+Result<StoreFolder::Lock> StoreFolder::LockShared(const std::string& name) const {
+  Result<Lock> lock = Wait(name, LOCK_SH);
+  if (lock.ok()) ::futimens(lock->number(), nullptr);
+  return lock;
+}
+
+Result<StoreFolder::Lock> StoreFolder::LockAlone(const std::string& name) const { return Wait(name, LOCK_EX); }
+
+std::uint64_t StoreFolder::Room(std::uint64_t own, std::uint64_t others) const {
+  const struct statvfs disk = DiskOf(path_);
+  const std::uint64_t free = std::uint64_t(disk.f_bavail) * disk.f_frsize + own;
+  return std::min(free, budget_ - std::min(budget_, others));
+}
+
+std::uint64_t StoreFolder::BytesOf(const std::string& name) const { return In(PathOf(name)).bytes; }
+
+std::uint64_t StoreFolder::RoomFor(const std::string& name) const {
+  std::uint64_t others = 0;
+  std::error_code error;
+  for (fs::directory_iterator each(path_, error), end; !error && each != end; each.increment(error)) {
+    if (each->path().filename() != name && each->is_directory(error)) others += In(each->path()).bytes;
+  }
+  return Room(BytesOf(name), others);
+}
+
+void StoreFolder::MakeRoom(const std::string& name, std::uint64_t bytes) const {
+  struct Store {
+    std::string name;
+    fs::file_time_type used;
+  };
+  std::vector<Store> stores;
+  std::error_code error;
+  for (fs::directory_iterator each(path_, error), end; !error && each != end; each.increment(error)) {
+    const std::string file = each->path().filename().string();
+    if (!each->is_directory(error) || file == name) continue;
+    std::error_code without_lock;
+    const fs::file_time_type used = fs::last_write_time(PathOf(file) + std::string(kLockEnding), without_lock);
+    stores.push_back({file, without_lock ? fs::file_time_type::min() : used});
+  }
+  std::ranges::sort(stores, {}, &Store::used);
+  for (const Store& store : stores) {
+    if (RoomFor(name) >= bytes) return;
+    const std::string file = PathOf(store.name) + std::string(kLockEnding);
+    const Lock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    if (lock.number() < 0 || ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0 || !IsOf(lock, file)) continue;  // it is in use
+    Remove(store.name);
+  }
+}
+
+bool StoreFolder::IsWhole(const std::string& name) const {
+  constexpr std::size_t kMost = 1000;
+  const Result<std::string> seal = ReadTextFile(PathOf(name) + "/" + kSeal, kMost);
+  return seal.ok() && *seal == In(PathOf(name)).Text();
+}
+
+Status StoreFolder::Seal(const std::string& name) const { return WriteTextFile(PathOf(name) + "/" + kSeal, In(PathOf(name)).Text()); }
+
+void StoreFolder::Remove(const std::string& name) const {
+  std::error_code ignored;
+  fs::remove(fs::path(PathOf(name)) / kSeal, ignored);  // first, if this process ends meanwhile
+  fs::remove_all(PathOf(name), ignored);
+  fs::remove(PathOf(name) + std::string(kLockEnding), ignored);
+}
+
+}  // namespace slabstream

@@ -1,0 +1,35 @@
+#include <lzf.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+
+#include "common/base/unwritten_vector.h"
+#include "data/codecs/codecs.h"
+#include "data/codecs/decoded_bytes.h"
+
+namespace slabstream {
+namespace {
+
+class Lzf : public ChunkCodec {
+ public:
+  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
+    // Three bytes stand for at most 264.
+    constexpr std::uint64_t kMostRatio = 88, kMostBytes = std::numeric_limits<unsigned>::max();
+    const std::span<const std::byte> in = packed.span();
+    if (in.empty()) return packed;  // the library reads the first byte
+    if (in.size() > kMostBytes) return DamagedBytes("lzf");
+    const std::uint64_t limit = std::min({most, kMostRatio * in.size(), kMostBytes});
+    UnwrittenVector<std::byte> out(limit);
+    const unsigned bytes = lzf_decompress(in.data(), unsigned(in.size()), out.data(), unsigned(limit));
+    if (bytes == 0) return errno == E2BIG ? TooManyBytes("lzf", limit + 1, limit) : DamagedBytes("lzf");
+    out.resize(bytes);
+    return Bytes(std::move(out));
+  }
+};
+
+}  // namespace
+
+SharedCodec LzfCodec() { return std::make_shared<Lzf>(); }
+
+}  // namespace slabstream

@@ -1,0 +1,92 @@
+#include "data/open/unchanged_source.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <chrono>
+#include <system_error>
+#include <utility>
+
+#include "common/base/file_stamp.h"
+#include "common/base/guarded.h"
+#include "common/base/printable.h"
+
+namespace slabstream {
+namespace {
+
+struct Watched {
+  std::string path;
+  FileStamp stamp;
+
+  // How a read has ended that ended so as far as the source knows. A file that is replaced may also look damaged.
+  Status EndOf(Status read) const {
+    if (read.code() == StatusCode::kCancelled) return read;
+    const Result<bool> changed = Guarded(path.c_str(), [&] { return HaveChanged(stamp); });
+    if (changed.ok() && !*changed) return read;
+    if (changed.status().code() == StatusCode::kResourceExhausted) return changed.status();
+    return Printable(Status::Unavailable(path + ": has changed since it was opened"));
+  }
+};
+
+class UnchangedSource : public VolumeSource {
+ public:
+  UnchangedSource(std::shared_ptr<VolumeSource> source, std::uint64_t version, Watched watched)
+      : source_(std::move(source)), info_(source_->info()), watched_(std::make_shared<const Watched>(std::move(watched))) {
+    info_.version = version;
+  }
+
+  const SourceInfo& info() const override { return info_; }
+  Counts counts() const override { return source_->counts(); }
+
+  void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override {
+    source_->Read(level, box, out, std::move(stop),
+                  [watched = watched_, done = std::move(done)](Status read) { done(watched->EndOf(std::move(read))); });
+  }
+
+ private:
+  const std::shared_ptr<VolumeSource> source_;
+  SourceInfo info_;
+  const std::shared_ptr<const Watched> watched_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<VolumeSource>> OpenUnchanged(const std::string& path, const OpenFunction& open) {
+  constexpr int kAttempts = 3;
+  constexpr std::chrono::seconds kRecent(2);  // clocks of file systems may be ahead of ours or behind
+  std::vector<std::string> files;             // which only the opened source tells
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const auto begin = std::chrono::system_clock::now();
+    Result<FileStamp> stamp = StampFiles(files);
+    Result<std::shared_ptr<VolumeSource>> source = open();
+    if (!source.ok()) return source;
+    if (const std::vector<std::string>& found = (*source)->info().files; found != files || !stamp.ok()) {
+      files = found;
+      stamp = StampFiles(files);
+      if (!stamp.ok()) return stamp.status();
+      if (!files.empty() && stamp->newest + kRecent > begin) continue;  // may have changed after it was opened: once more
+    }
+    const Result<std::uint64_t> version = VersionOf(files);
+    if (!version.ok()) return version.status();
+    return std::shared_ptr<VolumeSource>(std::make_shared<UnchangedSource>(*std::move(source), *version, Watched{path, *std::move(stamp)}));
+  }
+  return Printable(Status::Unavailable(path + ": changes while it is opened"));
+}
+
+Result<std::uint64_t> VersionOf(const std::vector<std::string>& files) {
+  std::string text;
+  for (const std::string& file : files) {
+    struct stat found {};
+    if (::stat(file.c_str(), &found) != 0) {
+      const int error = errno;
+      return Status(error == ENOENT ? StatusCode::kNotFound : StatusCode::kUnavailable,
+                    file + ": " + std::generic_category().message(error));
+    }
+    text += fmt::format("{} {}.{} ", found.st_size, found.st_mtim.tv_sec, found.st_mtim.tv_nsec);
+  }
+  return XXH3_64bits(text.data(), text.size());
+}
+
+}  // namespace slabstream

@@ -1,0 +1,64 @@
+// Boxes of a picture of several levels: each lies in zones of one level, and none is too large.
+#include "common/planning/level_partition.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include "tests/support/random.h"
+
+namespace slabstream {
+namespace {
+
+LevelMap RandomMap(Random& random, const Index3& size) {
+  LevelMap map{.levels = {0, 1, 2}};
+  for (const Axis axis : kAxes) {
+    map.side[axis] = random.Integer(1, size[axis]);
+    map.counts[axis] = (size[axis] - 1) / map.side[axis] + 1;
+  }
+  constexpr std::array<std::uint8_t, 4> kLevels = {0, 1, 2, LevelMap::kOutside};
+  const std::size_t kinds = random.Integer<std::size_t>(1, 4);
+  map.ForEachZone([&](const Index3&) { map.of_zone.push_back(kLevels.at(random.Integer<std::size_t>(0, kinds - 1))); });
+  return map;
+}
+
+TEST(LevelPartition, BoxesTileTheVolumeAndKeepToZonesOfOneLevel) {
+  Random random(71);
+  SCOPED_TRACE(random.trace());
+  for (int round = 0; round < 200; ++round) {
+    const Index3 size = {random.Integer(1, 60), random.Integer(1, 60), random.Integer(1, 60)};
+    const LevelMap map = RandomMap(random, size);
+    LevelPartitionRequest request{
+        .map = &map,
+        .size = size,
+        .least_boxes = random.Integer(1, 30),
+        .most_bytes = random.Integer(1, 20'000),
+        .bytes_of = [](const LevelBox& at) { return std::max<std::int64_t>(at.box.voxel_count() >> (3 * at.level), 1); },
+        .blocks_of = [&](std::uint8_t level) { return level == 0 ? Index3{} : Uniform(4 << level); }};
+    const auto [partition, levels] = DivideByLevels(request);  // checks that boxes tile the bounds
+    ASSERT_EQ(partition.bounds(), (Box{{0, 0, 0}, size}));
+    ASSERT_EQ(levels.size(), partition.boxes().size());
+    int shown = 0;
+    for (std::size_t i = 0; i < levels.size(); ++i) {
+      const Box& box = partition.boxes()[i];
+      std::set<std::uint8_t> met;
+      map.ForEachZone([&](const Index3& zone) {
+        if (!Intersection(map.BoxOf(zone, size), box).empty()) met.insert(map.Of(zone));
+      });
+      ASSERT_EQ(met, (std::set{levels[i]}));
+      if (levels[i] == LevelMap::kOutside) continue;
+      ++shown;
+      ASSERT_LE(request.bytes_of({box, levels[i]}), request.most_bytes);
+    }
+    const bool any = std::ranges::any_of(map.of_zone, [](std::uint8_t level) { return level != LevelMap::kOutside; });
+    EXPECT_GE(shown, any ? 1 : 0);
+    const auto again = DivideByLevels(request);
+    EXPECT_EQ(again.partition, partition);
+    EXPECT_EQ(again.levels, levels);
+  }
+}
+
+}  // namespace
+}  // namespace slabstream

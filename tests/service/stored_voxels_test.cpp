@@ -1,0 +1,74 @@
+// Voxels that a worker reads itself: where it finds the files, and once it does.
+#include "worker/stored_voxels.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <future>
+#include <string>
+#include <thread>
+
+#include "data/open/open_source.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StoredVoxelsTest : public testing::Test {
+ protected:
+  static constexpr Index3 kSize = {8, 6, 4};
+  StoredVoxelsTest() {
+    std::ofstream(path_, std::ios::binary) << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 6 4\nencoding: raw\n\n"
+                                           << std::string(CountIn(kSize), char(7));
+    const auto source = OpenSource(path_, {}, std::make_shared<ReadContext>(ReadContext::Limits{})).value();
+    stored_ = {path_, 0, source->info().version, {{0, 0, 0}, source->info().levels.front().block}};
+  }
+  // Once it reads there. Looks end on another thread.
+  WorkerEvent Read(Time now) {
+    std::promise<WorkerEvent> read;
+    std::future<WorkerEvent> event = read.get_future();
+    reads_ = std::move(read);
+    while (!Begin(now)) std::this_thread::yield();
+    return event.get();
+  }
+  bool Begin(Time now) { return voxels_.Read({kPadded, request_, std::make_shared<const StoredAt>(stored_)}, box_, now); }
+  static bool Refused(const WorkerEvent& event) {
+    const auto* message = std::get_if<MessageReceived>(&event);
+    return message != nullptr && std::holds_alternative<ChunkRefused>(message->message);
+  }
+
+  const TemporaryDirectory directory_;
+  const std::string path_ = directory_ / "v.nrrd", elsewhere_ = directory_ / "elsewhere";
+  static inline const BoxKey kPadded{.dataset = 3, .box = {{0, 0, 0}, kSize}, .types = ScalarType::kUint8, .generation = 1};
+  const std::shared_ptr<StoredBox> box_ = std::make_shared<StoredBox>(kPadded, std::vector<StoredBox::Copy>(), true);
+  const ChunkRequest request_{.epoch = 1, .worker = 2, .dataset = 3, .box = {{0, 0, 0}, kSize}};
+  StoredAt stored_;
+  std::promise<WorkerEvent> reads_;
+  StoredVoxels voxels_{[this](WorkerEvent event) { reads_.set_value(std::move(event)); }};
+};
+
+TEST_F(StoredVoxelsTest, AreReadOnceTheFilesAreSeen) {
+  fs::rename(path_, elsewhere_);
+  const Time now = Time{} + std::chrono::hours(1);
+  EXPECT_FALSE(Begin(now));
+  fs::rename(elsewhere_, path_);
+  const WorkerEvent event = Read(now + StoredVoxels::kLookAgain);
+  ASSERT_TRUE(std::holds_alternative<ChunkStored>(event));
+  EXPECT_EQ(*box_->RoomFor(kPadded.box)->first, std::byte{7});
+}
+
+TEST_F(StoredVoxelsTest, WhatCannotBeReadAnyMoreIsLeftToTheCoordinatorUntilItIsSeenAgain) {
+  const Time now = Time{} + std::chrono::hours(1);
+  EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now)));
+  fs::rename(path_, elsewhere_);
+  EXPECT_TRUE(Refused(Read(now)));
+  EXPECT_FALSE(Begin(now));
+  fs::rename(elsewhere_, path_);
+  EXPECT_TRUE(std::holds_alternative<ChunkStored>(Read(now + StoredVoxels::kLookAgain)));
+}
+
+}  // namespace
+}  // namespace slabstream
