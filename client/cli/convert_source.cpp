@@ -16,8 +16,7 @@
 namespace slabstream {
 namespace {
 
-Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits,
-                             ProgressBar& bar) {
+Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits, ProgressBar& bar) {
   if (FindSourceFormat(source.path, source.options) != nullptr) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
@@ -38,11 +37,10 @@ Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& so
   const Result<LoadedVolume> loaded = ReadInputVolume(with_progress);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
-  return SourceToConvert{MakeMemorySource(loaded->volume, {.format = info.format,
-                                                           .file_type = info.file_type,
-                                                           .labels = info.labels,
-                                                           .files = *std::move(files)}),
-                         std::nullopt, std::uint64_t(info.description.voxel_bytes())};
+  return SourceToConvert{
+      MakeMemorySource(loaded->volume,
+                       {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)}),
+      std::nullopt, std::uint64_t(info.description.voxel_bytes())};
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ struct StoredStream {
   // so memory, which decides whether smaller ones are stored, never decides what there is to see. The store is in use as long as this is
   // there.
   std::shared_ptr<VolumeSource> source;
-  std::string path;           // of the OME-Zarr
+  std::string path;  // of the OME-Zarr
 };
 
 struct BrickStoreOptions {
