@@ -19,6 +19,7 @@
 #include "common/volume/memory_budget.h"
 #include "coordinator/answer_question.h"
 #include "coordinator/dataset_id.h"
+#include "data/survey/brick_index.h"
 
 namespace slabstream {
 namespace {
@@ -160,7 +161,8 @@ Result<BackgroundActions::News> BackgroundActions::Open(const LoadDataset& actio
     SourceAtLevel at{.source = opened.source,
                      .surveyed = opened.survey.summary,
                      .stored = {opened.text, int(level), info.version, {{0, 0, 0}, levels[level].block}},
-                     .stamp = opened.stamp};
+                     .stamp = opened.stamp,
+                     .index = opened.index};
     if (int(level) == opened.survey.level && !opened.survey.sample) at.surveyed_level = int(level);
     sources.emplace_back().at_level = std::make_shared<const SourceAtLevel>(std::move(at));
   }
@@ -199,6 +201,10 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     samples.in_parts = {at.source, at.stored.level};
     summary = at.surveyed_level ? *at.surveyed : UnreadSummary(description, *at.surveyed);
     summary.stored = at.stored;
+    if (at.index != nullptr) {
+      const BrickRangeList& bricks = at.index->levels[std::size_t(at.stored.level)];
+      summary.indexed = std::make_shared<const BrickRangeList>(DataRanges(bricks, description));
+    }
   }
   const DatasetId id = IdOf(action.name, description, at.stored);
   const std::uint64_t held = samples.bytes();

@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/base/log.h"
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
@@ -186,6 +187,18 @@ Status TakeLayers(std::string& path, LayerFiles& layers) {
   return Status::Ok();
 }
 
+// Pictures are the same without it, so whatever is wrong with it is but a warning.
+std::shared_ptr<const BrickIndex> FindIndex(const std::string& source_text, const SourceInfo& info) {
+  const Result<IndexFile> file = IndexFileOf(source_text);
+  if (!file.ok() || !file->facts()) return nullptr;
+  const Result<std::string> name = file->NameNow(info.version, info);
+  Result<std::optional<BrickIndex>> index = name.ok() ? file->Read(*name, info) : name.status();
+  if (!index.ok()) {
+    LogWarning(fmt::format("the index of {} is not used: {}; `slabstream index` makes a new one", source_text, index.status().message()));
+  }
+  return index.ok() && *index ? std::make_shared<const BrickIndex>(**std::move(index)) : nullptr;
+}
+
 Status BeingWritten(const DataSource& source) {
   return Status::Unavailable(source.path.substr(0, source.path.find('?')) + ": the file is being written; the next request reads it again");
 }
@@ -204,10 +217,11 @@ struct WayToRead {
   std::function<Result<ReadableSource>()> read;
 };
 
-Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, ReadProgress& progress) {
+Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
+                                ReadProgress& progress) {
   Result<Survey> survey = SurveySource(*source, &progress);
   if (!survey.ok()) return survey.status();
-  return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr});
+  return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }
 
 // The voxels, those of layers too.
@@ -229,9 +243,9 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   ReadProgress* const progress = text.options.progress;
   WayToRead way{source->info().files, {}};
   if (in_parts) {
-    way.read = [source, place = PlaceOf(data, text), text, progress] {
+    way.read = [source, source_text = data.path, place = PlaceOf(data, text), text, progress] {
       WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
-      return Surveyed(source, place, *progress);
+      return Surveyed(source, place, FindIndex(source_text, source->info()), *progress);
     };
   } else if (IsReadWhole(text.path, text.options)) {
     way.read = [text] { return ReadWhole(text, {}); };
@@ -255,7 +269,7 @@ WayToRead WayOfStream(SourceInfo info, const DataSource& data, std::uint64_t mos
             if (!stores.ok()) return stores.status();
             Result<StoredStream> stored = OpenStored(source, *stores, ProcessReadContext(), {.memory = memory}, &progress);
             if (!stored.ok()) return stored.status();
-            return Surveyed(std::move(stored->source), std::move(stored->path), progress);
+            return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress);
           }};
 }
 
@@ -373,6 +387,15 @@ void CheckFiles(FoundData& found) {
       found.complaints.push_back(readable.message());
     }
   }
+}
+
+Result<IndexFile> IndexFileOf(const std::string& source) {
+  const Result<SourceText> parsed = ParseSourceText(source);
+  if (!parsed.ok()) return parsed.status();
+  if (FindSourceFormat(parsed->path, parsed->options) == nullptr) {
+    return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
+  }
+  return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));
 }
 
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell) {

@@ -22,6 +22,7 @@
 
 #include "common/base/status.h"
 #include "coordinator/data_source.h"
+#include "data/survey/index_file.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/read_progress.h"
 #include "data/volume_io/volume_reader.h"
@@ -69,8 +70,9 @@ void CheckFiles(FoundData& found);
 struct OpenedSource {
   std::shared_ptr<VolumeSource> source;
   Survey survey;
-  std::string text;                        // where workers find it
-  std::shared_ptr<const FileStamp> stamp;  // of its files as they were surveyed
+  std::string text;                              // where workers find it
+  std::shared_ptr<const FileStamp> stamp;        // of its files as they were surveyed
+  std::shared_ptr<const BrickIndex> index = {};  // null: there is none, or none that can be used; a line of the log says why
 };
 
 // A volume that was read as a whole.
@@ -90,5 +92,8 @@ using ReadableSource = std::variant<OpenedSource, LoadedSource>;
 // samples has been read, on any thread, one call at a time. Errors: of OpenSource, SurveySource, OpenStored, ReadVolume and ReadLayers;
 // Unavailable: they change again.
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell = {});
+
+// Where the index of a source is kept. Errors: of ParseSourceText and IndexFile::Of; InvalidArgument: its format cannot be read in parts.
+Result<IndexFile> IndexFileOf(const std::string& source);
 
 }  // namespace slabstream

@@ -22,6 +22,8 @@
 
 namespace slabstream {
 
+struct BrickIndex;
+
 // A level of a source that is open.
 struct SourceAtLevel {
   std::shared_ptr<VolumeSource> source;           // never null
@@ -29,6 +31,7 @@ struct SourceAtLevel {
   std::optional<int> surveyed_level = {};         // the survey's level, if that is it and all of it was read
   StoredAt stored;                                // where workers find it
   std::shared_ptr<const FileStamp> stamp;         // of its files
+  std::shared_ptr<const BrickIndex> index = {};   // of the source; null: there is none
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;

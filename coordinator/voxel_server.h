@@ -1,8 +1,8 @@
 // VoxelServer: the coordinator's end of the voxels plane. Its own thread owns the ROUTER and answers chunk requests out of the loaded
 // volumes.
 //
-// Voxels of sources that are read in parts are read when they are asked for, kReadAtOnce chunks of a dataset at a time; other requests do
-// not wait for them, so a store that does not answer holds up its own dataset alone.
+// Of a source that is read in parts, it reads a chunk when somebody asks for it, kReadAtOnce chunks of a dataset at a time. Other requests
+// do not wait for them, so a store that does not answer holds up its own dataset alone.
 //
 // It keeps no state about workers: each request is the credit for one answer of at most kChunkBytes. A request that cannot be met is
 // refused with a reason. One that comes while kMaxQueuedChunks answers wait for its sender to read them is dropped. Chunks go out packed,

@@ -12,10 +12,11 @@ namespace slabstream {
 namespace {
 
 // Cuts boxes at blocks of their source, or at several of them together, as many as one chunk brings, or at parts of one. So each piece is
-// one chunk.
-std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types) {
+// one chunk. `filled`: some parts are filled; then the blocks are those that are filled together.
+std::vector<Box> InBlocks(const std::vector<Box>& boxes, const StoredAt& stored, const SampleTypes& types, bool filled) {
   Index3 block = stored.block.end, end;
   for (const Box& box : boxes) end = Max(end, box.end);
+  if (filled) block = BlocksTogether(block, end, types.bytes_per_voxel(), kChunkBytes);
   for (const Axis axis : {Axis::kX, Axis::kY, Axis::kZ}) {
     while (2 * CountIn(block) * types.bytes_per_voxel() <= kChunkBytes && block[axis] < end[axis]) block[axis] *= 2;
   }
@@ -52,10 +53,15 @@ BoxFetcher::HeldBox* BoxFetcher::FindRequested(DatasetId dataset, const ChunkPla
 }
 
 BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, const SampleTypes& types,
-                                           const std::optional<StoredAt>& stored, WorkerActions& actions) {
+                                           const std::optional<StoredAt>& stored, const std::vector<FilledBox>& filled,
+                                           WorkerActions& actions) {
+  std::vector<FilledBox> inside;
+  for (const FilledBox& part : filled) {
+    if (const Box common = Intersection(part.box, box); !common.empty()) inside.push_back({common, part.sample});
+  }
   HeldBox* best = nullptr;
   for (auto& [generation, padded] : boxes_) {
-    if (padded.retired || padded.key.dataset != dataset || padded.key.types != types || !padded.key.box.Contains(box)) continue;
+    if (padded.retired || padded.key.dataset != dataset || padded.key.types != types || !padded.Covers(box, inside)) continue;
     if (best == nullptr || (padded.is_complete() && !best->is_complete())) best = &padded;
   }
   if (best == nullptr) {
@@ -63,6 +69,7 @@ BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, co
     best = &boxes_[generation];
     best->key = {dataset, box, types, generation};
     if (stored) best->stored_at = std::make_shared<const StoredAt>(*stored);
+    best->filled = std::move(inside);
     best->bytes = best->RawBytes();
     cached_bytes_ += best->bytes;
     best->pins = 1;
@@ -89,15 +96,20 @@ OpenBox BoxFetcher::PlanCopies(HeldBox& padded) {
     sources.push_back(&other);
     at_hand.push_back(other.key.box);
   }
-  const BoxAssembly assembly = Assemble(padded.key.box, at_hand, MostMissing(padded.key.box));
-  OpenBox open{padded.key, {}, padded.stored_at != nullptr};
+  BoxAssembly assembly = Assemble(padded.key.box, at_hand, MostMissing(padded.key.box));
+  OpenBox open{padded.key, {}, padded.stored_at != nullptr, padded.filled};
   for (const BoxAssembly::Part& part : assembly.copied) {
     HeldBox& source = *sources[part.source];
-    open.copies.push_back({source.key, part.box});
+    for (const Box& box : Without(Without({part.box}, source.filled), padded.filled)) open.copies.push_back({source.key, box});
+    for (const FilledBox& hole : source.filled) {
+      if (const Box box = Intersection(hole.box, part.box); !box.empty()) assembly.missing.push_back(box);
+    }
     ++source.pins;
     padded.sources.push_back(source.key.generation);
   }
-  for (const Box& box : padded.stored_at == nullptr ? assembly.missing : InBlocks(assembly.missing, *padded.stored_at, padded.key.types)) {
+  std::vector<Box> missing = Without(std::move(assembly.missing), padded.filled);
+  if (padded.stored_at != nullptr) missing = InBlocks(missing, *padded.stored_at, padded.key.types, !padded.filled.empty());
+  for (const Box& box : missing) {
     for (std::uint32_t chunk = 0; chunk < ChunkCount(box, padded.key.types); ++chunk) padded.missing.push_back({box, chunk});
   }
   if (padded.key.types.layers.cells) padded.missing.push_back({padded.key.box, kFirstCellChunk});
@@ -289,7 +301,7 @@ void BoxFetcher::GiveUp(HeldBox& padded, Status status) {
 // If one padded box covers another, the smaller one is no longer needed once both are complete, or if nobody waits for it.
 void BoxFetcher::RetireCovered(HeldBox& complete) {
   const auto covers = [](const HeldBox& a, const HeldBox& b) {
-    return a.key.dataset == b.key.dataset && a.key.types == b.key.types && a.key.box.Contains(b.key.box);
+    return a.key.dataset == b.key.dataset && a.key.types == b.key.types && a.Covers(b.key.box, b.filled);
   };
   for (auto& [generation, other] : boxes_) {
     if (&other == &complete || other.retired) continue;

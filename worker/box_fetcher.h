@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/volume/filled_box.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {
@@ -46,9 +47,10 @@ class BoxFetcher {
 
   void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all padded boxes, those in use too; without a call there is no limit
 
-  // `stored`: where the voxels can be read (FrameSetup::stored). What is missing is then asked for block by block.
+  // `stored`: where the voxels can be read (FrameSetup::stored). What is missing is then asked for block by block, without what `filled`
+  // fills.
   Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
-                     WorkerActions& actions);
+                     const std::vector<FilledBox>& filled, WorkerActions& actions);
   void Release(Generation padded);  // once for each Acquire
   // Of acquired padded boxes.
   bool complete(Generation padded) const { return boxes_.at(padded).is_complete(); }  // all that must be fetched is stored
@@ -98,6 +100,7 @@ class BoxFetcher {
   struct HeldBox {
     BoxKey key;
     std::shared_ptr<const StoredAt> stored_at = nullptr;  // null: the coordinator holds the voxels
+    std::vector<FilledBox> filled;                        // not read
     int pins = 0;
     bool retired = false;  // not to be acquired again; dropped when unpinned
     std::uint64_t bytes = 0;
@@ -114,6 +117,10 @@ class BoxFetcher {
     bool is_complete() const { return stored == chunk_count; }
     std::uint64_t RawBytes() const {  // of samples and cells
       return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel() + cell_bytes;
+    }
+    // Whether it can stand for a padded box in which no more than `filled` need not be read.
+    bool Covers(const Box& box, std::span<const FilledBox> may_be_filled) const {
+      return key.box.Contains(box) && FillsNoMoreThan(filled, box, may_be_filled);
     }
     std::uint32_t BytesOf(const ChunkPlace& chunk) const;  // the most, if they are not known yet
   };

@@ -158,7 +158,7 @@ Executor::~Executor() {
 void Executor::Perform(const OpenBox& action) {
   std::vector<StoredBox::Copy> copies;
   for (const OpenBox::Copy& copy : action.copies) copies.push_back({BoxOf(copy.from), copy.box});
-  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies), action.stored));
+  boxes_.insert_or_assign(action.padded, std::make_shared<StoredBox>(action.padded, std::move(copies), action.stored, action.filled));
 }
 
 void Executor::Perform(const DropBox& action) { boxes_.erase(action.padded); }

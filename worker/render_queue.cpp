@@ -21,7 +21,8 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
   }
   const Box voxels = PaddedBox(placement.at(), *setup);
   const std::uint8_t level = placement.level;
-  const BoxFetcher::Generation padded = boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), actions);
+  const BoxFetcher::Generation padded =
+      boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
   waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
 }
 

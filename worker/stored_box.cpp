@@ -1,12 +1,19 @@
 #include "worker/stored_box.h"
 
 #include <algorithm>
+#include <span>
 #include <string>
 #include <utility>
 
 #include "common/base/check.h"
 
 namespace slabstream {
+
+StoredBox::StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled)
+    : key_(key), stored_(stored), copies_(std::move(copies)), filled_(std::move(filled)) {
+  CHECK(stored_ || filled_.empty());
+}
+
 Status StoredBox::Store(const Chunk& chunk, const Bytes& payload) {
   const std::lock_guard lock(mutex_);
   if (chunk.box.empty() || !key_.box.Contains(chunk.box) || chunk.dataset != key_.dataset)
@@ -82,6 +89,7 @@ bool StoredBox::Assemble() {
   }
   BoxLayers layers{std::move(arriving_[1]), std::move(arriving_[2]), cells_.cells()};
   if (stored_) {
+    for (const FilledBox& filled : filled_) FillBox(ArrivingStored(), filled.box, filled.sample);
     FillPadding(ArrivingStored());
     voxels_ = std::make_shared<BoxVoxels>(*std::move(arriving_stored_), std::move(layers));
   } else {
@@ -89,6 +97,7 @@ bool StoredBox::Assemble() {
   }
   arriving_ = {};
   arriving_stored_.reset();
+  filled_ = {};
   cells_ = {};
   unpacked_ = {};
   return !std::exchange(copies_, {}).empty();

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/volume/filled_box.h"
 #include "common/wire/payload.h"
 #include "common/wire/voxel_messages.h"
 #include "data/sources/volume_source.h"
@@ -28,8 +29,9 @@ class StoredBox {
     Box box;
   };
 
-  // `stored`: its voxels are read in parts, so that nothing is known of them (OpenBox).
-  StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored) : key_(key), stored_(stored), copies_(std::move(copies)) {}
+  // `stored`: its voxels are read in parts, so that nothing is known of them (OpenBox). `filled`: of such a box: voxels that neither copies
+  // nor chunks bring.
+  StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled = {});
 
   // Of a box of stored voxels: where those of `box`, which lies in this one, are to be; nullopt: all are there. Whoever writes there keeps
   // this object.
@@ -38,7 +40,8 @@ class StoredBox {
   // DataLoss: the chunk does not fit this padded box.
   Status Store(const Chunk& chunk, const Bytes& payload);
 
-  // Call when all chunks are stored. The first call copies the voxels that other padded boxes hold. True: this call copied some.
+  // Call when all chunks are stored. The first call copies the voxels that other padded boxes hold, and fills others. True: this call
+  // copied some.
   bool Assemble();
 
   // The BoxData that a render of one client reads from and derives into. No other render uses it during the lease.
@@ -85,6 +88,7 @@ class StoredBox {
   const bool stored_;
   mutable std::mutex mutex_;  // guards what follows
   std::vector<Copy> copies_;
+  std::vector<FilledBox> filled_;
   std::array<std::optional<BrickedVoxels>, kLayers.size()> arriving_;  // by layer
   std::optional<PaddedVoxels> arriving_stored_;                        // instead of the volume's, if stored_
   ArrivingCells cells_;

@@ -1,6 +1,6 @@
-// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It finds
-// out by looking: until a source is open and known to be the same one, and wherever it is not, the coordinator is asked. A place that is
-// not seen is looked at again after kLookAgain, as is one that cannot be read any more; the last kMostPlaces stay open.
+// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It looks
+// whether it does. Until a source is open and known to be the same one, it asks the coordinator. It looks again after kLookAgain at a place
+// that it does not see, or cannot read any more. The last kMostPlaces stay open.
 //
 // One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
 #pragma once

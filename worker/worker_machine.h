@@ -175,7 +175,7 @@ struct ConnectVoxels {
   std::string endpoint;
 };  // on Welcome
 // Makes room for the padded box's voxels. Voxels that other padded boxes hold are copied before the first render; those padded boxes are
-// complete, and open until that render is done. Chunks of boxes inside the padded box bring the rest.
+// complete, and open until that render is done. What is filled has its sample; chunks of boxes inside the padded box bring the rest.
 struct OpenBox {
   struct Copy {
     BoxKey from;
@@ -183,7 +183,8 @@ struct OpenBox {
   };
   BoxKey padded;
   std::vector<Copy> copies;
-  bool stored = false;  // the voxels are read in parts: nothing is known of them
+  bool stored = false;                 // the voxels are read in parts: nothing is known of them
+  std::vector<FilledBox> filled = {};  // of such a box: voxels that neither copies nor chunks bring
 };
 struct StoreChunk {
   BoxKey padded;

@@ -207,6 +207,20 @@ void DeclareConvert(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunConvert);
 }
 
+void DeclareIndex(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand(
+      "index", "Read a volume once and note the values of its parts, so that later pictures read only what can show something");
+  auto options = std::make_shared<IndexingOptions>();
+  sub->add_option("SOURCE", options->source, "A volume that is read in parts: a file, or a folder such as an OME-Zarr")->required();
+  AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
+      ->type_name("SIZE")
+      ->default_str("1G");
+  sub->add_flag("--progress", options->progress, "Show progress on stderr");
+  AddReadOptions(*sub);
+  sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
+  RunWith(*sub, line.run, options, RunIndex);
+}
+
 void DeclareSphere(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("sphere", "Make one of the two test volumes of Yagel and Machiraju");
   auto options = std::make_shared<SphereOptions>();
@@ -397,10 +411,10 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice,   DeclareInfo,     DeclareValue,
-                                                 DeclareMeasure, DeclareTransfer,  DeclareConvert, DeclareSphere,   DeclareUp,
-                                                 DeclareView,    DeclareDown,      DeclareStatus,  DeclareAnnotate, DeclareKeys,
-                                                 DeclareData,    DeclareLogs,      DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice,   DeclareInfo,   DeclareValue,
+                                                 DeclareMeasure, DeclareTransfer,  DeclareConvert, DeclareIndex,  DeclareSphere,
+                                                 DeclareUp,      DeclareView,      DeclareDown,    DeclareStatus, DeclareAnnotate,
+                                                 DeclareKeys,    DeclareData,      DeclareLogs,    DeclareSlurm};
   return kCommands;
 }
 

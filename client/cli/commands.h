@@ -18,6 +18,7 @@ Status RunSlice(const SliceOptions& options);
 Status RunInfo(const InfoOptions& options);
 Status RunTransfer(const TransferOptions& options);
 Status RunConvert(const ConvertOptions& options);
+Status RunIndex(const IndexingOptions& options);
 Status RunSphere(const SphereOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunView(const ViewOptions& options);

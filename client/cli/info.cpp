@@ -1,8 +1,10 @@
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <iostream>
 #include <memory>
@@ -25,11 +27,14 @@
 #include "client/image_io/picture_header.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
+#include "common/planning/brick_visibility.h"
 #include "common/planning/resolved_request.h"
 #include "common/view/picture_geometry.h"
 #include "common/volume/summary.h"
 #include "coordinator/catalogue.h"
 #include "data/open/any_volume.h"
+#include "data/survey/brick_index.h"
+#include "data/survey/index_file.h"
 #include "data/volume_io/mesh_reader.h"
 
 namespace slabstream {
@@ -41,6 +46,59 @@ struct VolumeFacts {
   std::shared_ptr<const VolumeSummary> summary;  // of the whole volume, or what a survey found
   std::optional<OpenedSource> parts = {};        // none: it was read as a whole
 };
+
+// Of a source that can have an index.
+struct IndexFacts {
+  std::string path;
+  std::optional<IndexFile::Facts> file;  // none: it has none
+  bool usable = false;                   // else it is of other files, or damaged; the log says so
+  double read = 0;                       // share of the bricks that it knows
+  double may_show = 0;                   // share of the bricks of level 0 that can be visible
+  std::size_t bricks = 0;                // of level 0
+};
+
+std::optional<IndexFacts> IndexFactsOf(const std::string& source, const OpenedSource& opened, const TransferFunction& transfer) {
+  const Result<IndexFile> file = IndexFileOf(source);
+  if (!file.ok()) return std::nullopt;
+  IndexFacts facts{.path = file->path(), .file = file->facts(), .usable = opened.index != nullptr};
+  if (!facts.usable) return facts;
+  facts.read = ShareRead(*opened.index);
+  const VolumeSummary finest = UnreadSummary(opened.source->info().levels.front().description, *opened.survey.summary);
+  const BrickRangeList bricks = DataRanges(opened.index->levels.front(), finest.description);
+  const BrickVisibility visibility(finest, bricks, Classify(transfer, finest.description, finest.range));
+  facts.bricks = bricks.size();
+  std::size_t shown = 0;
+  for (std::size_t i = 0; i < bricks.size(); ++i) shown += visibility.AnyVisible(i) ? 1 : 0;
+  facts.may_show = double(shown) / double(facts.bricks);
+  return facts;
+}
+
+std::string TimeText(std::chrono::system_clock::time_point time) {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::chrono::system_clock::to_time_t(time)));
+}
+
+std::string IndexText(const std::optional<IndexFacts>& index, const std::string& transfer) {
+  if (!index) return "";
+  if (!index->file) return "index        none; `slabstream index` makes one, and pictures then read less\n";
+  const std::string which =
+      fmt::format("index        {}, {:.1f} KiB, of {}", index->path, double(index->file->bytes) / 1024, TimeText(index->file->written));
+  if (!index->usable) return which + ": not used\n";
+  std::string text = fmt::format("{}\n  {:.3g} % of {} bricks of level 0 can be visible under transfer function '{}'\n", which,
+                                 100 * index->may_show, index->bricks, transfer);
+  if (index->read < 1) text += fmt::format("  it knows {:.3g} % of all bricks; `slabstream index` reads the others\n", 100 * index->read);
+  return text;
+}
+
+nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
+  if (!index || !index->file) return nullptr;
+  nlohmann::ordered_json json = {
+      {"path", index->path}, {"bytes", index->file->bytes}, {"written", TimeText(index->file->written)}, {"usable", index->usable}};
+  if (index->usable) {
+    json["read"] = index->read;
+    json["visible"] = index->may_show;
+  }
+  return json;
+}
 
 // Of a volume with several levels, or a large one, what a survey of it tells; of any other one, what all voxels tell.
 Result<VolumeFacts> FactsOf(const std::string& source) {
@@ -170,7 +228,7 @@ std::string ChannelsText(const VolumeFileInfo& info) {
   return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
 }
 
-std::string InfoText(const VolumeFacts& facts, const std::string& transfer, double occupancy) {
+std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy) {
   const VolumeFileInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.description;
@@ -187,6 +245,7 @@ std::string InfoText(const VolumeFacts& facts, const std::string& transfer, doub
   text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
+  text += IndexText(index, transfer);
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
 }
 
@@ -229,7 +288,7 @@ std::string LayersText(const Layers& layers) {
 
 nlohmann::ordered_json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
 
-nlohmann::ordered_json IndexJson(const Index3& index) { return {index.x, index.y, index.z}; }
+nlohmann::ordered_json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
 
 nlohmann::ordered_json LayersJson(const Layers& layers) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
@@ -254,19 +313,19 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
   json["levels"] = nlohmann::ordered_json::array();
   for (const SourceLevel& level : info.levels) {
     const VolumeGeometry& geometry = level.description.geometry;
-    json["levels"].push_back({{"size", IndexJson(geometry.size)},
+    json["levels"].push_back({{"size", SizeJson(geometry.size)},
                               {"spacing", VectorJson(geometry.spacing)},
                               {"origin", VectorJson(geometry.orientation.origin)},
                               {"voxel_bytes", level.description.voxel_bytes()},
-                              {"block", IndexJson(level.block)}});
+                              {"block", SizeJson(level.block)}});
   }
   json["times"] = info.times;
   if (info.window) json["window"] = RangeJson(*info.window);
   json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
 }
 
-std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, double occupancy, const std::vector<DicomSeries>& series,
-                     const Layers& layers) {
+std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy,
+                     const std::vector<DicomSeries>& series, const Layers& layers) {
   const VolumeFileInfo& info = facts.file;
   const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.description;
@@ -281,7 +340,7 @@ std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, doub
   }
   world["straightened"] = info.straightened;
   nlohmann::ordered_json json = {{"format", info.format},
-                                 {"size", IndexJson(d.geometry.size)},
+                                 {"size", SizeJson(d.geometry.size)},
                                  {"type", NameOf(d.type)},
                                  {"file_type", info.file_type},
                                  {"labels", info.labels},
@@ -297,7 +356,10 @@ std::string InfoJson(const VolumeFacts& facts, const std::string& transfer, doub
                                  {"transfer", transfer},
                                  {"occupancy", occupancy},
                                  {"histogram", summary.histogram}};
-  if (facts.parts) AddPartsJson(facts, json);
+  if (facts.parts) {
+    AddPartsJson(facts, json);
+    json["index"] = IndexJson(index);
+  }
   if (!series.empty()) json["series"] = SeriesJson(series);
   if (layers.types().any()) json["layers"] = LayersJson(layers);
   return JsonText(json);
@@ -328,8 +390,10 @@ Status RunInfo(const InfoOptions& options) {
   if (!layers.ok()) return AsInput(layers.status());
 
   const std::string name = TransferName(options.request.transfer);
-  std::cout << (options.json ? InfoJson(*facts, name, occupancy, *series, *layers)
-                             : InfoText(*facts, name, occupancy) + LayersText(*layers));
+  std::optional<IndexFacts> index;
+  if (facts->parts) index = IndexFactsOf(options.path, *facts->parts, *transfer);
+  std::cout << (options.json ? InfoJson(*facts, index, name, occupancy, *series, *layers)
+                             : InfoText(*facts, index, name, occupancy) + LayersText(*layers));
   return Status::Ok();
 }
 

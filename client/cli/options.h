@@ -97,6 +97,12 @@ struct ConvertOptions {
   bool converts_part() const { return level != 0 || box != Box{}; }
 };
 
+struct IndexingOptions {
+  std::string source;        // a path, with options for reading it or without
+  std::uint64_t memory = 0;  // bytes, limit of this process; 0: the usual one
+  bool progress = false;
+};
+
 struct SphereOptions {
   SphereRequest request;
   std::string output;

@@ -6,9 +6,16 @@
 #include <utility>
 
 namespace slabstream {
+namespace {
 
-BrickVisibility::BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers)
-    : summary_(summary), table_(std::move(drawn)), layers_(std::move(layers)), next_visible_(table_.opacity.size()) {
+// A small part of a bin: a background in the bin below the first visible one stays empty.
+constexpr double kSlackBins = 1.0 / 16;
+
+}  // namespace
+
+BrickVisibility::BrickVisibility(const VolumeSummary& summary, const BrickRangeList& bricks, ClassificationTable drawn,
+                                 std::vector<std::uint8_t> layers)
+    : summary_(summary), bricks_(bricks), table_(std::move(drawn)), layers_(std::move(layers)), next_visible_(table_.opacity.size()) {
   int next = table_.size();
   for (int bin = table_.size() - 1; bin >= 0; --bin) {
     if (table_.opacity[std::size_t(bin)] > 0) next = bin;
@@ -22,7 +29,7 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
     for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
       const std::size_t row = NumberIn(summary_.brick_counts, {0, y, z});
       for (std::int32_t x = brick_of(box.begin.x); x <= brick_of(box.end.x - 1); ++x) {
-        if (Visible(row + std::size_t(x), 1)) return true;
+        if (AnyVisible(row + std::size_t(x))) return true;
       }
     }
   }
@@ -31,8 +38,8 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
 
 std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
   std::vector<Box> visible;
-  for (std::size_t i = 0; i < summary_.bricks.size(); ++i) {
-    if (!Visible(i, 0)) continue;
+  for (std::size_t i = 0; i < bricks_.size(); ++i) {
+    if (!AnyVisible(i)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
     const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary_.description.geometry.bounds());
     if (clip.MayKeep(box)) visible.push_back(box);
@@ -56,14 +63,14 @@ OccupancyGrid BrickVisibility::VisibleCells() const {
   return grid;
 }
 
-bool BrickVisibility::Visible(const ValueRange& brick, int slack) const {
+bool BrickVisibility::Visible(const ValueRange& brick) const {
   if (brick.min > brick.max) return false;
-  // The range was rounded to float; a slack of one bin on both sides makes up for the way back to stored samples.
+  // The range was rounded to float. The slack is for the way back to stored samples, and for kernels that find bins in single precision.
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  const int a = table_.BinOf(StoredFromData(double(std::nextafter(brick.min, -kInfinity))));
-  const int b = table_.BinOf(StoredFromData(double(std::nextafter(brick.max, kInfinity))));
-  const int low = std::max(std::min(a, b) - slack, 0), high = std::min(std::max(a, b) + slack, table_.size() - 1);
-  return next_visible_[std::size_t(low)] <= high;
+  const double a = StoredFromData(double(std::nextafter(brick.min, -kInfinity)));
+  const double b = StoredFromData(double(std::nextafter(brick.max, kInfinity)));
+  const double slack = kSlackBins / table_.bin_from_stored_scale;
+  return next_visible_[std::size_t(table_.BinOf(std::min(a, b) - slack))] <= table_.BinOf(std::max(a, b) + slack);
 }
 
 double BrickVisibility::StoredFromData(double value) const {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/classification/classification_table.h"
@@ -17,28 +18,30 @@ namespace slabstream {
 class BrickVisibility {
  public:
   // `summary` must outlive this. `layers`: LayerBricks (layer_bricks.h).
-  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {});
+  BrickVisibility(const VolumeSummary& summary, ClassificationTable drawn, std::vector<std::uint8_t> layers = {})
+      : BrickVisibility(summary, summary.bricks, std::move(drawn), std::move(layers)) {}
+  // By other ranges of the bricks than summary.bricks. They must outlive this, too.
+  BrickVisibility(const VolumeSummary& summary, const BrickRangeList& bricks, ClassificationTable drawn,
+                  std::vector<std::uint8_t> layers = {});
 
   // The brick can be visible.
-  bool AnyVisible(std::size_t brick) const { return Visible(brick, 1); }
+  bool AnyVisible(std::size_t brick) const { return Visible(bricks_[brick]) || (!layers_.empty() && layers_[brick] != 0); }
 
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
 
-  // The bricks that are visible and not clipped away, but for rounding: for framing, where nothing depends on a voxel.
+  // The bricks that can be visible and are not clipped away.
   std::vector<Box> VisibleBricks(const ClipRegion& clip = {}) const;
 
   // Counts all voxels of bricks that can be visible as occupied: a substitute for an exact count.
   OccupancyGrid VisibleCells() const;
 
  private:
-  bool Visible(std::size_t brick, int slack) const {  // bins
-    return Visible(summary_.bricks[brick], slack) || (!layers_.empty() && layers_[brick] != 0);
-  }
-  bool Visible(const ValueRange& brick, int slack) const;
+  bool Visible(const ValueRange& brick) const;
   double StoredFromData(double value) const;
 
   const VolumeSummary& summary_;
+  const BrickRangeList& bricks_;
   ClassificationTable table_;
   std::vector<std::uint8_t> layers_;  // by brick; empty: none
   std::vector<int> next_visible_;     // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none

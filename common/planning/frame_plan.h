@@ -17,6 +17,7 @@
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
 #include "common/planning/resolved_request.h"
+#include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -28,7 +29,8 @@ struct Placement {
   BoxId id = 0;
   Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
-  std::uint8_t level = 0;  // that it is drawn from: LevelBox
+  std::uint8_t level = 0;              // that it is drawn from: LevelBox
+  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read; only at level 0
 
   LevelBox at() const { return {box, level}; }
   friend bool operator==(const Placement&, const Placement&) = default;

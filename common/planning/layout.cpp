@@ -12,6 +12,7 @@
 #include "common/planning/layer_bricks.h"
 #include "common/planning/level_partition.h"
 #include "common/planning/measured_cost.h"
+#include "common/planning/unread_parts.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/sheet_grid.h"
 
@@ -188,7 +189,8 @@ struct LayoutMaker::State {
     std::vector<BrickVisibility> visible;
     for (std::size_t level = 0; level <= request.coarser.size(); ++level) {
       const VolumeSummary& summary = SummaryOf(std::uint8_t(level));
-      visible.emplace_back(summary, request.volume->renderer()->DrawnTable(request.volume->transfer(), summary));
+      const BrickRangeList& bricks = summary.indexed == nullptr ? summary.bricks : *summary.indexed;
+      visible.emplace_back(summary, bricks, request.volume->renderer()->DrawnTable(request.volume->transfer(), summary));
     }
     const auto shows = [&](const Box& box, BoxId id) {
       const LevelBox at(box, made.levels[id]);
@@ -227,29 +229,49 @@ struct LayoutMaker::State {
 
   double MeanSeconds(const Box& box) { return (Costs().Seconds(box, {.along = Axis::kX}) + Costs().Seconds(box, {.along = Axis::kY})) / 2; }
 
+  // An index says which boxes are rendered, and what of them is read. It does not say where they are: boxes are those that would be
+  // made without it.
   Layout Assign(Partition partition, const ResolvedPolicy& policy) {
     const bool by_cost = policy.assignment->by_cost && !request.summary->stored;
-    return Share(
-        std::move(partition), policy, [&](const Box& box, BoxId) { return fields.Shows(box); },
-        [&](const Box& box, BoxId) { return by_cost ? MeanSeconds(box) : 1; });
+    const std::optional<UnreadParts> unread = FindUnread();
+    std::vector<std::vector<FilledBox>> filled(unread ? partition.boxes().size() : 0);
+    const auto shows = [&](const Box& box, BoxId) { return fields.Shows(box) && (!unread || unread->Shows(box)); };
+    const auto cost_of = [&](const Box& box, BoxId id) {
+      if (!unread) return by_cost ? MeanSeconds(box) : 1;
+      const Box padded = PaddedBoxOf({box, 0});
+      filled[id] = unread->Of(padded);
+      std::int64_t read = padded.voxel_count();
+      for (const FilledBox& part : filled[id]) read -= part.box.voxel_count();
+      return double(read);
+    };
+    Layout layout = Share(std::move(partition), policy, shows, cost_of);
+    layout.filled = std::move(filled);
+    return layout;
   }
 
-  // Gives boxes that show something to slots.
+  // Gives boxes that show something to slots. Asks for the cost of each of them once.
   template <class Shows, class CostOf>
   Layout Share(Partition partition, const ResolvedPolicy& policy, Shows&& shows, CostOf&& cost_of) {
-    std::vector<BoxId> filled;
+    std::vector<BoxId> shown;
     std::vector<double> box_costs;
     for (BoxId id = 0; id < partition.boxes().size(); ++id) {
       const Box& box = partition.boxes()[id];
       if (!shows(box, id)) continue;
-      filled.push_back(id);
+      shown.push_back(id);
       box_costs.push_back(cost_of(box, id));
     }
     Layout layout{std::move(partition), {}};
     layout.owners.assign(layout.partition.boxes().size(), kNoSlot);
     const std::vector<std::uint32_t> owners = policy.assignment->assign({box_costs, request.slots});
-    for (std::size_t i = 0; i < filled.size(); ++i) layout.owners[filled[i]] = owners[i];
+    for (std::size_t i = 0; i < shown.size(); ++i) layout.owners[shown[i]] = owners[i];
     return layout;
+  }
+
+  std::optional<UnreadParts> FindUnread() const {
+    if (request.summary->indexed == nullptr) return std::nullopt;
+    const RendererKind& renderer = *request.volume->renderer();
+    return UnreadParts(*request.summary, renderer.DrawnTable(request.volume->transfer(), *request.summary), renderer.reach(),
+                       LayerBricks(*request.summary, renderer, request.volume->looks()));
   }
 
   // Of a layout: the render time of a frame, averaged over views, and each box's largest share of the work of any view. Boxes of equal work

@@ -14,6 +14,7 @@
 #include "common/planning/classified_volume.h"
 #include "common/planning/resolved_policy.h"
 #include "common/planning/resolved_request.h"
+#include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -24,6 +25,8 @@ struct Layout {
   Partition partition;
   std::vector<std::uint32_t> owners;      // by box: its slot, or kNoSlot
   std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
+  // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
+  std::vector<std::vector<FilledBox>> filled = {};
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 

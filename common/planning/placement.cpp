@@ -108,6 +108,7 @@ void PlaceBoxes(FramePlan& plan) {
     if (plan.groups.empty() || plan.groups.back().placements.size() == plan.slots) plan.groups.emplace_back();
     const std::uint8_t level = plan.layout->levels.empty() ? std::uint8_t{0} : plan.layout->levels[id];
     plan.groups.back().placements.push_back({id, plan.layout->partition.boxes()[id], 0, level});
+    if (!plan.layout->filled.empty()) plan.groups.back().placements.back().filled = plan.layout->filled[id];
   }
   if (plan.groups.empty()) plan.groups.emplace_back();
 }

@@ -102,6 +102,8 @@ inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker&
     const auto placement = check.In("placements", i);
     check.That(volume.Contains(group.placements[i].box), "box", "not inside the volume");
     check.That(group.placements[i].level <= setup.coarser.size(), "level", "not one of the setup");
+    check.That(group.placements[i].filled.empty() || (setup.stored && group.placements[i].level == 0), "filled",
+               "of a coarser level, or of voxels that the coordinator holds");
   }
   if (group.schedule.ranks != group.placements.size()) {
     check.Fail("schedule.ranks",

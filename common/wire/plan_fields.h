@@ -234,12 +234,21 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   if (check.ok()) check.Adopt(Validate(out.shading));
 }
 
+v1::FilledBox ProtoOf(const FilledBox&);
+void Fields(auto& io, Is<FilledBox> auto& m) {
+  using P = v1::FilledBox;
+  io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Any(m.sample, &P::sample, &P::set_sample);
+  io.Check([&](Checker& check) { check.That(std::isfinite(m.sample), "sample", "is not finite"); });
+}
+
 void Fields(auto& io, Is<Placement> auto& m) {
   using P = v1::Placement;
   io.Any(m.id, &P::id, &P::set_id);
   io.Message("box", m.box, &P::box, &P::mutable_box);
   io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
   io.Range("level", m.level, &P::level, &P::set_level, 0, kMaxLevels - 1);
+  io.Messages("filled", m.filled, &P::filled, &P::mutable_filled, kMaxFilled);
 }
 
 void Fields(auto& io, Is<ScheduleName> auto& m) {

@@ -31,7 +31,7 @@ class SliceStream : public VolumeSource {
 
   // One level; its block is a slice.
   const SourceInfo& info() const override { return volume_.info; }
-  // Memory: some slices as they are stored. DataLoss: truncated or damaged; damage may show only with the last slice.
+  // Takes memory for some slices. DataLoss: truncated or damaged; damage may show only with the last slice.
   void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) override;
   Counts counts() const override;
 

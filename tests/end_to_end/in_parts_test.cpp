@@ -260,5 +260,57 @@ TEST_F(InPartsTest, AWorkerThatDoesNotSeeTheFilesGetsVoxelsFromTheCoordinator) {
   coordinator.Wait();
 }
 
+TEST_F(InPartsTest, AnIndexIsMadeOnceAndToldByInfo) {
+  const std::string levels = "dense.ome.zarr";  // there is nothing around the sphere
+  MakeSphere("dense.nrrd", 1, 130);
+  MustRun({"convert", "dense.nrrd", levels});
+  const auto info = [&] { return json::parse(MustRun({"info", "--json", levels}).out)["index"]; };
+  EXPECT_EQ(info(), nullptr);
+  EXPECT_THAT(MustRun({"info", levels}).out, HasSubstr("index        none"));
+  const PictureFile without = Render(levels, {"--local=1", "--level", "0"});
+
+  const ProgramResult made = MustRun({"index", levels, "--memory", "512M", "--progress"});
+  EXPECT_THAT(made.out, AllOf(HasSubstr("wrote " + Path("cache/slabstream/index/")), HasSubstr("ranges of ")));
+  EXPECT_THAT(made.err, AllOf(HasSubstr("100 %"), HasSubstr("a second")));
+  EXPECT_EQ(info()["usable"], true);
+  EXPECT_EQ(info()["read"], 1);
+  EXPECT_GT(info()["visible"], 0);
+  EXPECT_LT(info()["visible"], 1);
+  EXPECT_THAT(MustRun({"info", levels}).out, HasSubstr("bricks of level 0 can be visible under transfer function 'auto'"));
+  EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--level", "0"}), without), 0);
+  const std::string path = info()["path"];
+
+  // Damaged.
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) - 1);
+  EXPECT_EQ(info()["usable"], false);
+  const ProgramResult damaged = MustRun({"info", levels});
+  ASSERT_EQ(damaged.err_lines().size(), 1U) << damaged.err;
+  EXPECT_THAT(damaged.err, AllOf(HasSubstr(path), HasSubstr("slabstream index")));
+  EXPECT_EQ(LargestDifference(Render(levels, {"--local=1", "--level", "0"}), without), 0);
+  MustRun({"index", levels});
+  EXPECT_EQ(info()["usable"], true);
+
+  // Of other files.
+  std::ofstream(Path(levels) + "/0/new") << "a chunk";
+  EXPECT_EQ(info()["usable"], false);
+  MustRun({"index", levels});
+  EXPECT_EQ(info()["usable"], true);
+}
+
+TEST_F(InPartsTest, AnIndexThatCannotBeMadeIsRefused) {
+  MakeSphere("ball.nii.gz", 2, 30);
+  ExpectEachRefused({"index"}, {
+                                   {{"ball.nii.gz"}, "its format cannot be read in parts"},
+                                   {{"no.ome.zarr"}, "no.ome.zarr"},
+                                   {{"ball.nii.gz", "--memory", "1"}, "--memory"},
+                               });
+  const std::string levels = MakeLevels();
+  std::ofstream(Path("cache")) << "no folder";
+  const ProgramResult failed = Slabstream({"index", levels});
+  EXPECT_EQ(failed.exit_status, 1);
+  ASSERT_EQ(failed.err_lines().size(), 1U) << failed.err;
+  EXPECT_THAT(failed.err, HasSubstr("XDG_CACHE_HOME"));
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -41,6 +41,9 @@ std::vector<FuzzBytes> DicomFileSeeds();
 bool DecodeMeshFile(std::span<const std::byte> input);
 std::vector<FuzzBytes> MeshFileSeeds();
 
+bool DecodeBrickIndex(std::span<const std::byte> input);
+std::vector<FuzzBytes> BrickIndexSeeds();
+
 bool DecodeHdf5File(std::span<const std::byte> input);
 std::vector<FuzzBytes> Hdf5FileSeeds();
 

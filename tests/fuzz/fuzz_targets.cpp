@@ -16,6 +16,7 @@ const std::vector<FuzzTarget>& FuzzTargets() {
       {"schedules", "combining schemes and their schedules", DecodeSchedule, ScheduleSeeds},
       {"policies", "policies and parameters of renderers", DecodePolicy, PolicySeeds},
       {"transfer-functions", "ParaView's colour maps", DecodeTransferFunction, TransferFunctionSeeds},
+      {"brick-indices", "indices of the bricks of a source", DecodeBrickIndex, BrickIndexSeeds},
       {"color-tables", "tables of label colours", DecodeColorTable, ColorTableSeeds},
       {"volume-files", "volume files of every format", DecodeVolumeFile, VolumeFileSeeds},
       {"chunk-codecs", "codecs of chunks", DecodeChunkCodec, ChunkCodecSeeds},

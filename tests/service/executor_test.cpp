@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cstring>
 #include <semaphore>
 
 #include "common/mesh/lattice.h"
@@ -16,6 +17,7 @@
 #include "tests/service/outputs.h"
 #include "tests/service/pictures.h"
 #include "worker/renderers/for_each_piece.h"
+#include "worker/stored_box.h"
 
 namespace slabstream {
 namespace {
@@ -242,6 +244,27 @@ TEST_F(ExecutorTest, RenderIsAnsweredAlsoWhenItIsCancelled) {
   EXPECT_TRUE(done.status.ok()) << done.status.message();
   EXPECT_GT(done.box_bytes, 0U);
   EXPECT_GT(done.report.stage_ns[std::size_t(Stage::kRender)], 0);
+}
+
+TEST(StoredBoxTest, WhatIsFilledHasItsSampleAndSoHasThePaddingBesideIt) {
+  const Box whole = {{0, 0, 0}, {40, 20, 10}}, read = {{8, 0, 0}, {32, 20, 10}};
+  const BoxKey key{.dataset = 1, .box = whole, .types = ScalarType::kUint16};
+  StoredBox box(key, {}, true, {{{{0, 0, 0}, {8, 20, 10}}, 0}, {{{32, 0, 0}, {40, 20, 10}}, 300}});
+  constexpr std::uint16_t kRead = 0x0909;
+  Chunk chunk{.epoch = 1, .dataset = 1, .box = read, .chunk = 0};
+  std::vector<std::byte> samples(std::size_t(read.voxel_count()) * sizeof(kRead), std::byte{9});
+  const Bytes payload = PackChunk(Bytes(std::move(samples)), Codec::kRaw, chunk);
+  ASSERT_TRUE(box.Store(chunk, payload).ok());
+  EXPECT_FALSE(box.Assemble()) << "nothing is copied";
+  const StoredBox::Lease lease = box.Lend(1);
+  ASSERT_NE(lease.data().padded(), nullptr);
+  for (const std::int32_t y : {-2, 0, 19, 21}) {
+    for (std::int32_t x = -kPad; x < whole.end.x + kPad; ++x) {
+      std::uint16_t sample = 0;
+      std::memcpy(&sample, lease.data().padded()->At({x, y, 5}), sizeof(sample));
+      EXPECT_EQ(sample, x < 8 ? 0 : x < 32 ? kRead : 300) << x << ", " << y;
+    }
+  }
 }
 
 // Renders small frames at once. Larger ones have three pieces, each of which says that it has begun and then waits until it may end.

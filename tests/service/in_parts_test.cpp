@@ -9,14 +9,19 @@
 #include <optional>
 
 #include "client/embedded/embedded_service.h"
+#include "coordinator/catalogue.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/unchanged_source.h"
 #include "data/sources/memory_source.h"
+#include "data/survey/index_file.h"
+#include "data/survey/make_index.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/volume_reader.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/service/pictures.h"
+#include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -373,6 +378,130 @@ TEST_F(InPartsTest, LevelsThatFitAreHeld) {
   request.level = "1";
   ASSERT_TRUE(Render(request).ok());
   EXPECT_EQ(client_->QueryStatus(seconds(30))->datasets.at(0).memory_bytes, 50U * 50 * 50);
+}
+
+// ---------------------------------------------------------------- with an index
+
+class IndexedTest : public InPartsTest {
+ protected:
+  IndexedTest() { ::setenv("XDG_CACHE_HOME", (directory_ / "cache").c_str(), 1); }
+
+  // A ball amid noise that TestRequest does not show.
+  static std::shared_ptr<const Volume> MostlyAir(double radius) {
+    Random random(71);
+    return std::make_shared<const Volume>(MakeTestVolume({100, 100, 320}, ScalarType::kUint8, [&](const Index3& v) {
+      const double distance = Length(ToVec3(v) - Vec3{50, 50, 44});
+      return distance < radius ? 255 - 2 * distance : random.Integer(5, 20);
+    }));
+  }
+  static IndexFile FileOf(const std::string& path) { return IndexFileOf(path).value(); }
+  static void MakeIndex(const std::string& path) {
+    const std::shared_ptr<VolumeSource> source = OpenSource(path, {}, ProcessReadContext()).value();
+    BrickIndex index = EmptyIndex(source->info()).value();
+    const std::string name = FileOf(path).NameNow(VersionOf(source->info().files).value(), source->info()).value();
+    CHECK(ReadIntoIndex(*source, {}, index).ok());
+    CHECK(FileOf(path).Write(name, index, source->info()).ok());
+  }
+
+  struct Drawn {
+    LocalImage image;
+    std::uint64_t voxel_bytes = 0;
+  };
+  std::vector<Drawn> Draw(const std::vector<FrameRequest>& requests) {
+    std::vector<Drawn> drawn;
+    for (const FrameRequest& request : requests) {
+      Result<Picture> picture = Render(request);
+      EXPECT_TRUE(picture.ok()) << picture.status().message();
+      if (!picture.ok()) continue;
+      Drawn& last = drawn.emplace_back(Drawn{std::move(picture->image)});
+      for (const RankReport& report : picture->statistics.reports) last.voxel_bytes += report.voxel_bytes;
+    }
+    return drawn;
+  }
+  // Nothing may depend on when a mask of hidden tiles arrives.
+  static std::vector<FrameRequest> ExactRequests(const RendererKind* renderer) {
+    std::vector<FrameRequest> requests = RequestsFor(renderer);
+    for (FrameRequest& request : requests) {
+      request.level = "0";
+      request.termination = 0;
+    }
+    return requests;
+  }
+};
+
+TEST_F(IndexedTest, ChangesNoBitAndLessIsRead) {
+  const std::shared_ptr<const Volume> volume = MostlyAir(36);
+  for (const std::string& path : {Nrrd(*volume), Zarr(volume)}) {
+    for (const RendererKind* renderer : VoxelRenderers()) {
+      SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name());
+      fs::remove_all(directory_ / "cache");
+      const std::vector<FrameRequest> requests = ExactRequests(renderer);
+      Start(path, 1);
+      const std::vector<Drawn> without = Draw(requests);
+      MakeIndex(path);
+      Start(path, 1);
+      const std::vector<Drawn> with = Draw(requests);
+      ASSERT_EQ(with.size(), without.size());
+      std::uint64_t read = 0, read_without = 0;
+      for (std::size_t i = 0; i < with.size(); ++i) {
+        EXPECT_EQ(LargestDifference(with[i].image, without[i].image, requests[i].size), 0) << "picture " << i;
+        read += with[i].voxel_bytes;
+        read_without += without[i].voxel_bytes;
+      }
+      // Projections show every value.
+      const bool shows_all = renderer->format() == PixelFormat::kMaximum || renderer->format() == PixelFormat::kSum;
+      if (!shows_all) {
+        EXPECT_LE(double(read), 0.75 * double(read_without));
+      }
+    }
+  }
+}
+
+TEST_F(IndexedTest, AnotherTransferFunctionReadsWhatWasLeftOut) {
+  const std::shared_ptr<const Volume> volume = MostlyAir(36);
+  const std::string path = Zarr(volume);
+  MakeIndex(path);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30), all = request;
+  request.level = all.level = "0";
+  std::get<TransferFunction>(all.transfer.choice).opacities = {{0, 0.002, 0.5, 0}, {255, 0.2, 0.5, 0}};
+  for (const int workers : {1, 3}) {
+    Start(path, workers);
+    for (const FrameRequest& each : {request, all, request, all}) ExpectPictureOf(each, *volume);
+  }
+}
+
+TEST_F(IndexedTest, WorkersComeAndGo) {
+  const std::shared_ptr<const Volume> volume = MostlyAir(36);
+  const std::string path = Zarr(volume);
+  MakeIndex(path);
+  Start(path, 3);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "0";
+  ExpectPictureOf(request, *volume);
+  service_->worker(1).RequestStop();
+  request.view.azimuth_degrees = 50;
+  ExpectPictureOf(request, *volume);
+}
+
+TEST_F(IndexedTest, OneOfOtherFilesOrADamagedOneIsNotUsed) {
+  const std::shared_ptr<const Volume> small = MostlyAir(20), large = MostlyAir(36);
+  FrameRequest request = TestRequest(VoxelRenderers().front(), 30);
+  request.level = "0";
+  for (const bool zarr : {false, true}) {
+    const auto write = [&](const std::shared_ptr<const Volume>& volume) { return zarr ? Zarr(volume) : Nrrd(*volume); };
+    const std::string path = write(small);
+    MakeIndex(path);
+    Start(path);
+    ExpectPictureOf(request, *small);
+    write(large);
+    ExpectPictureOf(request, *large);
+    Start(path);
+    ExpectPictureOf(request, *large);
+    MakeIndex(path);
+    std::fstream(FileOf(path).path(), std::ios::binary | std::ios::in | std::ios::out).seekp(-5, std::ios::end).put('x');
+    Start(path);
+    ExpectPictureOf(request, *large);
+  }
 }
 
 // ---------------------------------------------------------------- questions

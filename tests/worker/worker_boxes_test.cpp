@@ -396,5 +396,87 @@ TEST_F(WorkerBoxesTest, AsksForNoStoredVoxelsOutsideThePicture) {
   EXPECT_THAT(All<SendChunkRequest>(Tell(assignment)), IsEmpty());
 }
 
+// ---------------------------------------------------------------- voxels that need not be read
+
+class FilledBoxesTest : public WorkerBoxesTest {
+ protected:
+  // Blocks of 32 voxels a side; a padded box of 128 x 128 x 72 voxels.
+  static GroupAssignment Stored(FrameId frame, std::vector<FilledBox> filled) {
+    GroupAssignment assignment = Assignment(frame, {kSelf});
+    assignment.setup.stored = StoredAt{.source = "/data/scan.ome.zarr", .block = {{0, 0, 0}, {32, 32, 32}}};
+    assignment.group.placements[0].filled = std::move(filled);
+    return assignment;
+  }
+  static std::int64_t Asked(const Actions& actions) {  // voxels
+    std::int64_t voxels = 0;
+    for (const SendChunkRequest& send : All<SendChunkRequest>(actions)) voxels += send.request.box.voxel_count();
+    return voxels;
+  }
+  // Answers and renders; what was asked for.
+  std::vector<Box> Draw(const GroupAssignment& assignment) {
+    std::vector<Box> asked;
+    Actions actions = Tell(assignment), others;
+    opened_ = All<OpenBox>(actions);
+    for (std::size_t i = 0; i < actions.size(); ++i) {
+      Actions more;
+      if (const auto* request = std::get_if<SendChunkRequest>(&actions[i])) {
+        asked.push_back(request->request.box);
+        more = Tell(Answer(request->request));
+      } else if (const auto* store = std::get_if<StoreChunk>(&actions[i])) {
+        more = Tell(ChunkStored{store->padded, store->chunk.box, store->chunk.chunk, {}});
+      }
+      actions.insert(actions.end(), more.begin(), more.end());
+    }
+    EXPECT_THAT(All<StartRender>(actions), SizeIs(1));
+    Rendered(All<StartRender>(actions).at(0));
+    return asked;
+  }
+  static std::int64_t Voxels(const std::vector<Box>& boxes) {
+    std::int64_t voxels = 0;
+    for (const Box& box : boxes) voxels += box.voxel_count();
+    return voxels;
+  }
+
+  static constexpr Box kPadded = {{0, 0, 0}, {128, 128, 72}};
+  static constexpr FilledBox kLeft = {{{0, 0, 0}, {32, 128, 64}}, 5}, kRight = {{{96, 0, 0}, {128, 128, 64}}, 7};
+  std::vector<OpenBox> opened_;
+};
+
+TEST_F(FilledBoxesTest, AreNotAskedFor) {
+  const std::vector<Box> asked = Draw(Stored(1, {kLeft, kRight}));
+  EXPECT_EQ(Voxels(asked), kPadded.voxel_count() - kLeft.box.voxel_count() - kRight.box.voxel_count());
+  for (const Box& box : asked) {
+    EXPECT_TRUE(Intersection(box, kLeft.box).empty());
+    EXPECT_TRUE(Intersection(box, kRight.box).empty());
+  }
+  ASSERT_THAT(opened_, SizeIs(1));
+  EXPECT_THAT(opened_[0].filled, ElementsAre(kLeft, kRight));
+  EXPECT_THAT(Draw(Stored(2, {kLeft, kRight})), IsEmpty()) << "the box is kept";
+}
+
+TEST_F(FilledBoxesTest, AreReadOnceSomethingShowsThem) {
+  Draw(Stored(1, {kLeft, kRight}));
+  const std::vector<Box> asked = Draw(Stored(2, {kRight}));
+  EXPECT_EQ(Voxels(asked), kLeft.box.voxel_count()) << "the rest is copied";
+  for (const Box& box : asked) EXPECT_TRUE(kLeft.box.Contains(box));
+  ASSERT_THAT(opened_, SizeIs(1));
+  std::int64_t copied = 0;
+  for (const OpenBox::Copy& copy : opened_[0].copies) {
+    EXPECT_TRUE(Intersection(copy.box, kLeft.box).empty());
+    EXPECT_TRUE(Intersection(copy.box, kRight.box).empty()) << "what was never read is no copy's source";
+    copied += copy.box.voxel_count();
+  }
+  EXPECT_EQ(copied, kPadded.voxel_count() - kLeft.box.voxel_count() - kRight.box.voxel_count());
+  EXPECT_THAT(Draw(Stored(3, {kLeft, kRight})), IsEmpty()) << "a box that has more will do";
+  EXPECT_EQ(Voxels(Draw(Stored(4, {}))), kRight.box.voxel_count());
+}
+
+TEST_F(FilledBoxesTest, WhatLiesOutsideThePaddedBoxDoesNotMatter) {
+  Draw(Stored(1, {{{{0, 0, 0}, {32, 128, 640}}, 5}}));
+  ASSERT_THAT(opened_, SizeIs(1));
+  ASSERT_THAT(opened_[0].filled, SizeIs(1));
+  EXPECT_EQ(opened_[0].filled[0].box, (Box{{0, 0, 0}, {32, 128, 72}}));
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <type_traits>
 
@@ -39,6 +40,19 @@ PaddedVoxels MakePaddedVoxels(const Box& box, ScalarType type) {
   padded.slice = std::int64_t{padded.row} * (size.y + 2 * kPad);
   padded.samples = MakeLargeArray<std::byte>(std::size_t(padded.slice) * std::size_t(size.z + 2 * kPad) * BytesPerSample(type));
   return padded;
+}
+
+void FillBox(const PaddedVoxels& voxels, const Box& box, float sample) {
+  VisitScalarType(voxels.type, [&](auto* type) {
+    using T = std::remove_cvref_t<decltype(*type)>;
+    const T value = T(std::clamp(sample, float(std::numeric_limits<T>::lowest()), float(std::numeric_limits<T>::max())));
+    if (value == 0) return;
+    tbb::parallel_for(box.begin.z, box.end.z, [&](std::int32_t z) {
+      for (std::int32_t y = box.begin.y; y < box.end.y; ++y) {
+        std::fill_n(reinterpret_cast<T*>(voxels.At({box.begin.x, y, z})), box.size().x, value);
+      }
+    });
+  });
 }
 
 void FillPadding(const PaddedVoxels& voxels) {

@@ -36,6 +36,10 @@ struct PaddedVoxels {
 // All samples are 0. Those that are never written take no memory.
 PaddedVoxels MakePaddedVoxels(const Box& box, ScalarType type);
 
+// Gives the voxels of `box`, which lies in that of `voxels` and whose samples are still 0, the sample of the type that is nearest to
+// `sample`, which is finite. Parallel.
+void FillBox(const PaddedVoxels& voxels, const Box& box, float sample);
+
 // Repeats the samples at the faces of the box in the padding, all of which is still 0. Parallel.
 void FillPadding(const PaddedVoxels& voxels);
 

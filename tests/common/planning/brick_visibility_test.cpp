@@ -97,6 +97,19 @@ TEST(BrickVisibility, NeverCallsAVisibleVoxelEmpty) {
   EXPECT_GT(visible, 20);
 }
 
+// What surrounds a body often has the value below the first visible one.
+TEST(BrickVisibility, CallsABackgroundInTheBinBelowTheFirstVisibleOneEmpty) {
+  VolumeSummary summary = FullSummary({16, 16, 16});
+  TransferFunction transfer;
+  transfer.colors = {{0, {1, 1, 1}}};
+  transfer.opacities = {{0, 0}, {255, 0.5}};
+  for (const float value : {0.0F, 1.0F}) {
+    summary.bricks = {{value, value}};
+    const BrickVisibility bricks(summary, Classify(transfer, summary.description, summary.range));
+    EXPECT_EQ(bricks.AnyVisible(summary.description.geometry.bounds()), value > 0);
+  }
+}
+
 TEST(BrickVisibility, LooksAtEveryBrickThatTheBoxTouches) {
   const TransferFunction transfer = std::get<TransferFunction>(SomeRequest().transfer.choice);
   for (const Index3& bright : {Index3{0, 0, 0}, Index3{2, 1, 0}, Index3{1, 1, 2}}) {

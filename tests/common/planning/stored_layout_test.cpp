@@ -1,6 +1,9 @@
 // Layouts of volumes that nobody holds: boxes that fit a target, and end near the blocks in which the source is read.
 #include <gtest/gtest.h>
 
+#include <array>
+
+#include "common/renderers/registry.h"
 #include "common/renderers/renderer_kind.h"
 #include "tests/common/planning/plan_support.h"
 
@@ -81,6 +84,142 @@ TEST(StoredLayout, VoxelsThatAreHeldAreCutAsEver) {
   const FramePlan plan = Plan(SomeRequest(), held, FullRoster(2));
   EXPECT_FALSE(plan.setup.stored);
   EXPECT_EQ(plan.layout->partition.boxes().size(), 2U);
+}
+
+// ---------------------------------------------------------------- with an index
+
+// What an index says of bricks of 16 voxels: `value` for their voxels.
+template <class Value>
+VolumeSummary Indexed(VolumeSummary summary, const Value& value) {
+  auto bricks = std::make_shared<BrickRangeList>();
+  for (std::size_t i = 0; i < summary.bricks.size(); ++i) bricks->push_back(value(kBrick * PlaceIn(summary.brick_counts, i)));
+  summary.indexed = bricks;
+  return summary;
+}
+
+constexpr ValueRange kAir = {3, 20}, kBody = {3, 220};
+
+TEST(IndexedLayout, BoxesThatShowNothingAreRenderedByNobody) {
+  const VolumeSummary unknown = StoredSummary({512, 256, 256}, Uniform(64));
+  const VolumeSummary known = Indexed(unknown, [](const Index3& at) { return at.x < 200 ? kBody : kAir; });
+  for (const RendererKind* renderer : Renderers()) {
+    if (renderer->Can(Ability::kCells)) continue;
+    SCOPED_TRACE(renderer->name());
+    FrameRequest request = SomeRequest();
+    request.renderer = renderer->name();
+    request.policy.decomposition = "subcube";
+    const Layout without = *PlanFrame(request, 7, unknown, FullRoster(3), 4 << 20)->layout;
+    const Layout with = *PlanFrame(request, 7, known, FullRoster(3), 4 << 20)->layout;
+    EXPECT_EQ(with.partition, without.partition) << "boxes are where they would be";
+    EXPECT_TRUE(without.filled.empty());
+    const bool draws_all = renderer->format() == PixelFormat::kMaximum || renderer->format() == PixelFormat::kSum;
+    int dropped = 0;
+    for (BoxId box = 0; box < with.owners.size(); ++box) {
+      EXPECT_NE(without.owners[box], kNoSlot);
+      const bool shows = draws_all || with.partition.boxes()[box].begin.x < 208 + renderer->reach();
+      EXPECT_EQ(with.owners[box] != kNoSlot, shows) << "box " << box;
+      dropped += shows ? 0 : 1;
+    }
+    EXPECT_EQ(dropped > 0, !draws_all);
+  }
+}
+
+TEST(IndexedLayout, OnlyWhatIsFarFromAllThatIsDrawnIsFilled) {
+  Random random(62);
+  SCOPED_TRACE(random.trace());
+  int filled_parts = 0;
+  for (int round = 0; round < 20; ++round) {
+    const Index3 size = {random.Integer(500, 700), random.Integer(40, 200), random.Integer(40, 200)};
+    const Index3 block = {random.Integer(1, 40), random.Integer(1, 40), random.Integer(1, 40)};
+    const Axis axis = random.Chance(0.7) ? Axis::kX : Axis::kY;
+    std::vector<Box> drawn;
+    const VolumeSummary summary = Indexed(StoredSummary(size, Min(block, size)), [&](const Index3& at) {
+      if (at[axis] > size[axis] / 2 || random.Chance(0.9)) return ValueRange{float(random.Integer(0, 30)), float(random.Integer(30, 60))};
+      drawn.push_back({at, at + Uniform(kBrick)});
+      return kBody;
+    });
+    const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(2), 1 << 20).value();
+    const std::int32_t reach = plan.setup.renderer->reach();
+    for (const Placement& placement : PlacementsOf(plan)) {
+      const Box padded = PaddedBox(placement.at(), plan.setup);
+      EXPECT_EQ(placement.filled, plan.layout->filled[placement.id]);
+      for (const FilledBox& part : placement.filled) {
+        EXPECT_TRUE(padded.Contains(part.box));
+        for (const Box& brick : drawn) EXPECT_TRUE(Intersection(Grown(part.box, 2 * reach, padded), brick).empty());
+        const ValueRange& range = (*summary.indexed)[NumberIn(
+            summary.brick_counts, {part.box.begin.x / kBrick, part.box.begin.y / kBrick, part.box.begin.z / kBrick})];
+        EXPECT_EQ(part.sample, range.min) << "a sample of a brick in it";
+        ++filled_parts;
+      }
+    }
+  }
+  EXPECT_GT(filled_parts, 20);
+}
+
+TEST(IndexedLayout, SamplesOfWhatIsFilledAreStoredOnes) {
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kUint16, ScalarType::kFloat32}) {
+    VolumeSummary summary = StoredSummary({4096, 64, 64}, Uniform(16));
+    summary.description.type = type;
+    summary.description.mapping = {0.5, -20};
+    auto bricks = std::make_shared<BrickRangeList>(summary.bricks.size(), ValueRange{-16.5F, -15.5F});
+    bricks->front() = {105, 105};  // the only one that is drawn
+    summary.indexed = bricks;
+    const FramePlan plan = PlanFrame(SomeRequest(), 7, summary, FullRoster(1)).value();
+    const std::vector<Placement> placements = PlacementsOf(plan);
+    ASSERT_FALSE(placements.empty());
+    EXPECT_FALSE(placements[0].filled.empty());
+    for (const FilledBox& part : placements[0].filled) EXPECT_EQ(part.sample, 7);
+  }
+}
+
+TEST(IndexedLayout, BoxesOfEachLevelOfAPictureAreLeftOut) {
+  const VolumeSummary fine = StoredSummary({512, 64, 64}, Uniform(16));
+  VolumeSummary coarse = StoredSummary({256, 32, 32}, Uniform(16));
+  coarse.description.geometry.spacing = {2, 2, 2};
+  coarse.description.geometry.orientation.origin = {0.5, 0.5, 0.5};
+  // Zones 0 to 3 are drawn from the fine level, whose first voxels show; zones 4 to 7 from the coarse one, whose last voxels do.
+  constexpr std::int32_t kZone = 64, kFineEnd = 32, kCoarseBegin = 240;
+  const LevelMap map = {.levels = {0, 1}, .side = Uniform(kZone), .counts = {8, 1, 1}, .of_zone = {0, 0, 0, 0, 1, 1, 1, 1}};
+  const auto layout_of = [&](const VolumeSummary& finer, const VolumeSummary& coarser) {
+    FrameRequest request = SomeRequest();
+    request.renderer = "raycast";
+    const ResolvedRequest resolved = Resolved(request, finer);
+    const std::vector<CoarserVolume> levels = {{2, std::make_shared<const VolumeSummary>(coarser)}};
+    return MakeLayout({.summary = &finer,
+                       .volume = &resolved.volume,
+                       .policy = &*resolved.policy,
+                       .slots = 2,
+                       .box_bytes_target = 48 << 10,
+                       .map = &map,
+                       .coarser = levels});
+  };
+  const Layout without = layout_of(fine, coarse);
+  const Layout with = layout_of(Indexed(fine, [](const Index3& at) { return at.x < kFineEnd ? kBody : kAir; }),
+                                Indexed(coarse, [](const Index3& at) { return at.x >= kCoarseBegin ? kBody : kAir; }));
+  EXPECT_EQ(with.partition, without.partition);
+  EXPECT_TRUE(with.filled.empty());
+  const std::int32_t reach = FindRenderer("raycast")->reach();
+  std::array<int, 2> shown{}, left_out{};
+  for (BoxId id = 0; id < with.owners.size(); ++id) {
+    ASSERT_NE(without.owners[id], kNoSlot);
+    const Box& box = with.partition.boxes()[id];
+    const std::size_t level = without.levels[id];
+    const bool shows = level == 0 ? box.begin.x - reach < kFineEnd : (box.end.x + 1) / 2 + reach > kCoarseBegin;
+    EXPECT_EQ(with.owners[id] != kNoSlot, shows) << "box " << id << " of level " << level;
+    ++(shows ? shown : left_out).at(level);
+  }
+  for (const std::size_t level : {0, 1}) {
+    EXPECT_GT(shown.at(level), 0);
+    EXPECT_GT(left_out.at(level), 0);
+  }
+}
+
+TEST(IndexedLayout, FramingDoesNotDependOnIt) {
+  const VolumeSummary unknown = StoredSummary({512, 256, 256}, Uniform(64));
+  const VolumeSummary known = Indexed(unknown, [](const Index3& at) { return at.x < 100 ? kBody : kAir; });
+  FrameRequest request = SomeRequest();
+  request.view.fit = true;
+  EXPECT_EQ(SetupOf(request, known), SetupOf(request, unknown));
 }
 
 }  // namespace

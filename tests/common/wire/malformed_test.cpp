@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "common/volume/filled_box.h"
 #include "common/wire/about.h"
 #include "common/wire/any_message.h"
 #include "common/wire/limits.h"
@@ -183,6 +184,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"opacities", kMaxTransferPoints},
       {"lights", kMaxLights},
       {"placements", kMaxRanks},
+      {"filled", kMaxFilled},
       {"coarser", kMaxLevels - 1},
       {"levels", kMaxLevels},
       {"peers", kMaxPeers},

@@ -70,6 +70,10 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
     message.group.placements.push_back({rank, {{0, 0, z}, {size.x, size.y, z + 1}}, rank + 1});
     message.peers.push_back({rank + 1, "tcp://127.0.0.1:" + std::to_string(5000 + rank)});
   }
+  if (ranks > 1) {
+    setup.stored = StoredAt{.source = "/data/scan.ome.zarr?channel=1", .level = 2, .version = kMax64, .block = {{0, 0, 0}, {64, 32, 1}}};
+    message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {kMaxVolumeSide, 32, 2}}, -1e30F}};
+  }
   message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
   message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
@@ -120,6 +124,7 @@ GroupAssignment OfLevels() {
   }
   setup.coarser = {{kMax64 - 1, coarser, setup.stored}, {1, coarser}};
   for (std::size_t rank = 0; rank < 3; ++rank) message.group.placements[rank].level = std::uint8_t(rank);
+  std::swap(message.group.placements[0].filled, message.group.placements[1].filled);  // only placements of level 0 may have some
   return message;
 }
 

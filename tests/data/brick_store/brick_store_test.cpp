@@ -154,7 +154,7 @@ TEST_F(BrickStoreTest, MemoryChangesNoVoxel) {
   EXPECT_TRUE(Stores().empty());
 }
 
-// What is there after a stop is what a process that is killed leaves, but for files that it was writing.
+// A stop leaves what a killed process leaves, but for the files that it was writing.
 TEST_F(BrickStoreTest, GoesOnAfterAStopAnywhere) {
   const std::string file = Scan("v.nii.gz", {50, 40, 300});
   std::uint64_t written = 0;

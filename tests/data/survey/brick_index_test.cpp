@@ -11,7 +11,6 @@
 
 #include "data/sources/memory_source.h"
 #include "data/survey/index_file.h"
-#include "data/survey/learnt_index.h"
 #include "data/survey/make_index.h"
 #include "tests/support/random_volume.h"
 #include "tests/support/temporary_directory.h"
@@ -226,44 +225,6 @@ TEST_F(IndexFileTest, WhatSeveralKnowIsMerged) {
   }
   writers.clear();
   EXPECT_EQ(file.Read(name, source_->info()).value(), all);
-}
-
-TEST_F(IndexFileTest, IsLearntFromBoxesThatAreRead) {
-  Random random(56);
-  SCOPED_TRACE(random.trace());
-  for (const ScalarType type : kTypes) {
-    const std::shared_ptr<const Volume> volume = MappedVolume(random, {70, 50, 40}, type);
-    const std::shared_ptr<VolumeSource> source = SomeSource(volume);
-    const std::string path = directory_ / (std::string("learnt-") + std::string(NameOf(type)));
-    const auto learn = [&](const std::vector<Box>& boxes) {
-      const std::unique_ptr<LearntIndex> learnt = LearntIndex::Begin(path, "", 1, source);
-      if (learnt == nullptr) return false;
-      for (const Box& box : boxes) {
-        VoxelBlock block = MakeVoxelBlock(box, type);
-        EXPECT_TRUE(source->ReadNow(0, box, block.bytes).ok());
-        learnt->Learn(0, box, block.bytes);
-      }
-      return true;
-    };
-    const IndexFile file = IndexFile::Of(path, "").value();
-    const std::string name = file.NameNow(1, source->info()).value();
-    EXPECT_TRUE(learn({}));
-    EXPECT_FALSE(file.facts()) << "nothing was learnt";
-    EXPECT_TRUE(learn({{{10, 0, 16}, {40, 33, 40}}, {{1, 1, 1}, {17, 17, 17}}}));
-    const BrickIndex some = file.Read(name, source->info()).value().value();
-    const BrickIndex all = IndexOf(*source);
-    int known = 0;
-    for (std::size_t i = 0; i < all.levels[0].size(); ++i) {
-      const Index3 brick = PlaceIn({5, 4, 3}, i);
-      const bool inside = brick.x == 1 && brick.y < 2 && brick.z >= 1;  // as a whole; the last slices end with the volume
-      EXPECT_EQ(some.levels[0][i], inside ? all.levels[0][i] : kNotRead) << i;
-      known += inside ? 1 : 0;
-    }
-    EXPECT_EQ(known, 4);
-    EXPECT_TRUE(learn({volume->block.box}));
-    EXPECT_EQ(file.Read(name, source->info()).value(), all);
-    EXPECT_FALSE(learn({})) << "there is nothing more to learn";
-  }
 }
 
 TEST_F(IndexFileTest, ACacheFolderThatCannotBeMadeIsNamed) {

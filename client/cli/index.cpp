@@ -1,0 +1,106 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <utility>
+
+#include "client/cli/commands.h"
+#include "client/cli/input_volume.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/progress_bar.h"
+#include "common/transport/socket.h"
+#include "common/volume/memory_budget.h"
+#include "coordinator/catalogue.h"
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+#include "data/open/unchanged_source.h"
+#include "data/survey/index_file.h"
+#include "data/survey/make_index.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::uint64_t kUsualMemory = std::uint64_t{1} << 30;
+
+Result<std::shared_ptr<VolumeSource>> Open(const SourceText& source, std::uint64_t memory) {
+  const Result<std::shared_ptr<VolumeSource>> opened =
+      OpenSource(source.path, source.options,
+                 std::make_shared<ReadContext>(ReadContext::Limits{.under_way_bytes = memory / 8, .cache_bytes = memory / 8}));
+  if (!opened.ok()) return AsInput(opened.status());
+  return opened;
+}
+
+// What is known already of the files as they are.
+Result<BrickIndex> Begun(const IndexFile& file, const std::string& name, const SourceInfo& info) {
+  Result<std::optional<BrickIndex>> known = file.Read(name, info);
+  if (known.ok() && *known) return **std::move(known);
+  return EmptyIndex(info);  // none, or that of other files, or a damaged one: it is replaced
+}
+
+}  // namespace
+
+Status RunIndex(const IndexingOptions& options) {
+  const Result<SourceText> source = ParseSourceText(options.source);
+  if (!source.ok()) return source.status();
+  if (FindSourceFormat(source->path, source->options) == nullptr) {
+    if (Status status = CheckInputVolume(*source); !status.ok()) return status;
+    return Status::InvalidArgument(
+        fmt::format("SOURCE '{}' can have no index: its format cannot be read in parts; `slabstream convert` writes an OME-Zarr, which can",
+                    options.source));
+  }
+  const std::uint64_t memory = options.memory > 0 ? options.memory : kUsualMemory;
+  LimitMemory(memory);
+  const Result<std::shared_ptr<VolumeSource>> opened = Open(*source, memory);
+  if (!opened.ok()) return opened.status();
+  const SourceInfo& info = (*opened)->info();
+  const Result<IndexFile> file = IndexFileOf(options.source);
+  if (!file.ok()) return file.status();
+  const auto name_now = [&]() -> Result<std::string> {
+    const Result<std::uint64_t> version = VersionOf(info.files);
+    return version.ok() ? file->NameNow(*version, info) : version.status();
+  };
+  const Result<std::string> name = name_now();
+  if (!name.ok()) return AsInput(name.status());
+  Result<BrickIndex> index = Begun(*file, *name, info);
+  if (!index.ok()) return index.status();
+
+  ProgressBar bar(options.progress, 1);
+  Wakeup wakeup;
+  const InterruptGuard guard(wakeup);
+  std::stop_source stop;
+  int percent = -1;
+  std::optional<std::uint64_t> done_before;
+  const auto begin = std::chrono::steady_clock::now();
+  const auto progress = [&](const IndexProgress& now) {
+    if (guard.interrupted()) stop.request_stop();
+    if (!done_before) done_before = now.done_bytes;
+    const int its = int(100 * now.done_bytes / now.all_bytes);
+    if (std::exchange(percent, its) == its) return;
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double rate = double(now.done_bytes - *done_before) / std::max(seconds, 1e-9);
+    bar.Show(0.01 * its, fmt::format("reading {}: {} % of {}, {} a second", source->path, its, MemoryText(now.all_bytes),
+                                     MemoryText(std::uint64_t(rate))));
+  };
+  const Status read = ReadIntoIndex(**opened, {.memory = memory / 4, .stop = stop.get_token(), .progress = progress}, *index);
+  // What was read until an error or Ctrl-C is worth keeping, unless the files are not those that were read.
+  const Result<std::string> name_then = name_now();
+  if (!name_then.ok() || *name_then != *name) {
+    return Status::Unavailable(options.source + ": the files have changed while they were read; the same command reads them again");
+  }
+  if (Status written = file->Merge(*name, *index, info); !written.ok()) return written;
+  if (read.code() == StatusCode::kCancelled) {
+    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.source, percent));
+  }
+  if (!read.ok()) return AsInput(read);
+  std::size_t bricks = 0;
+  for (const BrickRangeList& level : index->levels) bricks += level.size();
+  std::cout << fmt::format("wrote {}: ranges of {} bricks, {:.1f} KiB\n", file->path(), bricks,
+                           double(file->facts().value_or(IndexFile::Facts{}).bytes) / 1024);
+  return Status::Ok();
+}
+
+}  // namespace slabstream

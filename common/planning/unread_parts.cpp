@@ -1,0 +1,77 @@
+#include "common/planning/unread_parts.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/planning/brick_visibility.h"
+#include "common/volume/box_assembly.h"
+#include "common/volume/bricks.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kTogetherBytes = 1 << 20;
+
+float StoredSample(double value, const VolumeDescription& description) {
+  const ValueMapping& mapping = description.mapping;
+  if (mapping.scale == 0) return 0;  // every sample has the same value
+  const double sample = (value - mapping.offset) / mapping.scale;
+  return float(description.type == ScalarType::kFloat32 ? sample : std::round(sample));
+}
+
+}  // namespace
+
+UnreadParts::UnreadParts(const VolumeSummary& summary, ClassificationTable drawn, std::int32_t reach,
+                         const std::vector<std::uint8_t>& layers)
+    : summary_(summary),
+      bounds_(summary.description.geometry.bounds()),
+      reach_(reach),
+      blocks_(BlocksTogether(summary.stored->block.end, bounds_.end, BytesPerSample(summary.description.type), kTogetherBytes)),
+      drawn_(summary.indexed->size()) {
+  const BrickVisibility visibility(summary, *summary.indexed, std::move(drawn), layers);
+  constexpr std::size_t kGrain = 4096;  // bricks
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, drawn_.size(), kGrain), [&](const auto& bricks) {
+    for (std::size_t i = bricks.begin(); i < bricks.end(); ++i) drawn_[i] = visibility.AnyVisible(i) ? 1 : 0;
+  });
+}
+
+bool UnreadParts::AnyDrawn(const Box& box) const {
+  const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
+  const std::int32_t first = brick_of(box.begin.x), last = brick_of(box.end.x - 1);
+  for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
+    for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
+      const auto row = drawn_.begin() + std::ptrdiff_t(NumberIn(summary_.brick_counts, {0, y, z}));
+      if (std::find(row + first, row + last + 1, 1) != row + last + 1) return true;
+    }
+  }
+  return false;
+}
+
+std::vector<FilledBox> UnreadParts::Of(const Box& padded) const {
+  std::vector<FilledBox> filled;
+  for (const Box& part : CutAtBlocks(padded, blocks_)) {
+    if (filled.size() < kMaxFilled && !AnyDrawn(Grown(part, 2 * reach_, bounds_))) AddFill(part, filled);
+  }
+  return filled;
+}
+
+// Takes the sample of any brick that has finite ones.
+void UnreadParts::AddFill(const Box& part, std::vector<FilledBox>& filled) const {
+  const Index3 first = {part.begin.x / kBrick, part.begin.y / kBrick, part.begin.z / kBrick};
+  const Index3 end = CubesOver(part.end, kBrick);
+  for (Index3 brick = first; brick.z < end.z; ++brick.z) {
+    for (brick.y = first.y; brick.y < end.y; ++brick.y) {
+      for (brick.x = first.x; brick.x < end.x; ++brick.x) {
+        const ValueRange& range = (*summary_.indexed)[NumberIn(summary_.brick_counts, brick)];
+        if (range.min > range.max) continue;
+        filled.push_back({part, StoredSample(double(range.min), summary_.description)});
+        return;
+      }
+    }
+  }
+}
+
+}  // namespace slabstream
