@@ -77,7 +77,7 @@ class RendererKind {
     std::string_view title;                   // in reports: "splatting"
     std::string_view purpose;                 // one line for --help
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
-    std::int32_t reach = kHalo;      // voxels round a box that it reads, [0, kHalo]; the same for all, so that they share cached voxels
+    std::int32_t reach = kHalo;      // voxels round a box that it reads, [0, kHalo]
     bool along_slices = false;       // the frame is an image along the slices (SheetGrid), else the camera's
     std::vector<Ability> abilities;  // in order
     double footprint = 1;            // pixels that a voxel fills, for each pixel of its cross-section

@@ -51,6 +51,7 @@ class MipKind : public ProjectionKind {
                         .title = "intensity projection",
                         .purpose = "the largest, least or mean value along each ray, for vessels",
                         .format = PixelFormat::kMaximum,
+                        .reach = kRayReach,
                         .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",

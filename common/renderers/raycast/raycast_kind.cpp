@@ -74,6 +74,7 @@ class RaycastKind : public RendererKind {
       : RendererKind({.name = "raycast",
                       .title = "ray casting",
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
+                      .reach = kRayReach,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
                                     Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels},
                       .parameters = {SamplingRate()}}) {}

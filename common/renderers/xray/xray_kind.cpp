@@ -28,6 +28,7 @@ class XrayKind : public ProjectionKind {
                         .title = "radiography",
                         .purpose = "a radiograph: line integrals of X-ray attenuation, in grey; for CT",
                         .format = PixelFormat::kSum,
+                        .reach = kRayReach,
                         .abilities = {Ability::kPerspective, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "energy",
