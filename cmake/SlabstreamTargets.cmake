@@ -92,7 +92,7 @@ function(slabstream_test name)
     target_precompile_headers(${name} REUSE_FROM slabstream_test_main)
   endif()
   add_test(NAME ${name} COMMAND ${name})
-  # Of the five jobs of the test presets: two tests that compute and one that waits run at a time on two cores.
+  # Of the six jobs of the test presets: two tests that compute and two that wait run at a time on two cores.
   set(processors 2)
   if(ARG_WAITS)
     set(processors 1)

@@ -16,10 +16,12 @@
 namespace slabstream {
 namespace {
 
-constexpr std::uint64_t kDerivedPerVoxel = 2;  // the voxels, and what renderers make from them
 // A tetrahedron and its share of points: 20 as it arrives, 20 as it is kept, and 40 for what slicing makes of it (64 bytes a point, 12 a
 // tetrahedron, 8 for each tile of the picture that it reaches into).
 constexpr std::uint64_t kBytesACell = 80;
+
+// Bytes that the renderer derives from a byte of voxels, at most.
+double DerivedShare(const FrameSetup& setup) { return ReadsInParts(setup) ? setup.renderer->derived_from_stored() : 1; }
 
 std::uint64_t ImageBytes(const PixelBounds& bounds, const FrameSetup& setup) {
   return std::uint64_t(bounds.pixel_count()) * BytesPerPixel(setup.format);
@@ -88,16 +90,16 @@ std::uint64_t PictureBytes(const FrameSetup& setup) {
   return std::uint64_t(FrameBytes(setup)) + copies * ImageBytes(picture, setup);
 }
 
-std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary) {
+std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share) {
   if (padded.empty()) return 0;
   std::uint64_t voxels = 0;
   VisitBricks(padded, summary, [&](std::size_t brick, const Box& part) {
     const ValueRange& range = summary.bricks[brick];
     if (range.min != range.max) voxels += std::uint64_t(part.voxel_count());
   });
-  std::uint64_t bytes = kDerivedPerVoxel * voxels * BytesPerSample(summary.description.type);
+  auto bytes = std::uint64_t((1 + derived_share) * double(voxels * BytesPerSample(summary.description.type)));
   for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
-    if (layer != nullptr) bytes += VoxelBytes(padded, *layer);
+    if (layer != nullptr) bytes += VoxelBytes(padded, *layer, derived_share);
   }
   return bytes + BytesOfCells(padded, summary);
 }
@@ -108,7 +110,8 @@ std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
   const std::uint64_t taken = kIdleMemoryBytes + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + images;
-  const std::uint64_t box = std::max(kLeast, (limit - std::min(limit, taken)) / (2 * kDerivedPerVoxel));
+  const double boxes = 2 + DerivedShare(setup);  // of that which is being read nothing is derived yet
+  const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
   return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
 }
 
@@ -119,9 +122,10 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   const std::uint64_t images = std::max<std::uint64_t>(group_bytes + PictureBytes(plan.setup), 1);
 
   constexpr std::uint64_t kEnough = kMostInWindow;  // more are never under way at a time
+  const double derived_share = DerivedShare(plan.setup);
   const auto at_most = [&](const Box& padded, std::uint8_t level) {
-    const std::uint64_t bytes = kDerivedPerVoxel * std::uint64_t(padded.voxel_count()) * summary.types().bytes_per_voxel();
-    return bytes + (level == 0 ? BytesOfCells(padded, summary) : 0);
+    const double bytes = double(padded.voxel_count()) * double(summary.types().bytes_per_voxel());
+    return std::uint64_t((1 + derived_share) * bytes) + (level == 0 ? BytesOfCells(padded, summary) : 0);
   };
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, at_most);
   const auto needs = [&](const WorkerLimit& limit) {
@@ -132,8 +136,9 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
       workers, [&](const WorkerLimit& limit) { return !has_part(limit) || needs(limit) + (kEnough - 1) * images <= limit.bytes; });
   if (all_fit) return int(kEnough);
   // Only now it matters how much of the volume is empty, which takes longer to find out.
-  voxels = MostVoxels(
-      plan, [&](const Box& padded, std::uint8_t level) { return level == 0 ? VoxelBytes(padded, summary) : at_most(padded, level); });
+  voxels = MostVoxels(plan, [&](const Box& padded, std::uint8_t level) {
+    return level == 0 ? VoxelBytes(padded, summary, derived_share) : at_most(padded, level);
+  });
 
   std::uint64_t fit = kEnough;
   for (const WorkerLimit& limit : workers) {

@@ -10,10 +10,11 @@
 //   an image of the whole frame           accumulated
 //   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
 // Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
-// worker's boxes, with their halo, and about as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
-// nothing. Voxels that are read in parts (FrameSetup::stored) take SourceBytes (memory_budget.h) more, for what is being read and decoded.
-// If the dataset is an unstructured grid, VoxelBytes has the cells in all bricks that the boxes touch, too. A worker caches more
-// voxels than a group needs as long as images leave room.
+// worker's boxes, with their halo, and at most as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
+// nothing. If voxels are read in parts (FrameSetup::stored), the worker takes SourceBytes (memory_budget.h) more, for what is being read
+// and decoded, and the renderer says what it derives from them (RendererKind::derived_from_stored). If the dataset is an unstructured grid,
+// VoxelBytes has the cells in all bricks that the boxes touch, too. A worker caches more voxels than a group needs as long as images leave
+// room.
 #pragma once
 
 #include <cstdint>
@@ -27,7 +28,8 @@ namespace slabstream {
 // Bytes, of the formula above. `placements`: of a group.
 std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
 std::uint64_t PictureBytes(const FrameSetup& setup);
-std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary);
+// `derived_share`: bytes that are derived from a byte of voxels.
+std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share);
 
 // Most bytes of the voxels of a padded box with which a worker of this limit (0: none) can hold two boxes of a frame at a time, so that it
 // reads one while it renders the other: kBoxBytesTarget or less, in few different sizes.

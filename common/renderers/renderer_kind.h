@@ -77,10 +77,11 @@ class RendererKind {
     std::string_view title;                   // in reports: "splatting"
     std::string_view purpose;                 // one line for --help
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
-    std::int32_t reach = kHalo;      // voxels round a box that it reads, [0, kHalo]
-    bool along_slices = false;       // the frame is an image along the slices (SheetGrid), else the camera's
-    std::vector<Ability> abilities;  // in order
-    double footprint = 1;            // pixels that a voxel fills, for each pixel of its cross-section
+    std::int32_t reach = kHalo;               // voxels round a box that it reads, [0, kHalo]
+    double derived_from_stored = 1;           // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 1]
+    bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
+    std::vector<Ability> abilities;           // in order
+    double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
     std::vector<Stage> stages = {Stage::kSample};  // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
@@ -95,6 +96,7 @@ class RendererKind {
   std::string_view purpose() const { return facts_.purpose; }
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
+  double derived_from_stored() const { return facts_.derived_from_stored; }
   bool along_slices() const { return facts_.along_slices; }
   const std::vector<Ability>& abilities() const { return facts_.abilities; }
   std::vector<std::string_view> AbilityNames() const;

@@ -13,6 +13,8 @@ inline RendererParameter SamplingRate(double standard = 1) {
 // A sample lies between voxels of its box, or half a voxel beyond them. It interpolates the eight voxels round it, and its gradient is
 // interpolated from differences of their neighbours.
 inline constexpr std::int32_t kRayReach = 2;
+// Voxels that are read in parts are kept as rays read them. What is derived are ranges of macrocells, and the padding.
+inline constexpr double kRayDerived = 0.25;
 
 // The sampling rate, of CostBasis::parameters.
 inline double SamplingRateOf(std::span<const double> parameters, double standard = 1) {

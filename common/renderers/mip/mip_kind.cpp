@@ -52,6 +52,7 @@ class MipKind : public ProjectionKind {
                         .purpose = "the largest, least or mean value along each ray, for vessels",
                         .format = PixelFormat::kMaximum,
                         .reach = kRayReach,
+                        .derived_from_stored = kRayDerived,
                         .abilities = {Ability::kPerspective, Ability::kTransfer, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "projection-mode",

@@ -75,6 +75,7 @@ class RaycastKind : public RendererKind {
                       .title = "ray casting",
                       .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
                       .reach = kRayReach,
+                      .derived_from_stored = kRayDerived,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
                                     Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels},
                       .parameters = {SamplingRate()}}) {}

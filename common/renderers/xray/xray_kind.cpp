@@ -29,6 +29,7 @@ class XrayKind : public ProjectionKind {
                         .purpose = "a radiograph: line integrals of X-ray attenuation, in grey; for CT",
                         .format = PixelFormat::kSum,
                         .reach = kRayReach,
+                        .derived_from_stored = kRayDerived,
                         .abilities = {Ability::kPerspective, Ability::kLevels},
                         .parameters = {SamplingRate(),
                                        {.name = "energy",
