@@ -138,19 +138,22 @@ struct LayoutMaker::State {
   }
 
   // Boxes of voxels that are read in parts end where blocks of their source end, so that few blocks are read for two boxes: those of the
-  // policy's decomposition, or if they are too large or blocks would be read much more often, cubes of blocks or smaller ones.
+  // policy's decomposition, or if they are too large or more would be read for them, cubes of blocks or smaller ones.
   Partition MakeStoredPartition(const ResolvedPolicy& policy) {
-    constexpr double kWorthIt = 0.8;
     constexpr std::int32_t kSmallUnit = 32;
     const Index3 block = request.summary->stored->block.end;
     const Index3 small = Min(block, Uniform(kSmallUnit));
     std::optional<Partition> best = PartitionInUnits(policy, policy.decomposition->make, block);
     double read = best ? double(VoxelsRead(*best, block)) : std::numeric_limits<double>::infinity();
-    for (const Index3& unit : {block, small}) {
+    struct Other {
+      Index3 unit;
+      double worth_it;  // share of what is read otherwise
+    };
+    for (const auto& [unit, worth_it] : {Other{block, 0.95}, Other{small, 0.8}}) {  // blocks are cut for much only
       std::optional<Partition> cubes = PartitionInUnits(policy, &MakeSubcubes, unit);
       if (!cubes) continue;
       const auto voxels = double(VoxelsRead(*cubes, block));
-      if (voxels > kWorthIt * read) continue;
+      if (voxels > worth_it * read) continue;
       best = std::move(cubes);
       read = voxels;
     }

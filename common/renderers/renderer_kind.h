@@ -78,7 +78,7 @@ class RendererKind {
     std::string_view purpose;                 // one line for --help
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels round a box that it reads, [0, kHalo]
-    double derived_from_stored = 1;           // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 1]
+    double derived_from_stored = 1;           // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 2]
     bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
     std::vector<Ability> abilities;           // in order
     double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section

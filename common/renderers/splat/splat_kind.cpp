@@ -22,6 +22,7 @@ class SplatKind : public RendererKind {
       : RendererKind({.name = "splat",
                       .title = "splatting",
                       .purpose = "soft footprints of all visible voxels; for translucent volumes",
+                      .derived_from_stored = 2,  // bricks of the voxels, and their cells
                       .along_slices = true,
                       .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer},
                       .footprint = 4,
