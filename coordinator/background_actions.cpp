@@ -144,6 +144,7 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   }
   if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
+  samples.description = volume->description;
   const DatasetId id = IdOf(action.name, *volume, layers);
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp}, id, std::move(samples)};
@@ -190,6 +191,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
     if (volume.ok()) {
       samples.volume = *volume;
       samples.read_from = at.source;
+      samples.description = description;
     }
   }
   if (samples.volume != nullptr) {

@@ -92,6 +92,12 @@ Status DatasetMachine::State::DescendUse(Use& use) {
     const CheckId check = Seek(name);
     use.entries.push_back({name, check});
   }
+  use.has_light = use.request->shading.needs_light_volume();
+  if (use.has_light) {
+    const std::string name = LevelName(use.request->dataset, LightLevelOf(*levels));
+    const CheckId check = Seek(name);
+    use.entries.push_back({name, check});
+  }
   return Status::Ok();
 }
 
@@ -106,7 +112,9 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
       return;
     }
     ready.seen = ready.seen && entry.checks.IsOver(awaited.check);
-    if (ready.dataset == 0) {
+    if (use.has_light && &awaited == &use.entries.back()) {
+      ready.light = {entry.id, entry.summary};
+    } else if (ready.dataset == 0) {
       ready.dataset = entry.id;
       ready.summary = entry.summary;
     } else {
@@ -251,6 +259,7 @@ void DatasetMachine::State::RenewData(const std::string& changed) {
     if (use.begun() || use.map == nullptr || use.request->dataset != name) continue;
     use.entries = {{name}};
     use.map = nullptr;
+    use.has_light = false;
   }
   for (auto& [id, open] : questions) {
     if (open.asked || DatasetOfLevel(open.entry) != name || open.entry == name) continue;

@@ -36,13 +36,14 @@ struct DatasetMachine::State {
   // A dataset that a request needs.
   struct Use {
     std::shared_ptr<const FrameRequest> request;
-    // Of the table: what it waits for. The dataset, or the levels of it that it draws, finest first.
+    // Of the table: what it waits for. The dataset, or the levels of it that it draws, finest first, then that of its light volume.
     struct Entry {
       std::string name;
       CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
     };
     std::vector<Entry> entries;
     std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
+    bool has_light = false;                    // likewise: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
     bool begun() const { return !kept.empty(); }

@@ -61,6 +61,7 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   if (!resolved.ok()) return resolved.status();
   resolved->map = ready.map;
   resolved->coarser = ready.coarser;
+  resolved->light = ready.light;
   // Nobody counts what nobody holds, nor what is drawn from several levels.
   const bool counted = !resolved->summary->stored && resolved->map == nullptr;
   request.uses_occupancy = NeedsOccupancy(asked.policy) && counted;

@@ -85,6 +85,7 @@ struct DatasetReady {
   // If there are several of these: which parts, and those beside the finest one (ResolvedRequest).
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
+  std::optional<CoarserVolume> light = {};  // of such a dataset, if the request needs it (ResolvedRequest)
   bool seen = true;  // its files are as they were read, by a look that began after the request came; a frame may begin
 };
 using RefusedAs = std::uint64_t RefusedRequests::*;  // what a refusal counts as

@@ -57,11 +57,13 @@ struct OpenRequest {
     std::vector<DatasetId> datasets() const {
       std::vector<DatasetId> all = {volume().dataset()};
       for (const CoarserVolume& level : resolved->coarser) all.push_back(level.dataset);
+      if (resolved->light) all.push_back(resolved->light->dataset);
       return all;
     }
     bool DrawsFrom(const DatasetReady& ready) const {
       return volume().dataset() == ready.dataset &&
-             std::ranges::equal(resolved->coarser, ready.coarser, {}, &CoarserVolume::dataset, &CoarserVolume::dataset);
+             std::ranges::equal(resolved->coarser, ready.coarser, {}, &CoarserVolume::dataset, &CoarserVolume::dataset) &&
+             (resolved->light ? resolved->light->dataset : 0) == (ready.light ? ready.light->dataset : 0);
     }
   };
   std::variant<Submitted, AwaitsDataset, HasDataset> state = {};

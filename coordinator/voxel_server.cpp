@@ -11,6 +11,7 @@
 
 #include "common/base/guarded.h"
 #include "common/base/log.h"
+#include "common/volume/light_volume.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
 #include "data/sources/read_part.h"
@@ -55,22 +56,42 @@ VoxelServer::~VoxelServer() {
 
 void VoxelServer::Publish(DatasetId dataset, Samples samples) {
   const std::lock_guard lock(mutex_);
+  if (samples.description) light_volume_of_[LightVolumeOf(dataset)] = dataset;
   samples_.insert_or_assign(dataset, std::move(samples));
 }
 
 void VoxelServer::Withdraw(DatasetId dataset) {
-  Samples unused;  // freed without the lock
+  Samples unused, unused_light;  // freed without the lock
   const std::lock_guard lock(mutex_);
-  const auto found = samples_.find(dataset);
-  if (found == samples_.end()) return;
-  unused = std::move(found->second);
-  samples_.erase(found);
+  const auto take = [this](DatasetId id, Samples& to) {
+    const auto found = samples_.find(id);
+    if (found == samples_.end()) return;
+    to = std::move(found->second);
+    samples_.erase(found);
+  };
+  take(dataset, unused);
+  if (light_volume_of_.erase(LightVolumeOf(dataset)) > 0) take(LightVolumeOf(dataset), unused_light);
 }
 
 VoxelServer::Samples VoxelServer::Find(DatasetId dataset) {
   const std::lock_guard lock(mutex_);
   const auto found = samples_.find(dataset);
   return found == samples_.end() ? Samples{} : found->second;
+}
+
+VoxelServer::Samples VoxelServer::LightVolume(DatasetId light) {
+  Samples of;
+  {
+    const std::lock_guard lock(mutex_);
+    const auto found = light_volume_of_.find(light);
+    if (found == light_volume_of_.end()) return {};
+    of = samples_.at(found->second);
+  }
+  const Samples made = {.volume = std::make_shared<const Volume>(of.volume != nullptr ? MakeLightVolume(of.volume->block, *of.description)
+                                                                                      : MakeLightVolume(*of.bricks, *of.description))};
+  const std::lock_guard lock(mutex_);
+  if (light_volume_of_.contains(light)) samples_.insert_or_assign(light, made);  // the dataset is still there
+  return made;
 }
 
 void VoxelServer::EndConnections(const std::string& user) {
@@ -151,7 +172,14 @@ void VoxelServer::Answer(const Incoming& incoming) {
   if (!decoded.ok()) return complaints_.Warning("voxels plane: dropped a message: " + decoded.status().message());
   const ChunkRequest& request = std::get<ChunkRequest>(*decoded);
   if (request.epoch != epoch_) return;  // it was for an earlier coordinator; a refusal would meet the worker's next request
-  const Samples samples = Find(request.dataset);
+  Samples samples = Find(request.dataset);
+  if (!samples.any()) {
+    const Status made = Guarded("a light volume", [&] {
+      samples = LightVolume(request.dataset);
+      return Status::Ok();
+    });
+    if (!made.ok()) return Reply(incoming.identity, request, made);
+  }
   if (const Status status = Check(request, samples); !status.ok()) return Reply(incoming.identity, request, status);
   if (samples.in_parts.source != nullptr) {
     std::deque<Asked>& waiting = reads_[request.dataset].waiting;

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -50,6 +51,7 @@ class VoxelServer {
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
     std::shared_ptr<VolumeSource> read_from = nullptr;  // of `volume`, if chunks tell what was read of it
+    std::optional<VolumeDescription> description = {};  // of what is held; none: nobody can ask for its light volume
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().
@@ -85,7 +87,8 @@ class VoxelServer {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread; once for each id. They are served until they are withdrawn.
+  // From any thread; once for each id. They are served until they are withdrawn. So is the light volume of samples that are held
+  // (LightVolumeOf), which is made when it is first asked for.
   void Publish(DatasetId dataset, Samples samples);
   void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
   Samples Find(DatasetId dataset);   // from any thread; neither: not published
@@ -97,6 +100,7 @@ class VoxelServer {
   void Run(const std::stop_token& stop);
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
+  Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
   // Of voxels that are read first: Reply follows when they are there.
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
@@ -124,12 +128,13 @@ class VoxelServer {
   const Epoch epoch_;
   const Codec codec_;
   std::mutex mutex_;
-  std::map<DatasetId, Samples> samples_;  // guarded by mutex_
-  std::vector<std::string> unwanted_;     // users whose connections are to end; guarded by mutex_
-  ChunkBuffers buffers_;                  // the thread's
-  CellBytes cell_bytes_;                  // the thread's
-  LimitedLog complaints_;                 // the thread's
-  std::map<DatasetId, Reads> reads_;      // the thread's
+  std::map<DatasetId, Samples> samples_;            // guarded by mutex_
+  std::map<DatasetId, DatasetId> light_volume_of_;  // by LightVolumeOf; guarded by mutex_
+  std::vector<std::string> unwanted_;               // users whose connections are to end; guarded by mutex_
+  ChunkBuffers buffers_;                            // the thread's
+  CellBytes cell_bytes_;                            // the thread's
+  LimitedLog complaints_;                           // the thread's
+  std::map<DatasetId, Reads> reads_;                // the thread's
   const std::shared_ptr<Mailbox<ReadDone>> read_ = std::make_shared<Mailbox<ReadDone>>();  // reads may outlive this
   Socket socket_;                                                                          // the thread's
   std::jthread thread_;                                                                    // last member

@@ -16,6 +16,9 @@ constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(5
 // Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
 constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
+// Pictures while moving lose their shadows above the first, and get them back below the second: at most they double the time.
+constexpr Duration kPlainAbove = milliseconds(50), kShadowedBelow = milliseconds(25);
+
 Duration Smoothed(Duration before, Duration sample) { return before == Duration::zero() ? sample : (3 * before + sample) / 4; }
 
 }  // namespace
@@ -45,13 +48,15 @@ ViewMachine::Actions ViewMachine::OnView(std::uint64_t seq, Time now) {
   return actions;
 }
 
-ViewMachine::Actions ViewMachine::OnRendered(bool finest, Time now) {
+ViewMachine::Actions ViewMachine::OnRendered(bool finest, bool shadowed, Time now) {
   if (!rendering_) return {};
   const Duration time = now - rendering_since_;
   render_time_ = Smoothed(render_time_, time);
   rendered_ = std::exchange(rendering_, std::nullopt);
   if (!rendered_->for_still && time > kCoarserAbove) coarseness_ = std::min(2 * coarseness_, kMostCoarseness);
   if (!rendered_->for_still && time < kFinerBelow) coarseness_ = std::max(coarseness_ / 2, 1.0);
+  if (!rendered_->for_still && shadowed) plain_ = time > (rendered_->plain ? kShadowedBelow : kPlainAbove);
+  if (!shadowed) rendered_->plain = false;
   still_coarseness_ = time < kFinerBelow ? 1 : rendered_->coarseness / 2;
   if (finest) rendered_->coarseness = 1;
   to_be_shown_ = !rendered_->for_still || !rendered_->as_asked();  // the lossless one is encoded only once
@@ -152,7 +157,7 @@ bool ViewMachine::MayRender(Time now) {
 
 void ViewMachine::Render(Time now, Actions& actions) {
   if (latest_ == 0 || refused_ || unavailable_ || rendering_) return;
-  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1, .coarseness = coarseness_};
+  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1, .coarseness = coarseness_, .plain = plain_};
   if (IsRenderedOrRenders(latest_)) {
     const bool still_needs_it = !rendered_->as_asked() && !to_be_shown_;
     if (!still_needs_it) return;
@@ -163,7 +168,8 @@ void ViewMachine::Render(Time now, Actions& actions) {
   }
   rendering_ = next;
   rendering_since_ = now;
-  actions.push_back({.kind = ViewActionKind::kRender, .seq = next.seq, .scale = next.scale, .coarseness = next.coarseness});
+  actions.push_back(
+      {.kind = ViewActionKind::kRender, .seq = next.seq, .scale = next.scale, .coarseness = next.coarseness, .plain = next.plain});
 }
 
 void ViewMachine::WakeAt(Time time) { wake_ = wake_ ? std::min(*wake_, time) : time; }

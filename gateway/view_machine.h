@@ -8,7 +8,8 @@
 //   no sooner than the page is ready for its picture: so what is shown is as new as can be, and no frame is rendered for nothing.
 // - A frame that renders is finished although newer views have come, else a picture that always moves would never be seen. A lossless
 //   picture is given up for a newer view.
-// - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly.
+// - While the view moves, pictures may be drawn from coarser levels: as much coarser as it takes to render them quickly. If a picture with
+//   shadows or ambient occlusion takes longer than 50 ms, those that move have neither.
 // - kStillAfter after the last view, the same picture follows, lossless: the one that was rendered, or one in full size and of the level
 // that
 //   the view asks for. If rendering takes long, pictures of levels between these come before it.
@@ -38,6 +39,7 @@ struct ViewAction {
   std::uint64_t seq = 0;    // kRender
   double scale = 1;         // kRender: of width and height
   double coarseness = 1;    // kRender: factor of the view's `detail`, [1, kMostCoarseness]
+  bool plain = false;       // kRender: without the view's shadows and ambient occlusion
   bool final = false;       // kEncode: lossless
   int quality = 0;          // kEncode: of JPEG, if not final
   std::uint64_t frame = 0;  // kSend
@@ -50,9 +52,10 @@ class ViewMachine {
 
   // `seq` rises from view to view; one that does not is ignored.
   Actions OnView(std::uint64_t seq, Time now);
-  Actions OnRendered(bool finest, Time now);  // finest: with less coarseness the picture would be the same
-  Actions OnRefused(Time now);                // the view cannot be rendered: it is done with
-  Actions OnUnavailable(Time now);            // the service is gone: the view waits for OnServiceBack
+  // finest: with less coarseness the picture would be the same. shadowed: the view has shadows or ambient occlusion.
+  Actions OnRendered(bool finest, bool shadowed, Time now);
+  Actions OnRefused(Time now);      // the view cannot be rendered: it is done with
+  Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
   Actions OnServiceBack(Time now);
   Actions OnEncoded(Time now);
   Actions OnEncodeFailed(Time now);  // there is no picture to send; the view is done with
@@ -70,8 +73,9 @@ class ViewMachine {
     std::uint64_t seq = 0;
     double scale = 1;
     double coarseness = 1;
+    bool plain = false;
     bool for_still = false;  // the view stands still
-    bool as_asked() const { return scale == 1 && coarseness == 1; }
+    bool as_asked() const { return scale == 1 && coarseness == 1 && !plain; }
   };
   enum class Out : std::uint8_t { kEmpty, kEncoding, kEncoded };
 
@@ -101,6 +105,7 @@ class ViewMachine {
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
   bool small_ = false;                     // pictures while moving have half the size
   double coarseness_ = kFirstCoarseness;   // of pictures while moving
+  bool plain_ = false;                     // pictures while moving have no shadows
   double still_coarseness_ = 1;            // of the next picture of a view that stands still
   std::optional<Time> wake_;
 };

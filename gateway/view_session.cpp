@@ -106,7 +106,7 @@ void ViewSession::SendError(std::uint64_t seq, const Status& status) {
 void ViewSession::Do(const ViewMachine::Actions& actions) {
   for (const ViewAction& action : actions) {
     switch (action.kind) {
-      case ViewActionKind::kRender: Render(action.seq, action.scale, action.coarseness); break;
+      case ViewActionKind::kRender: Render(action); break;
       case ViewActionKind::kCancelRender:
         if (rendering_) link_->Cancel(rendering_->ticket);
         rendering_.reset();
@@ -134,7 +134,9 @@ void ViewSession::SetTimer() {
   });
 }
 
-void ViewSession::Render(std::uint64_t seq, double scale, double coarseness) {
+void ViewSession::Render(const ViewAction& action) {
+  const std::uint64_t seq = action.seq;
+  const double scale = action.scale, coarseness = action.coarseness;
   const std::uint64_t order = ++orders_;
   Result<PictureJob> job = MakePictureJob(view_->kind, view_->options);
   if (!job.ok()) {
@@ -148,13 +150,15 @@ void ViewSession::Render(std::uint64_t seq, double scale, double coarseness) {
     });
     return;
   }
+  const bool shadowed = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return frame.shading.needs_light_volume(); });
   for (FrameRequest& frame : job->frames) {
+    if (action.plain) frame.shading.shadows = frame.shading.ambient_occlusion = 0;
     frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
     if (coarseness > 1) frame.detail = std::min((frame.detail == 0 ? 1 : frame.detail) * coarseness, kMostDetail);
   }
   // A level that the view names is drawn, however coarse pictures may be.
   const bool names_level = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return LevelNumber(frame.level).has_value(); });
-  Rendering rendering{.order = order, .ticket = 0, .view = {}, .size = job->frames.front().size};
+  Rendering rendering{.order = order, .ticket = 0, .view = {}, .size = job->frames.front().size, .shadowed = shadowed};
   rendering.view.seq = seq;
   rendering.view.scale = scale;
   rendering.view.coarseness = names_level ? 1 : coarseness;
@@ -206,7 +210,7 @@ void ViewSession::OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> re
   view.timeline = rendering.view.timeline;
   around_.metrics.CountFrame(view.statistics, view.latency);
   rendered_ = std::make_shared<const RenderedView>(std::move(view));
-  Do(machine_.OnRendered(finest, MonotonicNow()));
+  Do(machine_.OnRendered(finest, rendering.shadowed, MonotonicNow()));
 }
 
 void ViewSession::Encode(bool final, int quality) {

@@ -44,7 +44,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
  private:
   void Handle(ViewMessage view);
   void Do(const ViewMachine::Actions& actions);
-  void Render(std::uint64_t seq, double scale, double coarseness);
+  void Render(const ViewAction& action);  // kRender
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void Encode(bool final, int quality);
@@ -67,8 +67,9 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   struct Rendering {
     std::uint64_t order = 0;
     ServiceLink::Ticket ticket = 0;
-    RenderedView view;  // what is known before the pictures are there
-    ImageSize size;     // of each frame
+    RenderedView view;      // what is known before the pictures are there
+    ImageSize size;         // of each frame
+    bool shadowed = false;  // the view asks for shadows or ambient occlusion
   };
   std::optional<Rendering> rendering_;
   std::shared_ptr<const RenderedView> rendered_;

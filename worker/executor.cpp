@@ -116,6 +116,19 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
   return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");
 }
 
+std::shared_ptr<const FrameLight> LightFrom(StoredBox& light, const StartRender& action) {
+  return MakeFrameLight(
+      [&] {
+        light.Assemble();
+        const StoredBox::Lease lease = light.Lend(action.client);
+        const VoxelBricks bricks = lease.data().bricks();
+        VoxelBlock values = MakeVoxelBlock(action.setup->light->description.geometry.bounds(), bricks.type());
+        bricks.Read(values.box, 0, values.bytes);
+        return values;
+      },
+      *action.setup);
+}
+
 }  // namespace
 
 Executor::Executor(Mailbox<ExecutorOutput>& outbox, Codec frame_codec, int threads, RendererFactory make_renderer, TaskHook hook)
@@ -176,18 +189,19 @@ void Executor::Perform(StoreChunk&& action) {
 
 void Executor::Perform(StartRender&& action) {
   std::shared_ptr<StoredBox> padded = BoxOf(action.padded);
+  std::shared_ptr<StoredBox> light = action.light ? BoxOf(*action.light) : nullptr;
   auto image = images_.insert_or_assign(action.image, std::make_shared<LocalImage>()).first->second;
   auto control = std::make_shared<RenderControl>();
   std::erase_if(renders_, [](const auto& render) { return render.second.expired(); });
   renders_[action.image] = control;
   ClientLane& lane = render_.Of(action.client);
-  lane.thread.Post(
-      [this, &lane, padded = std::move(padded), image = std::move(image), control = std::move(control), render = std::move(action)] {
-        outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *padded, *control, lane, *image); })));
-      });
+  lane.thread.Post([this, &lane, padded = std::move(padded), light = std::move(light), image = std::move(image),
+                    control = std::move(control), render = std::move(action)] {
+    outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *padded, light.get(), *control, lane, *image); })));
+  });
 }
 
-RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane,
+RenderDone Executor::Render(const StartRender& action, StoredBox& padded, StoredBox* light, const RenderControl& control, ClientLane& lane,
                             LocalImage& image) {
   RenderDone done{action.key, action.rank, action.image, {}, {}};
   RankReport& report = done.report;
@@ -195,6 +209,7 @@ RenderDone Executor::Render(const StartRender& action, StoredBox& padded, const 
   done.status = Guard("render", [&] {
     if (padded.Assemble()) AddStage(report, Stage::kFetch, begin, NowNs());
     const StoredBox::Lease lease = padded.Lend(action.client);
+    lease.data().SetLight(light == nullptr ? nullptr : LightFrom(*light, action));
     std::unique_ptr<Renderer>& renderer = lane.renderers[action.setup->renderer];
     if (renderer == nullptr) renderer = make_renderer_(*action.setup->renderer);
     const OcclusionMask& hidden = action.hidden == nullptr ? kNothingHidden : *action.hidden;

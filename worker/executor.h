@@ -101,7 +101,9 @@ class Executor {
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns
   std::shared_ptr<RenderControl> ControlOf(ImageHandle image) const;   // null: the render has ended
-  RenderDone Render(const StartRender& action, StoredBox& padded, const RenderControl& control, ClientLane& lane, LocalImage& image);
+  // `light`: the frame's light volume; null: it has none.
+  RenderDone Render(const StartRender& action, StoredBox& padded, StoredBox* light, const RenderControl& control, ClientLane& lane,
+                    LocalImage& image);
 
   Mailbox<ExecutorOutput>& outbox_;
   const Codec frame_codec_;

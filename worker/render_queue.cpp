@@ -23,13 +23,24 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
   const std::uint8_t level = placement.level;
   const BoxFetcher::Generation padded =
       boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
-  waiting_[{client, key, rank}] = {placement, setup, hidden, padded, !boxes_.complete(padded)};
+  BoxFetcher::Generation light = 0;
+  if (setup->light) {
+    const auto& [dataset, description, stored] = *setup->light;
+    light = boxes_.Acquire(dataset, description.geometry.bounds(), {description.type, {}}, stored, {}, actions);
+  }
+  Job& job = waiting_[{client, key, rank}] = {placement, setup, hidden, padded, light};
+  job.waited = !Complete(job);
+}
+
+void RenderQueue::Release(const Job& job) {
+  boxes_.Release(job.padded);
+  if (job.light != 0) boxes_.Release(job.light);
 }
 
 void RenderQueue::DropGroup(const GroupKey& key, Time now, WorkerActions& actions) {
   std::erase_if(waiting_, [&](const auto& entry) {
     if (std::get<GroupKey>(entry.first) != key) return false;
-    boxes_.Release(entry.second.padded);
+    Release(entry.second);
     return true;
   });
   for (auto& [client, begun] : begun_) {
@@ -44,7 +55,7 @@ RenderQueue::Waiting::const_iterator RenderQueue::NextOf(ClientId client) const 
   for (auto job = waiting_.lower_bound({client, {}, 0}); job != waiting_.end() && std::get<ClientId>(job->first) == client; ++job) {
     const BoxFetcher::Generation padded = job->second.padded;
     const auto uses = [&](const auto& begun) { return begun.second.job.padded == padded; };
-    if (boxes_.complete(padded) && (boxes_.HasRoomBeside(padded) || std::ranges::none_of(begun_, uses))) return job;
+    if (Complete(job->second) && (boxes_.HasRoomBeside(padded) || std::ranges::none_of(begun_, uses))) return job;
   }
   return waiting_.end();
 }
@@ -118,6 +129,7 @@ void RenderQueue::Begin(ClientId client, Time now, WorkerActions& actions) {
   waiting_.erase(next);
   actions.push_back(StartRender{client, begun.key, begun.rank, boxes_.key(begun.job.padded), begun.job.placement, begun.job.setup,
                                 begun.job.hidden, begun.image});
+  if (begun.job.light != 0) std::get<StartRender>(actions.back()).light = boxes_.key(begun.job.light);
 }
 
 Time RenderQueue::NextTurn() const { return turn_ && !OnlyTurns() && NextInTurn() ? turn_->begin + kTurn : Time::max(); }
@@ -130,12 +142,15 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   const Begun job = std::move(ended->second);
   begun_.erase(ended);
   const BoxFetcher::Generation padded = job.job.padded;
-  if (done.status.ok()) boxes_.Rendered(padded);
+  if (done.status.ok()) {
+    boxes_.Rendered(padded);
+    if (job.job.light != 0) boxes_.Rendered(job.job.light);
+  }
   boxes_.SetBytes(padded, done.box_bytes);  // a cancelled frame derives data too
   if (waiting_.empty() && begun_.empty()) turns_.ForgetAll();
   turns_.ForgetIdle([this](ClientId each) { return Busy(each); });
   if (job.dropped) {
-    boxes_.Release(padded);
+    Release(job.job);
     actions.push_back(ReleaseImage{done.image});
     return std::nullopt;
   }
@@ -145,14 +160,17 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
   report.rank = job.rank;
   report.box = job.job.placement.id;
   if (job.job.waited) {
-    const BoxFetcher::FetchReport fetched = boxes_.TakeReport(padded);
-    report.voxel_bytes = fetched.voxel_bytes;
-    report.stored_bytes = fetched.stored_bytes;
-    if (fetched.voxel_bytes > 0) {
-      AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+    for (const BoxFetcher::Generation box : {padded, job.job.light}) {
+      if (box == 0) continue;
+      const BoxFetcher::FetchReport fetched = boxes_.TakeReport(box);
+      report.voxel_bytes += fetched.voxel_bytes;
+      report.stored_bytes += fetched.stored_bytes;
+      if (fetched.voxel_bytes > 0) {
+        AddStage(report, Stage::kFetch, fetched.begin.time_since_epoch().count(), fetched.end.time_since_epoch().count());
+      }
     }
   }
-  boxes_.Release(padded);
+  Release(job.job);
   if (!done.status.ok()) actions.push_back(ReleaseImage{done.image});
   return report;
 }
@@ -160,7 +178,11 @@ std::optional<RankReport> RenderQueue::Finish(const RenderDone& done, WorkerId w
 std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::BoxesInTurn() const {
   std::vector<ClientId> clients;
   std::map<ClientId, std::vector<BoxFetcher::Generation>> boxes;
-  for (const auto& [name, job] : waiting_) boxes[std::get<ClientId>(name)].push_back(job.padded);
+  for (const auto& [name, job] : waiting_) {
+    std::vector<BoxFetcher::Generation>& of_client = boxes[std::get<ClientId>(name)];
+    if (job.light != 0 && std::ranges::find(of_client, job.light) == of_client.end()) of_client.push_back(job.light);
+    of_client.push_back(job.padded);
+  }
   for (const auto& [client, of_client] : boxes) clients.push_back(client);
   std::ranges::sort(clients, {}, [this](ClientId client) { return turns_.TurnOf(client); });
   std::vector<std::vector<BoxFetcher::Generation>> in_turn;
@@ -171,7 +193,7 @@ std::vector<std::vector<BoxFetcher::Generation>> RenderQueue::BoxesInTurn() cons
 std::set<GroupKey> RenderQueue::GroupsOn(BoxFetcher::Generation padded) const {
   std::set<GroupKey> groups;
   for (const auto& [name, job] : waiting_) {
-    if (job.padded == padded) groups.insert(std::get<GroupKey>(name));
+    if (job.padded == padded || job.light == padded) groups.insert(std::get<GroupKey>(name));
   }
   return groups;
 }

@@ -54,7 +54,8 @@ class RenderQueue {
     std::shared_ptr<const FrameSetup> setup;
     std::shared_ptr<const OcclusionMask> hidden;
     BoxFetcher::Generation padded = 0;
-    bool waited = false;  // for voxels: its report tells of their fetch
+    BoxFetcher::Generation light = 0;  // the light volume; 0: the frame has none
+    bool waited = false;               // for voxels: its report tells of their fetch
   };
   struct Begun {
     GroupKey key;
@@ -70,6 +71,8 @@ class RenderQueue {
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;
 
+  bool Complete(const Job& job) const { return boxes_.complete(job.padded) && (job.light == 0 || boxes_.complete(job.light)); }
+  void Release(const Job& job);
   bool Busy(ClientId client) const;
   bool OnlyTurns() const;                                 // nobody but the client whose turn it is has any job
   Waiting::const_iterator NextOf(ClientId client) const;  // its first job that can begin; end: none

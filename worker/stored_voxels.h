@@ -1,6 +1,6 @@
-// StoredVoxels: reads chunks of voxels from the files that hold them, where this process sees the same files as the coordinator. It looks
-// whether it does. Until a source is open and known to be the same one, it asks the coordinator. It looks again after kLookAgain at a place
-// that it does not see, or cannot read any more. The last kMostPlaces stay open.
+// StoredVoxels: reads chunks of voxels from the files that hold them, if this process sees the same files as the coordinator. It finds that
+// out by opening them. Until a source is open and known to be the same one, the coordinator must be asked. A place that it does not see, or
+// cannot read any more, is tried again after kLookAgain. The last kMostPlaces stay open.
 //
 // One thread uses an object of this class. What it reads comes back through the mailbox as if the coordinator had sent it.
 #pragma once

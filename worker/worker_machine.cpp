@@ -42,7 +42,7 @@ struct WorkerMachine::State {
     std::map<WorkerId, std::uint32_t> met;        // workers of groups that are over here, and the last such group
     std::optional<FrameAccumulator> accumulator;  // display worker
     // Memory of images, if this worker's memory is limited: of its largest group, and of its picture.
-    std::uint64_t group_bytes = 0, picture_bytes = 0;
+    std::uint64_t group_bytes = 0, picture_bytes = 0, light_bytes = 0;
   };
 
   // ---- input from the coordinator and the executor. `actions` and `now` are those of the running Step.
@@ -258,6 +258,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   if (config.memory_bytes != 0) {
     frame.group_bytes = std::max(frame.group_bytes, GroupImageBytes(assignment.setup, assignment.group.placements));
     frame.picture_bytes = PictureBytes(assignment.setup);
+    frame.light_bytes = LightBytes(assignment.setup);
   }
 
   if (assignment.display == worker) {
@@ -479,11 +480,13 @@ void WorkerMachine::State::Tend() {
 // What the images of the present frames leave of memory_bytes.
 std::uint64_t WorkerMachine::State::RoomForVoxels() const {
   std::uint64_t taken = kIdleMemoryBytes + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
+  std::uint64_t light = 0;  // frames share it
   for (const auto& [id, frame] : frames) {
+    light = std::max(light, frame.light_bytes);
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
     taken += frame.group_bytes * std::uint64_t(runs) + (frame.accumulator ? frame.picture_bytes : 0);
   }
-  return config.memory_bytes - std::min(config.memory_bytes, taken);
+  return config.memory_bytes - std::min(config.memory_bytes, taken + light);
 }
 
 Time WorkerMachine::State::NextWake() const {

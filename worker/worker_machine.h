@@ -32,6 +32,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -204,6 +205,7 @@ struct StartRender {
   std::shared_ptr<const FrameSetup> setup;
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
+  std::optional<BoxKey> light = {};  // of the light volume (FrameSetup::light), whole
 };
 // Of a started render, by its image, for which RenderDone has not come. PauseRender: it stops soon, between two of its pieces, and keeps
 // what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.

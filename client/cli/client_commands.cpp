@@ -243,9 +243,9 @@ void DeclareSphere(const CommandLine& line) {
 void DeclareUp(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
   auto options = std::make_shared<UpOptions>();
-  options->workers = std::min(CoreCount(), kMaxUpWorkers);
   options->listen = "tcp://127.0.0.1:7420";
-  AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")->default_str("one a core");
+  AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")
+      ->default_str("one a core, but no more than one for each GiB of --memory");
   AddThreads(*sub, options->threads, "Render threads of each worker");
   AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("NAME=FILE");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
@@ -277,6 +277,7 @@ void DeclareUp(const CommandLine& line) {
   sub->callback([&run = line.run, options, &log_level = line.log_level] {
     run = [options, &log_level] {
       options->log_level = log_level;
+      if (options->workers == 0) options->workers = WorkersWithin(options->memory, std::min(CoreCount(), kMaxUpWorkers));
       return RunUp(*options);
     };
   });

@@ -3,15 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <stop_token>
-#include <utility>
 #include <vector>
 
+#include "client/cli/byte_progress.h"
 #include "client/cli/convert_source.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
@@ -58,18 +56,10 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
   Wakeup wakeup;
   const InterruptGuard guard(wakeup);
   std::stop_source stop;
-  int percent = -1;
-  const auto begin = std::chrono::steady_clock::now();
-  std::optional<std::uint64_t> done_before;
+  ByteProgress shown(bar, "writing " + options.output);
   const auto progress = [&](const OmeZarrProgress& now) {
     if (guard.interrupted()) stop.request_stop();
-    if (!done_before) done_before = now.done_bytes;
-    const int its = int(100 * now.done_bytes / now.all_bytes);
-    if (std::exchange(percent, its) == its) return;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    const double rate = double(now.done_bytes - *done_before) / std::max(seconds, 1e-9);
-    bar.Show(0.01 * its, fmt::format("writing {}: {} % of {}, {} a second", options.output, its, MemoryText(now.all_bytes),
-                                     MemoryText(std::uint64_t(rate))));
+    shown.Show(now.done_bytes, now.all_bytes);
   };
   const Status status = WriteOmeZarr(*opened->source, options.output,
                                      {.version = options.zarr_version,
@@ -79,11 +69,12 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
                                       .stop = stop.get_token(),
                                       .progress = progress});
   if (status.code() == StatusCode::kCancelled) {
-    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.output, percent));
+    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.output, shown.percent()));
   }
   if (status.code() == StatusCode::kInvalidArgument) return Status::InvalidArgument("OUTPUT " + status.message());
   if (!status.ok()) return AsInput(status);
   const Index3& size = volume.geometry.size;
+  bar.Clear();
   std::cout << fmt::format("wrote {}: OME-Zarr {}, {} x {} x {} voxels\n", options.output, ToString(options.zarr_version), size.x, size.y,
                            size.z);
   return Status::Ok();

@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <chrono>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <stop_token>
 #include <utility>
 
+#include "client/cli/byte_progress.h"
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
 #include "client/cli/interrupt.h"
@@ -72,18 +71,10 @@ Status RunIndex(const IndexingOptions& options) {
   Wakeup wakeup;
   const InterruptGuard guard(wakeup);
   std::stop_source stop;
-  int percent = -1;
-  std::optional<std::uint64_t> done_before;
-  const auto begin = std::chrono::steady_clock::now();
+  ByteProgress shown(bar, "reading " + source->path);
   const auto progress = [&](const IndexProgress& now) {
     if (guard.interrupted()) stop.request_stop();
-    if (!done_before) done_before = now.done_bytes;
-    const int its = int(100 * now.done_bytes / now.all_bytes);
-    if (std::exchange(percent, its) == its) return;
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    const double rate = double(now.done_bytes - *done_before) / std::max(seconds, 1e-9);
-    bar.Show(0.01 * its, fmt::format("reading {}: {} % of {}, {} a second", source->path, its, MemoryText(now.all_bytes),
-                                     MemoryText(std::uint64_t(rate))));
+    shown.Show(now.done_bytes, now.all_bytes);
   };
   const Status read = ReadIntoIndex(**opened, {.memory = memory / 4, .stop = stop.get_token(), .progress = progress}, *index);
   // What was read until an error or Ctrl-C is worth keeping, unless the files are not those that were read.
@@ -93,11 +84,12 @@ Status RunIndex(const IndexingOptions& options) {
   }
   if (Status written = file->Merge(*name, *index, info); !written.ok()) return written;
   if (read.code() == StatusCode::kCancelled) {
-    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.source, percent));
+    return Status::Cancelled(fmt::format("'{}': stopped at {} %; the same command goes on from there", options.source, shown.percent()));
   }
   if (!read.ok()) return AsInput(read);
   std::size_t bricks = 0;
   for (const BrickRangeList& level : index->levels) bricks += level.size();
+  bar.Clear();
   std::cout << fmt::format("wrote {}: ranges of {} bricks, {:.1f} KiB\n", file->path(), bricks,
                            double(file->facts().value_or(IndexFile::Facts{}).bytes) / 1024);
   return Status::Ok();

@@ -14,14 +14,19 @@
 namespace slabstream {
 namespace {
 
+constexpr char kSuitable[] = "suitable";  // what --local alone stands for
+
 void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   app.option_defaults()->group("Service");
-  const std::string every_core = std::to_string(std::min(CoreCount(), kMaxLocalWorkers));
-  const auto parse = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxLocalWorkers); };
-  AddOptionalValue(app, "--local", connection.local_workers, every_core, parse,
-                   fmt::format("Render the file SOURCE in this process, with N workers, or with one per core ({} here) if N "
-                               "is left out; needs no service, and is not needed where no service is named and none runs",
-                               every_core))
+  const auto parse = [](const std::string& option, const std::string& text) -> Result<int> {
+    if (text == kSuitable) return ConnectionOptions::kSuitableWorkers;
+    return ParseInteger(option, text, 1, kMaxLocalWorkers);
+  };
+  AddOptionalValue(
+      app, "--local", connection.local_workers, kSuitable, parse,
+      fmt::format("Render the file SOURCE in this process, with N workers, or else with one for {} cores, and no more than one "
+                  "for each GiB of --memory; needs no service, and is not needed where no service is named and none runs",
+                  kThreadsOfAWorker))
       ->type_name("[N]");
   AddThreads(app, connection.local_threads, "Render threads of each worker of --local");
   AddParsed(app, "--memory", connection.local_memory, ParseMemoryLimit, "Memory limit of this process, with --local: 2G or 512M")
@@ -30,12 +35,15 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   AddService(app, connection.service);
 }
 
-// Whether this process renders SOURCE: --local says so, or the user names no service, none runs here, and SOURCE is a file.
+// Whether this process renders SOURCE: --local says so, or the user names no service, none runs here, and SOURCE is a file. Then the number
+// of workers is known, too.
 bool RendersHere(const std::string& source, ConnectionOptions& connection) {
+  const int suitable = WorkersWithin(connection.local_memory, std::min(WorkersForOneUser(), kMaxLocalWorkers));
+  if (connection.local_workers == ConnectionOptions::kSuitableWorkers) connection.local_workers = suitable;
   if (connection.local_workers > 0) return true;
   const Result<ServiceChoice> named = NamedService(connection.service);
   if (!named.ok() || !named->text().empty() || !NamesVolumeFile(source) || FindState("")) return false;
-  connection.local_workers = std::min(CoreCount(), kMaxLocalWorkers);
+  connection.local_workers = suitable;
   connection.unasked = true;
   return true;
 }

@@ -27,10 +27,11 @@ inline constexpr int kMaxLocalWorkers = 256;  // of EmbeddedOptions
 
 // Where the frames are rendered.
 struct ConnectionOptions {
-  int local_workers = 0;           // 0: render at the service; else in this process, by this many workers
-  int local_threads = 0;           // of each local worker; 0: LocalThreads
-  std::uint64_t local_memory = 0;  // bytes, limit of this process with local workers; 0: none
-  bool unasked = false;            // local workers that nobody asked for (RendersHere)
+  static constexpr int kSuitableWorkers = -1;  // of local_workers, only while options are read
+  int local_workers = 0;                       // 0: render at the service; else in this process, by this many workers
+  int local_threads = 0;                       // of each local worker; 0: LocalThreads
+  std::uint64_t local_memory = 0;              // bytes, limit of this process with local workers; 0: none
+  bool unasked = false;                        // local workers that nobody asked for (RendersHere)
   ServiceChoice service;
 };
 
@@ -111,7 +112,7 @@ struct SphereOptions {
 inline constexpr int kMaxUpWorkers = 256;
 
 struct UpOptions {
-  int workers = 1;                // processes, [1, kMaxUpWorkers]
+  int workers = 0;                // processes, [1, kMaxUpWorkers]; 0, only while options are read: as many as suit machine and memory
   int threads = 0;                // of each worker; 0: CoreShare
   std::vector<std::string> data;  // NAME=PATH or DIR, as slabstream-coordinator takes them
   std::string listen;             // endpoint for clients; a wildcard port is fine

@@ -11,8 +11,9 @@ namespace slabstream {
 
 ProgressBar::ProgressBar(bool wanted, double total) : wanted_(wanted), terminal_(::isatty(STDERR_FILENO) == 1), total_(total) {}
 
-ProgressBar::~ProgressBar() {
+void ProgressBar::Clear() {
   if (terminal_ && !last_.empty()) std::cerr << "\r\033[K" << std::flush;
+  last_.clear();
 }
 
 void ProgressBar::Show(double done, const std::string& text) {

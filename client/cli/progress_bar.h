@@ -8,11 +8,12 @@ namespace slabstream {
 class ProgressBar {
  public:
   ProgressBar(bool wanted, double total);  // total > 0: the value of `done` at the end
-  ~ProgressBar();                          // clears the bar
+  ~ProgressBar() { Clear(); }
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void Show(double done, const std::string& text);
+  void Clear();  // before other output on a terminal
 
  private:
   bool wanted_, terminal_;

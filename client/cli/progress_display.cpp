@@ -28,7 +28,8 @@ std::string Describe(const FrameProgress& progress, const std::string& source) {
     case FramePhase::kLoading: return Describe(ReadShare{int(progress.read_percent), progress.read_rate}, source);
     case FramePhase::kRunning: break;
   }
-  std::string text = fmt::format("{} of {} groups, {} workers", progress.groups_done, progress.group_count, progress.workers);
+  std::string text = fmt::format("{} of {} groups, {} worker{}", progress.groups_done, progress.group_count, progress.workers,
+                                 progress.workers == 1 ? "" : "s");
   if (progress.attempt > 1) text += fmt::format(", attempt {}", progress.attempt);
   return text;
 }

@@ -73,11 +73,6 @@ std::string ShownDataset(const std::string& source) {
   return several ? NameAtTime(name, parsed->options.time->first) : name;
 }
 
-// The threads of one worker draw one image together, while images of several workers must be combined. A task of splatting is 64 rows, so a
-// picture of 1024 rows keeps this many threads busy.
-constexpr int kThreadsOfAWorker = 8;
-int WorkersForView() { return (CoreCount() + kThreadsOfAWorker - 1) / kThreadsOfAWorker; }
-
 // A child that ends with this process or with this object.
 class Helper {
  public:
@@ -177,7 +172,7 @@ Status RunView(const ViewOptions& options) {
   ServiceChoice choice = *named;
   if (file && choice.text().empty()) {
     if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
-    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--workers", std::to_string(WorkersForView()),
+    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--workers", std::to_string(WorkersForOneUser()),
                                        "--data", CatalogueEntry(options.source, options.layers)});
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));

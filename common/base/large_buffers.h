@@ -3,17 +3,23 @@
 
 #include <malloc.h>
 
+#include <algorithm>
+#include <thread>
+
 namespace slabstream {
 
 // glibc raises its threshold for mapping a buffer, up to 32 MiB, each time one is freed. Buffers of changing sizes, freed by other threads
 // than made them, then leave holes in several heaps. With a fixed threshold, messages that carry pictures of up to 1100 x 1100 pixels find
 // memory in a heap, instead of having it mapped, cleared and unmapped for each frame, and nothing larger leaves a hole. A heap (64 MiB at
 // most) keeps the free memory at its end, so strips of pictures that arrive one after the other use the memory of the last frame's strips.
-// Called once, first thing in main. Images have blocks of their own: pooled_vector.h.
+// There are as many heaps as cores, not glibc's eight a core: chunks of stored voxels are read, decoded and freed by different threads, and
+// what lies free in one heap is of no use to the others. Called once, first thing in main. Images have blocks of their own:
+// pooled_vector.h.
 inline void KeepFrameBuffers() {
   constexpr int kFrameBytes = 20 << 20, kHeapBytes = 64 << 20;
   mallopt(M_MMAP_THRESHOLD, kFrameBytes);
   mallopt(M_TRIM_THRESHOLD, kHeapBytes);
+  mallopt(M_ARENA_MAX, std::max(2, int(std::thread::hardware_concurrency())));
 }
 
 }  // namespace slabstream

@@ -1,7 +1,13 @@
 // ParaView's colour-map JSON, as Edit Color Map > Choose Preset > Export writes it.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
+#include <ranges>
+#include <string_view>
+#include <utility>
 
 #include "common/base/printable.h"
 #include "common/classification/transfer_function.h"
@@ -30,6 +36,27 @@ Result<std::vector<double>> ReadCurve(const Json& preset, const char* field) {
   return numbers;
 }
 
+constexpr const char* kMaterial = "Material";
+constexpr std::array<std::pair<std::string_view, float Material::*>, 4> kMaterialFields = {{{"ambient", &Material::ambient},
+                                                                                            {"diffuse", &Material::diffuse},
+                                                                                            {"specular", &Material::specular},
+                                                                                            {"shininess", &Material::shininess}}};
+
+Result<Material> ReadMaterial(const Json& json) {
+  if (!json.is_object()) return Status::InvalidArgument(fmt::format("{} is not an object", kMaterial));
+  Material material;
+  for (const auto& [name, value] : json.items()) {
+    const auto* const field = std::ranges::find(kMaterialFields, name, [](const auto& each) { return each.first; });
+    if (field == kMaterialFields.end()) {
+      return Status::InvalidArgument(
+          fmt::format("{} has the field \"{}\", must be one of: {}", kMaterial, name, fmt::join(kMaterialFields | std::views::keys, ", ")));
+    }
+    if (!value.is_number()) return Status::InvalidArgument(fmt::format("{}.{} is not a number", kMaterial, name));
+    material.*field->second = value.get<float>();
+  }
+  return material;
+}
+
 Result<TransferFunction> ReadPreset(const Json& preset) {
   if (!preset.is_object()) return Status::InvalidArgument("not a colour map: expected an object or an array of objects");
   if (!preset.contains("RGBPoints")) return Status::InvalidArgument("not a colour map: RGBPoints is missing");
@@ -55,6 +82,11 @@ Result<TransferFunction> ReadPreset(const Json& preset) {
   } else {
     transfer.opacities = {{transfer.colors.front().value, 0}, {transfer.colors.back().value, 1}};
   }
+  if (preset.contains(kMaterial)) {
+    Result<Material> material = ReadMaterial(preset.at(kMaterial));
+    if (!material.ok()) return material.status();
+    transfer.material = *material;
+  }
   if (Status status = Validate(transfer); !status.ok()) return status;
   return transfer;
 }
@@ -79,7 +111,10 @@ std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string
   std::vector<double> colors, opacities;
   for (const ColorPoint& p : transfer.colors) colors.insert(colors.end(), {p.value, p.color.r, p.color.g, p.color.b});
   for (const OpacityPoint& p : transfer.opacities) opacities.insert(opacities.end(), {p.value, p.opacity, p.midpoint, p.sharpness});
-  const nlohmann::ordered_json preset = {{"Name", name}, {"ColorSpace", "RGB"}, {"RGBPoints", colors}, {"Points", opacities}};
+  nlohmann::ordered_json preset = {{"Name", name}, {"ColorSpace", "RGB"}, {"RGBPoints", colors}, {"Points", opacities}};
+  for (const auto& [field, number] : kMaterialFields) {
+    if (transfer.material) preset[kMaterial][std::string(field)] = (*transfer.material).*number;
+  }
   return nlohmann::ordered_json::array({preset}).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 

@@ -131,7 +131,7 @@ TransferFunction CtSkin(const VolumeSummary& summary) {
 // ---- Fitted to the values above the background
 
 // The bins above the background; if there are none the upper half of all bins, so that each preset shows something of any volume.
-MaterialBins Material(const VolumeSummary& summary) {
+MaterialBins MaterialOf(const VolumeSummary& summary) {
   const MaterialBins above = FindForeground(summary).above;
   return above.share > 0 ? above : MaterialBins{kHistogramBins / 2, kHistogramBins - 1, 0.5};
 }
@@ -146,7 +146,7 @@ double SoftSurfaceOpacity(const VolumeSummary& summary, double share_of_side) {
 // A soft surface round grey matter. At the bottom of the folds grey matter shares its voxels with fluid and is darker than on top. Colour
 // makes it darker still, so that the folds stand out.
 TransferFunction MriBrain(const VolumeSummary& summary) {
-  const MaterialBins tissue = Material(summary);
+  const MaterialBins tissue = MaterialOf(summary);
   const double begin = BinBorder(summary.range, tissue.first), middle = Quantile(summary, tissue, 0.5);
   const double clear = std::lerp(begin, middle, 0.4), solid = std::lerp(begin, middle, 0.85), opacity = SoftSurfaceOpacity(summary, 0.025);
   const auto at = [&](double q) { return std::max(clear, Quantile(summary, tissue, q)); };
@@ -162,7 +162,7 @@ TransferFunction MriBrain(const VolumeSummary& summary) {
 // For slices: all is opaque, and few values are black or white only.
 TransferFunction Window(const VolumeSummary& summary) {
   constexpr double kBelowWhite = 0.995;  // share of the material
-  const MaterialBins material = Material(summary);
+  const MaterialBins material = MaterialOf(summary);
   const double black = BinBorder(summary.range, material.first), white = Quantile(summary, material, kBelowWhite);
   if (!(black < white)) return {{{double(summary.range.max), {1, 1, 1}}}, {{double(summary.range.max), 1}}};
   return {{{black, {0, 0, 0}}, {white, {1, 1, 1}}}, {{black, 1}}};
@@ -171,7 +171,7 @@ TransferFunction Window(const VolumeSummary& summary) {
 // For T1: the brain lies between the fluids, which are dark, and the fat of the scalp, which is brightest. Both ends are almost clear, so
 // the skin is a veil. Where grey matter shares its voxels with fluid, in the folds, it is dark, so that they stand out.
 TransferFunction MriHead(const VolumeSummary& summary) {
-  const MaterialBins tissue = Material(summary);
+  const MaterialBins tissue = MaterialOf(summary);
   const double begin = BinBorder(summary.range, tissue.first);
   const auto at = [&](double q) { return Quantile(summary, tissue, q); };
   return {{{begin, {0.55F, 0.32F, 0.27F}},
@@ -186,7 +186,7 @@ TransferFunction MriHead(const VolumeSummary& summary) {
 // Vessels are the brightest few per cent, or all of the material where everything else was masked out.
 TransferFunction Angiography(const VolumeSummary& summary) {
   constexpr double kVesselShare = 0.03;  // of all voxels
-  const MaterialBins material = Material(summary);
+  const MaterialBins material = MaterialOf(summary);
   const double share = std::max(material.share, kVesselShare);
   const double begin =
       share > kVesselShare ? Quantile(summary, material, 1 - kVesselShare / share) : BinBorder(summary.range, material.first);
@@ -198,7 +198,7 @@ TransferFunction Angiography(const VolumeSummary& summary) {
 // Like glowing gas: thin where values are low (colours after "plasma" of matplotlib). Stops are quantiles, because the values of plumes and
 // fields often fall off over orders of magnitude.
 TransferFunction Simulation(const VolumeSummary& summary) {
-  const MaterialBins material = Material(summary);
+  const MaterialBins material = MaterialOf(summary);
   const double begin = BinBorder(summary.range, material.first);
   const auto at = [&](double q) { return Quantile(summary, material, q); };
   return {{{begin, {0.24F, 0.10F, 0.72F}},
@@ -248,7 +248,7 @@ const std::vector<TransferPreset>& TransferPresets() {
 
 ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary) {
   if (!range.percentiles) return range;
-  const MaterialBins material = Material(summary);
+  const MaterialBins material = MaterialOf(summary);
   return {Quantile(summary, material, range.min / 100), Quantile(summary, material, range.max / 100)};
 }
 

@@ -134,7 +134,15 @@ Status Validate(const TransferFunction& transfer) {
                                                transfer.opacity_distance, kMaxOpacityDistance));
   }
   if (Status status = Validate(transfer.isosurfaces); !status.ok()) return status;
-  return Validate(transfer.gradient_opacities);
+  if (Status status = Validate(transfer.gradient_opacities); !status.ok()) return status;
+  return Validate(transfer.material.value_or(Material()));
+}
+
+Status Validate(const Material& material) {
+  if (Status s = InRange("ambient of the material", double(material.ambient), 0, 1); !s.ok()) return s;
+  if (Status s = InRange("diffuse of the material", double(material.diffuse), 0, 1); !s.ok()) return s;
+  if (Status s = InRange("specular of the material", double(material.specular), 0, 1); !s.ok()) return s;
+  return InRange("shininess of the material", double(material.shininess), 1, 1000);
 }
 
 Status Validate(const std::vector<Isosurface>& isosurfaces) {

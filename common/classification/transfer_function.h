@@ -2,7 +2,8 @@
 // curve (Points) whose segments have a midpoint and a sharpness (0: linear, 1: a step at the midpoint; between them a Hermite curve,
 // as in vtkPiecewiseFunction). Outside the first and the last point the end value holds; at a step, the last of the points at that value.
 //
-// Beside the curves, isosurfaces may stand at single values, and a second opacity curve may lie over the gradient's magnitude.
+// Beside the curves, isosurfaces may stand at single values, a second opacity curve may lie over the gradient's magnitude, and one material
+// may say how all that the function shows answers light.
 //
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
@@ -10,11 +11,13 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/view/material.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
@@ -68,6 +71,7 @@ struct TransferFunction {
   double opacity_distance = 1;                                // voxel lengths, (0, kMaxOpacityDistance]
   std::vector<Isosurface> isosurfaces = {};                   // at most kMaxIsosurfaces, their values ascend
   std::vector<GradientOpacityPoint> gradient_opacities = {};  // at most kMaxTransferPoints; empty: the factor is 1
+  std::optional<Material> material = {};                      // none: that of the request (OnMaterial)
 
   Rgb Color(double value) const;       // value finite
   double Opacity(double value) const;  // value finite; in [0, 1]
@@ -89,6 +93,7 @@ TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range);
 Status Validate(const TransferFunction& transfer);
 Status Validate(const std::vector<Isosurface>& isosurfaces);
 Status Validate(const std::vector<GradientOpacityPoint>& points);
+Status Validate(const Material& material);
 
 // Largest opacity of any value in [low, high] (exact: at curve points and segment ends; the curves are monotone between points; of a step
 // above `low` both sides count). 0 if low > high. To decide whether a brick can be skipped, ask the ClassificationTable, which renderers
@@ -96,11 +101,12 @@ Status Validate(const std::vector<GradientOpacityPoint>& points);
 double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
-// optional "Points" (x, opacity, midpoint, sharpness, ...); without "Points" the opacity rises linearly over the colour range.
+// optional "Points" (x, opacity, midpoint, sharpness, ...); without "Points" the opacity rises linearly over the colour range. Beyond what
+// ParaView writes, "Material" may have "ambient", "diffuse", "specular" and "shininess"; those that are left out are the standard ones.
 // Colours are interpolated in RGB; the map's ColorSpace is ignored. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
-// The inverse, as a preset called `name`. `transfer` valid; only its curves over data values have a place there.
+// The inverse, as a preset called `name`. `transfer` valid; only its curves over data values and its material have a place there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
 struct ColorMap;

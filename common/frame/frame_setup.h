@@ -24,6 +24,12 @@ class RendererKind;  // common/renderers/renderer_kind.h
 
 using DatasetId = std::uint64_t;  // a volume under a name: the same in every coordinator's life, another one for other voxels. 0: none
 
+// The light volume of a dataset whose voxels the coordinator holds (common/volume/light_volume.h).
+constexpr DatasetId LightVolumeOf(DatasetId dataset) {
+  constexpr DatasetId kMask = 0x6C69676874766F6C;
+  return dataset == kMask ? 1 : dataset ^ kMask;
+}
+
 // A coarser level of a frame's volume, from which some of the boxes are drawn.
 struct CoarserLevel {
   DatasetId dataset = 0;
@@ -39,6 +45,7 @@ struct FrameSetup {
   ValueRange range;                         // data values that the classification table is made for
   std::optional<StoredAt> stored = {};      // none: the coordinator holds the voxels
   std::vector<CoarserLevel> coarser = {};   // finest first
+  std::optional<CoarserLevel> light = {};   // the light volume, if shading.needs_light_volume()
   const RendererKind* renderer = nullptr;   // of Renderers(); lives as long as the program
   std::vector<double> parameters;           // one value for each of renderer->parameters()
   PixelFormat format = PixelFormat::kRgba;  // of local images: renderer->FormatOf(parameters), so that combining need not know renderers

@@ -25,9 +25,12 @@ struct Mesh {
   std::vector<Tetrahedron> tetrahedra;   // of `points`; none has a point twice
   ValuesAt at = ValuesAt::kPoints;
   AlignedVector<float> values;  // by point or by tetrahedron; may not be finite: nothing is seen there
+  // By point, for light (PointGradients); what a MeshCutter cuts out has them. Empty: not known.
+  AlignedVector<Vector3<float>> gradients = {};
 
   std::size_t bytes() const {
-    return points.capacity() * sizeof(points[0]) + tetrahedra.capacity() * sizeof(Tetrahedron) + values.capacity() * sizeof(float);
+    return (points.capacity() + gradients.capacity()) * sizeof(points[0]) + tetrahedra.capacity() * sizeof(Tetrahedron) +
+           values.capacity() * sizeof(float);
   }
 };
 

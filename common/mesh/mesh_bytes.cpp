@@ -15,7 +15,11 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "meshes are little endian and are copied as they are");
 static_assert(sizeof(Vector3<float>) == 12 && std::is_trivially_copyable_v<Vector3<float>> && sizeof(Tetrahedron) == 16);
 
-using Header = std::array<std::uint64_t, 3>;  // points, tetrahedra, at
+struct Header {
+  std::uint64_t points, tetrahedra;
+  std::uint32_t at, lit;
+};
+static_assert(sizeof(Header) == 24);
 
 template <class Vector>
 void Append(std::byte*& to, const Vector& from) {
@@ -52,14 +56,15 @@ Status CheckCells(const Mesh& mesh) {
 }  // namespace
 
 std::vector<std::byte> EncodeMesh(const Mesh& mesh) {
-  const Header header = {mesh.points.size(), mesh.tetrahedra.size(), std::uint64_t(mesh.at)};
+  const Header header = {mesh.points.size(), mesh.tetrahedra.size(), std::uint32_t(mesh.at), mesh.gradients.empty() ? 0U : 1U};
   std::vector<std::byte> bytes(sizeof header + std::span(mesh.points).size_bytes() + std::span(mesh.tetrahedra).size_bytes() +
-                               std::span(mesh.values).size_bytes());
+                               std::span(mesh.values).size_bytes() + std::span(mesh.gradients).size_bytes());
   std::byte* to = bytes.data();
-  Append(to, header);
+  Append(to, std::array{header});
   Append(to, mesh.points);
   Append(to, mesh.tetrahedra);
   Append(to, mesh.values);
+  Append(to, mesh.gradients);
   return bytes;
 }
 
@@ -68,20 +73,23 @@ Result<Mesh> DecodeMesh(std::span<const std::byte> bytes) {
   if (bytes.size() < sizeof header) {
     return Status::DataLoss(fmt::format("mesh: has {} bytes, must have at least {}", bytes.size(), sizeof header));
   }
-  std::memcpy(header.data(), bytes.data(), sizeof header);
-  const auto [points, tetrahedra, at] = header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const auto [points, tetrahedra, at, lit] = header;
   if (points > std::uint64_t(kMaxMeshPoints)) {
     return Status::DataLoss(fmt::format("mesh: has {} points, must have at most {}", points, kMaxMeshPoints));
   }
   if (tetrahedra > std::uint64_t(kMaxTetrahedra)) {
     return Status::DataLoss(fmt::format("mesh: has {} tetrahedra, must have at most {}", tetrahedra, kMaxTetrahedra));
   }
-  if (at > std::uint64_t(ValuesAt::kCells)) return Status::DataLoss(fmt::format("mesh: values are at {}, must be at 0 or 1", at));
+  if (at > std::uint32_t(ValuesAt::kCells)) return Status::DataLoss(fmt::format("mesh: values are at {}, must be at 0 or 1", at));
+  if (lit > (points > 0 ? 1 : 0)) {
+    return Status::DataLoss(fmt::format("mesh: lit is {}, must be 0, or 1 if there are points", lit));
+  }
   Mesh mesh;
   mesh.at = ValuesAt(at);
   const std::uint64_t values = mesh.at == ValuesAt::kPoints ? points : tetrahedra;
-  const std::uint64_t expected =
-      sizeof header + points * sizeof(Vector3<float>) + tetrahedra * sizeof(Tetrahedron) + values * sizeof(float);
+  const std::uint64_t expected = sizeof header + points * sizeof(Vector3<float>) + tetrahedra * sizeof(Tetrahedron) +
+                                 values * sizeof(float) + lit * points * sizeof(Vector3<float>);
   if (bytes.size() != expected) {
     return Status::DataLoss(
         fmt::format("mesh: has {} bytes, must have {} for {} points and {} tetrahedra", bytes.size(), expected, points, tetrahedra));
@@ -90,6 +98,7 @@ Result<Mesh> DecodeMesh(std::span<const std::byte> bytes) {
   Take(from, std::size_t(points), mesh.points);
   Take(from, std::size_t(tetrahedra), mesh.tetrahedra);
   Take(from, std::size_t(values), mesh.values);
+  Take(from, std::size_t(lit * points), mesh.gradients);
   if (Status status = CheckCells(mesh); !status.ok()) return status;
   return mesh;
 }

@@ -4,6 +4,8 @@
 #include <bit>
 #include <utility>
 
+#include "common/mesh/point_gradients.h"
+
 namespace slabstream {
 namespace {
 
@@ -45,7 +47,7 @@ class KeptPoints {
 
 }  // namespace
 
-MeshCutter::MeshCutter(std::shared_ptr<const Mesh> mesh) : mesh_(std::move(mesh)), runs_(*mesh_) {}
+MeshCutter::MeshCutter(std::shared_ptr<const Mesh> mesh) : mesh_(std::move(mesh)), gradients_(PointGradients(*mesh_)), runs_(*mesh_) {}
 
 Mesh MeshCutter::Cut(const Box& box) const {
   Mesh part;
@@ -60,9 +62,11 @@ Mesh MeshCutter::Cut(const Box& box) const {
   });
   const std::size_t points = kept.Count();
   part.points.reserve(points);
+  part.gradients.reserve(points);
   if (part.at == ValuesAt::kPoints) part.values.reserve(points);
   kept.Visit([&](std::size_t point) {
     part.points.push_back(mesh_->points[point]);
+    part.gradients.push_back(gradients_[point]);
     if (part.at == ValuesAt::kPoints) part.values.push_back(mesh_->values[point]);
   });
   for (Tetrahedron& t : part.tetrahedra) std::ranges::transform(t, t.begin(), [&](PointNumber point) { return kept.NumberOf(point); });

@@ -8,7 +8,7 @@
 namespace slabstream {
 namespace {
 
-// A small part of a bin: a background in the bin below the first visible one stays empty.
+// Much less than a bin, so that a background in the bin below the first visible one counts as empty.
 constexpr double kSlackBins = 1.0 / 16;
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "common/planning/frame_plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -9,8 +11,32 @@
 #include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
+#include "common/volume/light_volume.h"
 
 namespace slabstream {
+
+namespace {
+
+// InvalidArgument: too many voxels for a light volume, and nobody holds them.
+Result<CoarserLevel> LightVolumeFrom(const std::string& name, DatasetId dataset, const VolumeSummary& summary) {
+  CoarserLevel light = {dataset, summary.description, summary.stored};
+  const Index3& size = summary.description.geometry.size;
+  if (!summary.stored) {
+    light.dataset = LightVolumeOf(dataset);
+    light.description.geometry = LightGeometry(summary.description.geometry);
+  } else if (!IsLightSized(summary.description.geometry)) {
+    return Status::InvalidArgument(
+        fmt::format("shadows and ambient-occlusion need a level of dataset \"{}\" of at most {} voxels a side, and its coarsest one has "
+                    "{} x {} x {}; slabstream convert makes levels",
+                    name, kMaxLightSide, size.x, size.y, size.z));
+  }
+  return light;
+}
+
+// Towards a light beside the viewer, above on the left.
+Vec3 BesideViewer(const Camera& camera) { return 0.7 * camera.up - 0.6 * camera.right - camera.view_direction; }
+
+}  // namespace
 
 Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   const FrameRequest& request = resolved.frame;
@@ -38,8 +64,16 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
-  setup.shading = request.shading;
+  setup.shading = OnMaterial(request.shading, setup.transfer.material.value_or(Material()));
+  setup.transfer.material.reset();  // workers find it in the shading
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
+  if (setup.shading.shadows > 0 && setup.shading.lights.empty()) setup.shading.lights = {Normalized(BesideViewer(setup.camera))};
+  if (setup.shading.needs_light_volume()) {
+    const CoarserVolume from = resolved.light.value_or(CoarserVolume{setup.dataset, resolved.summary});
+    Result<CoarserLevel> light = LightVolumeFrom(request.dataset, from.dataset, *from.summary);
+    if (!light.ok()) return light.status();
+    setup.light = *std::move(light);
+  }
   setup.termination = request.termination;
   return setup;
 }

@@ -14,6 +14,7 @@
 #include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/volume/grid_map.h"
+#include "common/volume/light_volume.h"
 
 namespace slabstream {
 namespace {
@@ -177,6 +178,14 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels) {
   return summary;
 }
 
+int LightLevelOf(const VolumeLevels& levels) {
+  const int last = int(levels.levels.size()) - 1;
+  for (int level = 0; level < last; ++level) {
+    if (IsLightSized(levels.levels[std::size_t(level)].geometry)) return level;
+  }
+  return last;
+}
+
 Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels) {
   const int count = int(levels.levels.size());
   const VolumeGeometry& finest = levels.levels.front().geometry;
@@ -188,7 +197,9 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
   const VolumeGeometry& overview = levels.overview->description.geometry;
-  const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview);
+  FrameRequest seen = AtLevel(request, finest, overview);
+  seen.shading = {};  // light changes no level, and here there is no level to make a light volume from
+  const Result<ResolvedRequest> resolved = ResolveRequest(std::move(seen), 1, levels.overview);
   if (!resolved.ok()) return resolved.status();
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();

@@ -35,6 +35,10 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels);
 // Errors of ResolveRequest and MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
 Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels);
 
+// The level that the light volume of a dataset is, or is made from: the finest one of at most kMaxLightSide voxels a side, else the
+// coarsest.
+int LightLevelOf(const VolumeLevels& levels);
+
 // The request that shows of `level` what `request` shows of `finest`. `level` describes the same part of the world.
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level);
 

@@ -31,6 +31,8 @@ struct ResolvedRequest {
   // If the picture is drawn from several levels: which one each part, and those beside the summary's, finest first. Null: there are none.
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};
+  // Of a dataset with several levels, if the request shows shadows or ambient occlusion: the level that its light volume is made from.
+  std::optional<CoarserVolume> light = {};
 };
 
 // Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the

@@ -10,11 +10,11 @@
 //   an image of the whole frame           accumulated
 //   the picture, twice                    resampled or averaged if it is not the frame itself; then encoded, until it is sent
 // Images count with all pixels that their boxes can reach (ReachOf). Runs and lent images take less. A group needs the voxels of its
-// worker's boxes, with their halo, and at most as much again for what renderers derive from them (VoxelBytes). Bricks of one value take
-// nothing. If voxels are read in parts (FrameSetup::stored), the worker takes SourceBytes (memory_budget.h) more, for what is being read
-// and decoded, and the renderer says what it derives from them (RendererKind::derived_from_stored). If the dataset is an unstructured grid,
-// VoxelBytes has the cells in all bricks that the boxes touch, too. A worker caches more voxels than a group needs as long as images leave
-// room.
+// worker's boxes, with their halo, and what renderers derive from them (VoxelBytes): at most as much again. Bricks of one value take
+// nothing. If the dataset is an unstructured grid, VoxelBytes has the cells in all bricks that the boxes touch, too. If voxels are read in
+// parts (FrameSetup::stored), the renderer says how much it derives from them (RendererKind::derived_from_stored), and the worker takes
+// SourceBytes (memory_budget.h) more, for what is being read and decoded. Shadows and ambient occlusion take some 32 bytes more a voxel of
+// the light volume. A worker caches more voxels than a group needs as long as images leave room.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +28,8 @@ namespace slabstream {
 // Bytes, of the formula above. `placements`: of a group.
 std::uint64_t GroupImageBytes(const FrameSetup& setup, std::span<const Placement> placements);
 std::uint64_t PictureBytes(const FrameSetup& setup);
+// The light volume, and what shadows and ambient occlusion make of it; 0: the frame has neither.
+std::uint64_t LightBytes(const FrameSetup& setup);
 // `derived_share`: bytes that are derived from a byte of voxels.
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share);
 

@@ -19,11 +19,13 @@ enum class Ability : std::uint8_t {
   kDepthShading = 7,     // lights them by ShadingModel::kDepthGradient, too
   kTransfer = 8,         // shows values by the transfer function
   kLevels = 9,           // draws boxes of one picture from several levels of the dataset
+  kShadows = 10,         // shows shadows and ambient occlusion (Shading)
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 10> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",   "overlay",
-                                                                   "cells",       "lights",      "depth-shading",    "transfer", "levels"};
+inline constexpr std::array<std::string_view, 11> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
+                                                                   "overlay",     "cells",       "lights",           "depth-shading",
+                                                                   "transfer",    "levels",      "shadows"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

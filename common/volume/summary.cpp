@@ -10,6 +10,8 @@
 #include <utility>
 #include <variant>
 
+#include "common/volume/column_ranges.h"
+
 namespace slabstream {
 namespace {
 
@@ -21,19 +23,6 @@ bool IsFinite(T stored) {
     return true;
   }
 }
-
-// The range of stored samples; low > high until a finite one was met.
-template <class T>
-struct StoredRange {
-  T low = std::numeric_limits<T>::max();
-  T high = std::numeric_limits<T>::lowest();
-
-  bool empty() const { return low > high; }
-  void Include(const StoredRange& other) {
-    low = std::min(low, other.low);
-    high = std::max(high, other.high);
-  }
-};
 
 // Data values are kept as float; a value beyond its range becomes the nearest finite float.
 float DataValue(const ValueMapping& mapping, double stored) {
@@ -48,44 +37,6 @@ ValueRange ToDataValues(const StoredRange<T>& stored, const ValueMapping& mappin
   return {min, max};
 }
 
-// Ranges of the bricks of one row of bricks along x. Rows of voxels are first folded onto each other, which vectorises for every type, and
-// then into bricks.
-template <class T>
-class BrickRow {
- public:
-  explicit BrickRow(std::int32_t width)
-      : low_(std::size_t(width), std::numeric_limits<T>::max()), high_(std::size_t(width), std::numeric_limits<T>::lowest()) {}
-
-  void Fold(const T* __restrict row) {
-    T* __restrict low = low_.data();
-    T* __restrict high = high_.data();
-    const std::size_t width = low_.size();
-    for (std::size_t x = 0; x < width; ++x) {
-      const T value = row[x];
-      if constexpr (std::is_floating_point_v<T>) {
-        // Comparisons with NaN are false; infinite values are replaced by the bounds so far.
-        const bool finite = IsFinite(value);
-        const T low_value = finite ? value : low[x], high_value = finite ? value : high[x];
-        low[x] = low_value < low[x] ? low_value : low[x];
-        high[x] = high_value > high[x] ? high_value : high[x];
-      } else {
-        low[x] = std::min(low[x], value);
-        high[x] = std::max(high[x], value);
-      }
-    }
-  }
-
-  StoredRange<T> Brick(std::int32_t brick) const {
-    const std::size_t begin = std::size_t(brick) * kBrick, end = std::min(begin + kBrick, low_.size());
-    StoredRange<T> range;
-    for (std::size_t x = begin; x < end; ++x) range.Include({low_[x], high_[x]});
-    return range;
-  }
-
- private:
-  std::vector<T> low_, high_;
-};
-
 // Of a piece of a volume, calls met(part, row of samples, their number) for each row, and found(part, brick, its range) for each brick.
 // Parallel: each row of bricks by one thread, which calls local() for its `part` first.
 template <class T, class Local, class Met, class Found>
@@ -94,16 +45,19 @@ void ForEachRowOfBricks(const VoxelBlock& piece, Local&& local, Met&& met, Found
   const Index3 first = {begin.x / kBrick, begin.y / kBrick, begin.z / kBrick}, bricks = CubesOver(piece.box.size(), kBrick);
   tbb::parallel_for(0, bricks.y * bricks.z, [&](std::int32_t row_of_bricks) {
     auto* const part = local();
-    BrickRow<T> brick_row(end.x - begin.x);
+    ColumnRanges<T> columns(std::size_t(end.x - begin.x));
     const Index3 row = {first.x, first.y + row_of_bricks % bricks.y, first.z + row_of_bricks / bricks.y};
     for (std::int32_t z = row.z * kBrick; z < std::min((row.z + 1) * kBrick, end.z); ++z) {
       for (std::int32_t y = row.y * kBrick; y < std::min((row.y + 1) * kBrick, end.y); ++y) {
         const T* const samples = piece.samples<T>() + piece.Offset({begin.x, y, z});
-        brick_row.Fold(samples);
+        columns.Fold(samples);
         met(*part, samples, end.x - begin.x);
       }
     }
-    for (std::int32_t brick = 0; brick < bricks.x; ++brick) found(*part, row + Index3{brick, 0, 0}, brick_row.Brick(brick));
+    for (std::int32_t brick = 0; brick < bricks.x; ++brick) {
+      const std::size_t x = std::size_t(brick) * kBrick;
+      found(*part, row + Index3{brick, 0, 0}, columns.Of(x, x + kBrick));
+    }
   });
 }
 
@@ -164,13 +118,13 @@ class PiecesOf {
     const Index3 size = piece.box.size();
     tbb::parallel_for(0, size.z, [&](std::int32_t z) {
       Part<T>& part = parts_.local();
-      BrickRow<T> row(size.x);
+      ColumnRanges<T> columns{std::size_t(size.x)};
       for (std::int32_t y = 0; y < size.y; ++y) {
         const T* const samples = piece.samples<T>() + piece.Offset(piece.box.begin + Index3{0, y, z});
-        row.Fold(samples);
+        columns.Fold(samples);
         part.counts.Add(samples, size.x);
       }
-      for (std::int32_t brick = 0; brick * kBrick < size.x; ++brick) part.range.Include(row.Brick(brick));
+      part.range.Include(columns.Of(0, std::size_t(size.x)));
     });
   }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/renderers/registry.h"
+#include "common/volume/light_volume.h"
 #include "common/wire/request_fields.h"
 
 namespace slabstream {
@@ -132,6 +133,7 @@ void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its pa
   io.Message("range", m.range, &P::range, &P::mutable_range);
   io.Optional("stored", m.stored, &P::has_stored, &P::stored, &P::mutable_stored);
   io.Messages("coarser", m.coarser, &P::coarser, &P::mutable_coarser, kMaxLevels - 1);
+  io.Optional("light", m.light, &P::has_light, &P::light, &P::mutable_light);
   io.Message("camera", m.camera, &P::camera, &P::mutable_camera);
   io.Message("transfer", m.transfer, &P::transfer, &P::mutable_transfer);
   io.Optional("labels", m.looks.labels, &P::has_labels, &P::labels, &P::mutable_labels);
@@ -198,6 +200,16 @@ inline void CheckCoarser(const FrameSetup& setup, Checker& check) {
   }
 }
 
+inline void CheckLight(const FrameSetup& setup, Checker& check) {
+  const auto scope = check.In("light");
+  if (!setup.light) return check.That(!setup.shading.needs_light_volume(), "", "missing");
+  check.That(setup.renderer->Can(Ability::kShadows), "", "not expected by this renderer");
+  const VolumeDescription& description = setup.light->description;
+  check.That(IsLightSized(description.geometry), "description", "more voxels than a light volume has");
+  check.That(description.type == setup.description.type && description.mapping == setup.description.mapping, "description",
+             "of other values than the volume");
+}
+
 inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   ReadRenderer(in, out, check);  // sets the halo, too
   ReadFields(in, out, check);
@@ -219,6 +231,7 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
     if (check.ok()) CheckClip(out, check);
   }
   if (check.ok() && !out.coarser.empty()) CheckCoarser(out, check);
+  if (check.ok()) CheckLight(out, check);
   if (out.looks.labels) check.That(out.layers.labels.has_value(), "labels", "of a dataset without labels");
   if (out.looks.overlay) check.That(out.layers.overlay.has_value(), "overlay", "of a dataset without an overlay");
   if (check.ok() && out.renderer->Can(Ability::kCells))

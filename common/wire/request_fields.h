@@ -108,6 +108,14 @@ void Fields(auto& io, Is<GradientOpacityPoint> auto& m) {
   io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
 }
 
+void Fields(auto& io, Is<Material> auto& m) {
+  using P = v1::Material;
+  io.Finite("ambient", m.ambient, &P::ambient, &P::set_ambient);
+  io.Finite("diffuse", m.diffuse, &P::diffuse, &P::set_diffuse);
+  io.Finite("specular", m.specular, &P::specular, &P::set_specular);
+  io.Finite("shininess", m.shininess, &P::shininess, &P::set_shininess);
+}
+
 void Fields(auto& io, Is<TransferFunction> auto& m) {
   using P = v1::TransferFunction;
   io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
@@ -115,6 +123,7 @@ void Fields(auto& io, Is<TransferFunction> auto& m) {
   io.Finite("opacity_distance", m.opacity_distance, &P::opacity_distance, &P::set_opacity_distance);
   io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
   io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
+  io.Optional("material", m.material, &P::has_material, &P::material, &P::mutable_material);
 }
 
 void Fields(auto& io, Is<ScalarRange> auto& m) {
@@ -169,6 +178,9 @@ void Fields(auto& io, Is<Shading> auto& m) {
   io.Finite("diffuse", m.diffuse, &P::diffuse, &P::set_diffuse);
   io.Finite("specular", m.specular, &P::specular, &P::set_specular);
   io.Finite("shininess", m.shininess, &P::shininess, &P::set_shininess);
+  io.Finite("shadows", m.shadows, &P::shadows, &P::set_shadows);
+  io.Finite("ambient_occlusion", m.ambient_occlusion, &P::ambient_occlusion, &P::set_ambient_occlusion);
+  io.Finite("occlusion_radius", m.occlusion_radius, &P::occlusion_radius, &P::set_occlusion_radius);
 }
 
 void Fields(auto& io, Is<Policy> auto& m) {

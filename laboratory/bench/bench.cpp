@@ -41,8 +41,12 @@ Result<std::vector<BenchCase>> ChooseCases(const BenchOptions& options) {
   }
   if (cases.empty()) cases = StandardBenchCases();
   for (BenchCase& c : cases) {
-    c.renderer = options.renderer.value_or(c.renderer);
-    if (const auto values = ParseParameters(*c.renderer, options.parameters); !values.ok()) {
+    if (options.renderer) {
+      c.renderer = *options.renderer;
+      c.parameters.clear();
+    }
+    for (const auto& [name, text] : options.parameters) c.parameters.insert_or_assign(name, text);
+    if (const auto values = ParseParameters(*c.renderer, c.parameters); !values.ok()) {
       return Status(values.status().code(), fmt::format("CASE '{}': {}", c.name, values.status().message()));
     }
   }

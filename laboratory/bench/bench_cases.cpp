@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
 #include "client/cli/input_volume.h"
 #include "client/request/volume_argument.h"
+#include "common/renderers/sampling_rate.h"
 #include "data/open/any_volume.h"
 
 namespace slabstream {
@@ -44,6 +46,10 @@ std::string Stem(const std::string& path) {
   return stem.empty() ? "volume" : stem.string();
 }
 
+bool SamplesAlongRays(const RendererKind& renderer) {
+  return std::ranges::any_of(renderer.parameters(), [](const RendererParameter& each) { return each.name == SamplingRate().name; });
+}
+
 }  // namespace
 
 BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer) {
@@ -62,7 +68,8 @@ BenchCase SphereCase(const SphereRequest& sphere, double opacity, const Renderer
           .volume = sphere,
           .renderer = renderer,
           .transfer = {SphereTransfer(opacity)},
-          .opacity = opacity};
+          .opacity = opacity,
+          .parameters = SamplesAlongRays(*renderer) ? ParameterTexts{{std::string(SamplingRate().name), "1"}} : ParameterTexts{}};
 }
 
 BenchCase BrainCase() {
@@ -142,6 +149,9 @@ FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& vie
   request.size = size;
   request.view = view;
   request.transfer = bench_case.transfer;
+  request.parameters = bench_case.parameters;
+  // As other programs draw the cells of grids, whom bench/against_vtk compares with.
+  if (bench_case.renderer->Can(Ability::kCells)) request.shading.model = ShadingModel::kNone;
   return request;
 }
 

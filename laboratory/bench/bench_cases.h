@@ -22,6 +22,7 @@ struct BenchCase {
   const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
+  ParameterTexts parameters;      // of the renderer; spheres: one sample a voxel length, as other programs take by default
 };
 
 const std::vector<BenchCase>& StandardBenchCases();
@@ -46,7 +47,7 @@ Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_cas
 inline constexpr double kBenchElevationDegrees = 20, kBenchZoom = 1.732, kBenchFovDegrees = 30;
 ViewParameters BenchView(Projection projection, int index, int frames);
 
-// One of the views, with Phong shading by a headlight; everything else has the default of FrameRequest.
+// One of the views, with Phong shading by a headlight, cells of grids without light; everything else has the default of FrameRequest.
 FrameRequest BenchRequest(const BenchCase& bench_case, const ViewParameters& view, ImageSize size);
 
 }  // namespace slabstream

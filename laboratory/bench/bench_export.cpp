@@ -24,8 +24,7 @@ Result<Json> GridJson(const BenchCase& c, const Volume& volume) {
   return Json{{"file", error ? source->path : path.string()}, {"array", source->options.array}};
 }
 
-std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Json& grid) {
-  const Shading shading;
+std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Material& material, const Json& grid) {
   Json projections = Json::array();
   for (const Projection projection : c.renderer->projections()) projections.push_back(NameOf(projection));
   Json json = {
@@ -43,7 +42,7 @@ std::string SceneJson(const BenchCase& c, const BenchOptions& options, const Jso
         {"zoom", kBenchZoom},
         {"fov_degrees", kBenchFovDegrees}}},
       {"shading",
-       {{"ambient", shading.ambient}, {"diffuse", shading.diffuse}, {"specular", shading.specular}, {"shininess", shading.shininess}}}};
+       {{"ambient", material.ambient}, {"diffuse", material.diffuse}, {"specular", material.specular}, {"shininess", material.shininess}}}};
   if (!grid.is_null()) json["grid"] = grid;
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -64,7 +63,7 @@ Status ExportCase(const BenchCase& bench_case, const BenchOptions& options) {
   if (Status status = WriteTextFile(base + ".transfer.json", FormatParaViewColorMap(*transfer, bench_case.name)); !status.ok()) {
     return status;
   }
-  return WriteTextFile(base + ".scene.json", SceneJson(bench_case, options, *grid));
+  return WriteTextFile(base + ".scene.json", SceneJson(bench_case, options, transfer->material.value_or(Material()), *grid));
 }
 
 }  // namespace slabstream

@@ -45,7 +45,7 @@ Json CaseJson(const BenchRun& run, const BenchResult& result) {
   return {{"case", c.name},
           {"volume", volume},
           {"renderer", c.renderer->name()},
-          {"parameters", Json(run.options.parameters)},
+          {"parameters", Json(c.parameters)},
           {"transfer", preset != nullptr ? Json(*preset) : Json("curve")},
           {"opacity", c.opacity ? Json(*c.opacity) : Json()},
           {"opacity_distance", c.transfer.opacity_distance},

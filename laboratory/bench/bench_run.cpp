@@ -28,7 +28,6 @@ Result<ServiceConnection> Connect(const BenchCase& c, const ConnectionOptions& c
 FrameJob MakeJob(const BenchCase& c, const BenchOptions& options, const std::string& dataset, Projection projection, int index) {
   FrameJob job{BenchRequest(c, BenchView(projection, index, options.frames), {options.size, options.size}), {}, {}};
   job.request.dataset = dataset;
-  job.request.parameters = options.parameters;
   return job;
 }
 

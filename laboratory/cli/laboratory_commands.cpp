@@ -53,7 +53,7 @@ void DeclareBench(const CommandLine& line) {
                 std::string(rate.purpose) + ", of every case; for renderers that take samples along rays"),
             {rate.least, rate.most})
       ->type_name("NUMBER")
-      ->default_str("the renderer's own");
+      ->default_str("1 for spheres, otherwise the renderer's own");
   sub->add_option("--json", options->json_path, "Write all figures and the machine as JSON")->type_name("FILE");
   sub->add_option("--pictures", options->pictures_directory, "Write the first view of each projection to DIR, after measuring")
       ->type_name("DIR");

@@ -24,9 +24,10 @@ void LeaveOutCombining(KeyedFrame& keyed) {
 }  // namespace
 
 Json CaseJson(ExperimentContext& context, const FrameCase& frame) {
-  // All fields are named: if there is one more, this does not compile. RequestOf takes those that are not mentioned below.
+  // All fields are named: if there is one more, this does not compile. RequestOf takes those that are not mentioned below, but for
+  // `parameters`: experiments have their own.
   const auto& [volume, size, view, policy, workers, look] = frame;
-  const auto& [name, purpose, dataset, source, renderer, transfer, opacity] = volume;
+  const auto& [name, purpose, dataset, source, renderer, transfer, opacity, parameters] = volume;
   Json json = {{"look", name}, {"volume", context.volumes().Identity(volume)}};
   if (opacity) json["opacity"] = *opacity;  // for readers: the transfer function decides
   json.update(RequestJson(RequestOf(frame)));

@@ -5,7 +5,7 @@ import dataclasses
 import json
 import os
 import pathlib
-from typing import Any, Sequence
+from typing import Any, Mapping, Sequence
 
 from . import schema
 from .errors import InvalidArgument, NotFound
@@ -13,6 +13,7 @@ from .errors import InvalidArgument, NotFound
 _NUMBERS_PER_POINT = 4
 _MOST_POINTS = 4096
 _MOST_FILE_BYTES = 16 << 20
+_MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 _EDGE = 1e-5  # VTK takes midpoints of 0 and 1 too, as this close to the end
 
 
@@ -26,6 +27,7 @@ class TransferFunction:
 
     colors: Sequence[tuple[float, tuple[float, float, float]]]     #: data value, and straight (r, g, b) from 0 to 1
     opacities: Sequence[tuple[float, ...]]                        #: data value, opacity from 0 to 1[, midpoint, sharpness]
+    material: Mapping[str, float] | None = None                   #: some of ambient, diffuse, specular and shininess
 
     def message(self) -> Any:
         """TransferFunction of the wire. Its ranges are checked by the service."""
@@ -35,6 +37,10 @@ class TransferFunction:
         for value, opacity, *shape in self.opacities:
             midpoint, sharpness = [*shape, 0.5, 0.0][:2] if len(shape) != 1 else (shape[0], 0.0)
             found.opacities.add(value=value, opacity=opacity, midpoint=midpoint, sharpness=sharpness)
+        if self.material is not None:
+            found.material.SetInParent()
+            for name, number in _checked_material(self.material, "transfer").items():
+                setattr(found.material, name, number)
         return found
 
 
@@ -53,18 +59,30 @@ def _curve(preset: dict[str, Any], field: str, name: str) -> list[list[float]]:
     return [found[i : i + _NUMBERS_PER_POINT] for i in range(0, len(found), _NUMBERS_PER_POINT)]
 
 
+def _checked_material(material: Any, name: str) -> dict[str, float]:
+    if not isinstance(material, Mapping):
+        raise InvalidArgument(f"{name}: Material is not an object")
+    for field, number in material.items():
+        if field not in _MATERIAL:
+            raise InvalidArgument(f"{name}: Material has the field {field!r}, must be one of: {', '.join(_MATERIAL)}")
+        if isinstance(number, bool) or not isinstance(number, (int, float)):
+            raise InvalidArgument(f"{name}: Material.{field} is not a number")
+    return dict(material)
+
+
 def from_paraview(document: Any, name: str = "transfer") -> TransferFunction:
     """A colour map as ParaView exports it: the contents of its JSON file. `name` begins messages."""
     preset = document[0] if isinstance(document, list) and document else document
     if not isinstance(preset, dict) or "RGBPoints" not in preset:
         raise InvalidArgument(f"{name}: not a colour map: RGBPoints is missing")
     colors = [(value, (red, green, blue)) for value, red, green, blue in _curve(preset, "RGBPoints", name)]
+    material = _checked_material(preset["Material"], name) if "Material" in preset else None
     if "Points" not in preset:
-        return TransferFunction(colors, [(colors[0][0], 0), (colors[-1][0], 1)])
+        return TransferFunction(colors, [(colors[0][0], 0), (colors[-1][0], 1)], material)
     opacities = []
     for value, opacity, midpoint, sharpness in _curve(preset, "Points", name):
         opacities.append((value, opacity, min(max(midpoint, _EDGE), 1 - _EDGE) if midpoint in (0, 1) else midpoint, sharpness))
-    return TransferFunction(colors, opacities)
+    return TransferFunction(colors, opacities, material)
 
 
 def read_paraview(path: str | os.PathLike[str], name: str) -> TransferFunction:

@@ -104,6 +104,30 @@ TEST_F(RenderTest, WorkersGroupsAxesAndSchemesDoNotChangeThePicture) {
   }
 }
 
+TEST_F(RenderTest, ShadowsAndAmbientOcclusionAreTheSameForAnyNumberOfWorkers) {
+  for (const std::string renderer : {"splat", "raycast", "zbuffer"}) {
+    const std::vector<std::string> look = {"--renderer", renderer, "--azimuth",           "33", "--light", "1,-1,2", "--light", "-1,0,1",
+                                           "--shadows",  "0.9",    "--ambient-occlusion", "1"};
+    const auto with = [&](const std::string& workers) {
+      std::vector<std::string> options = look;
+      options.push_back("--local=" + workers);
+      return Render("of" + workers + ".exr", options);
+    };
+    const PictureFile one = with("1");
+    for (const std::string workers : {"3", "8"}) {
+      EXPECT_LE(LargestDifference(one, with(workers)), renderer == "zbuffer" ? 0.0 : 2e-5 + 1.0 / 1024) << renderer << ' ' << workers;
+    }
+    const PictureFile plain = Render("plain.exr", {"--renderer", renderer, "--azimuth", "33"});
+    EXPECT_GT(LargestDifference(one, plain), 0.1) << renderer;
+  }
+}
+
+TEST_F(RenderTest, ARendererWithoutShadowsSaysSoInOneLine) {
+  ExpectEachRefused({"render", ball_, "-o", "no.png", "--local=1"},
+                    {{{"--renderer", "mip", "--shadows", "1"}, "renderer is 'mip', but shadows needs one of: "},
+                     {{"--shadows", "2"}, "--shadows 2 is out of range [0, 1]"}});
+}
+
 TEST_F(RenderTest, AngleOfViewTurnsThePicture) {
   // From behind, what was on the right is on the left.
   const PictureFile front = Render("front.exr"), back = Render("back.exr", {"--azimuth", "180"});

@@ -237,6 +237,8 @@ TEST_F(ServiceTest, LimitsOfMemoryAreSharedOutAndShown) {
   const ProgramResult too_little = Slabstream({"up", "--detach", "--workers", "2", "--memory", "512MiB", "--listen", endpoint_});
   EXPECT_EQ(too_little.exit_status, 2);
   EXPECT_THAT(too_little.err, HasSubstr("memory 512 MiB is too little for a coordinator and 2 workers, which need 768 MiB"));
+  MustRun({"up", "--detach", "--memory", "1G", "--listen", endpoint_});
+  EXPECT_EQ(json::parse(MustRun({"status", "--json"}).out)["workers"].size(), 1) << "with any number of cores";
 }
 
 TEST_F(ServiceTest, InTheForegroundCtrlCEndsEverything) {

@@ -36,7 +36,8 @@ bool DecodeTransferFunction(std::span<const std::byte> bytes) {
 std::vector<FuzzBytes> TransferFunctionSeeds() {
   std::vector<FuzzBytes> seeds = {
       SeedOf(R"([{"Name": "ramp", "ColorSpace": "RGB", "RGBPoints": [0, 0, 0, 0, 255, 1, 1, 1]}])"),
-      SeedOf(R"({"RGBPoints": [-1.5, 1, 0.5, 0, -1.5, 0, 0.5, 1], "Points": [-2, 0, 0.5, 0, 3e2, 1, 0, 1, 300, 0.25, 1, 0.5]})")};
+      SeedOf(R"({"RGBPoints": [-1.5, 1, 0.5, 0, -1.5, 0, 0.5, 1], "Points": [-2, 0, 0.5, 0, 3e2, 1, 0, 1, 300, 0.25, 1, 0.5]})"),
+      SeedOf(R"({"RGBPoints": [0, 0, 0, 0], "Material": {"ambient": 0.1, "shininess": 40}})")};
   Random random(45);
   for (int i = 0; i < 6; ++i) seeds.push_back(SeedOf(FormatParaViewColorMap(RandomTransfer(random), "random")));
   return seeds;

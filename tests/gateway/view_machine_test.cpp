@@ -24,7 +24,7 @@ Time At(int ms) { return Time{} + milliseconds(100000 + ms); }
 TEST(ViewMachineTest, AViewIsRenderedEncodedSentAndThenStill) {
   ViewMachine machine;
   EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = kFirstCoarseness}));
-  EXPECT_THAT(machine.OnRendered(true, At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
+  EXPECT_THAT(machine.OnRendered(true, false, At(30)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   EXPECT_THAT(machine.OnEncoded(At(35)), ElementsAre(ViewAction{.kind = Kind::kSend, .frame = 1}));
   EXPECT_EQ(machine.wake_time(), At(150));
   EXPECT_THAT(machine.OnAck(1, At(45)), IsEmpty());
@@ -40,7 +40,7 @@ TEST(ViewMachineTest, TheLatestViewWins) {
   ViewMachine machine;
   machine.OnView(1, At(0));
   for (int seq = 2; seq <= 9; ++seq) EXPECT_THAT(machine.OnView(std::uint64_t(seq), At(seq)), IsEmpty());
-  EXPECT_THAT(machine.OnRendered(true, At(30)),
+  EXPECT_THAT(machine.OnRendered(true, false, At(30)),
               ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 9, .coarseness = kFirstCoarseness}));
   EXPECT_THAT(machine.OnView(9, At(31)), IsEmpty());  // not newer
 }
@@ -48,7 +48,7 @@ TEST(ViewMachineTest, TheLatestViewWins) {
 TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(true, At(30));
+  machine.OnRendered(true, false, At(30));
   machine.OnEncoded(At(31));
   machine.OnAck(1, At(40));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
@@ -59,10 +59,10 @@ TEST(ViewMachineTest, ALosslessPictureIsGivenUpForANewView) {
 TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(true, At(30));
+  machine.OnRendered(true, false, At(30));
   machine.OnEncoded(At(31));
   EXPECT_THAT(machine.OnView(2, At(40)), ElementsAre(Is(Kind::kRender)));  // no round trip is known yet
-  EXPECT_THAT(machine.OnRendered(true, At(70)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_THAT(machine.OnRendered(true, false, At(70)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(75)), IsEmpty());
   EXPECT_THAT(machine.OnView(3, At(80)), IsEmpty());  // it would wait behind the second
   EXPECT_THAT(machine.OnAck(7, At(85)), IsEmpty());   // of no frame that was sent
@@ -72,7 +72,7 @@ TEST(ViewMachineTest, NothingIsSentBeforeTheAcknowledgement) {
 TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(true, At(10));
+  machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));  // the lossless picture is being encoded meanwhile
   EXPECT_EQ(machine.Quality(), 50);
@@ -80,10 +80,10 @@ TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) 
   const auto actions = machine.OnView(2, At(500));
   ASSERT_FALSE(actions.empty());
   EXPECT_EQ(actions.back(), (ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 0.5, .coarseness = kFirstCoarseness / 2}));
-  EXPECT_THAT(machine.OnRendered(true, At(510)), ElementsAre(Is(Kind::kEncode)));
+  EXPECT_THAT(machine.OnRendered(true, false, At(510)), ElementsAre(Is(Kind::kEncode)));
   EXPECT_THAT(machine.OnEncoded(At(511)), ElementsAre(Is(Kind::kSend)));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 2, .scale = 1}));
-  EXPECT_THAT(machine.OnRendered(true, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnRendered(true, false, At(660)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
   EXPECT_THAT(machine.OnEncoded(At(670)), IsEmpty());
   EXPECT_THAT(machine.OnAck(2, At(900)), ElementsAre(Is(Kind::kSend)));
 }
@@ -91,11 +91,11 @@ TEST(ViewMachineTest, PicturesAreSmallOnSlowConnectionsUntilTheViewStandsStill) 
 TEST(ViewMachineTest, AFullFrameForTheStillPictureIsCancelled) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(true, At(10));
+  machine.OnRendered(true, false, At(10));
   machine.OnEncoded(At(10));
   machine.OnAck(1, At(410));
   machine.OnView(2, At(500));
-  machine.OnRendered(true, At(510));
+  machine.OnRendered(true, false, At(510));
   machine.OnEncoded(At(511));
   EXPECT_THAT(machine.OnTime(At(650)), ElementsAre(Is(Kind::kRender)));
   EXPECT_THAT(machine.OnView(3, At(660)), testing::Contains(Is(Kind::kCancelRender)));
@@ -105,15 +105,15 @@ TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAsk
   ViewMachine machine;
   const auto render = [](double coarseness) { return ViewAction{.kind = Kind::kRender, .seq = 1, .coarseness = coarseness}; };
   EXPECT_THAT(machine.OnView(1, At(0)), ElementsAre(render(4)));
-  EXPECT_THAT(machine.OnRendered(false, At(100)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
+  EXPECT_THAT(machine.OnRendered(false, false, At(100)), ElementsAre(ViewAction{.kind = Kind::kEncode, .quality = 92}));
   machine.OnEncoded(At(101));
   EXPECT_THAT(machine.OnAck(1, At(110)), IsEmpty());
   EXPECT_EQ(machine.wake_time(), At(150));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(render(2)));  // it takes long: there is one between
-  EXPECT_THAT(machine.OnRendered(false, At(400)), ElementsAre(Is(Kind::kEncode), render(1)));
+  EXPECT_THAT(machine.OnRendered(false, false, At(400)), ElementsAre(Is(Kind::kEncode), render(1)));
   EXPECT_THAT(machine.OnEncoded(At(401)), ElementsAre(Is(Kind::kSend)));
   machine.OnAck(2, At(410));
-  EXPECT_THAT(machine.OnRendered(true, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
+  EXPECT_THAT(machine.OnRendered(true, false, At(900)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
   EXPECT_THAT(machine.OnEncoded(At(950)), ElementsAre(Is(Kind::kSend)));
   EXPECT_EQ(machine.wake_time(), std::nullopt);
 }
@@ -121,11 +121,11 @@ TEST(ViewMachineTest, PicturesOfAViewThatStandsStillBecomeFinerUntilTheyAreAsAsk
 TEST(ViewMachineTest, WhatIsRenderedQuicklyIsAsAskedForAtOnce) {
   ViewMachine machine;
   machine.OnView(1, At(0));
-  machine.OnRendered(false, At(10));
+  machine.OnRendered(false, false, At(10));
   machine.OnEncoded(At(11));
   machine.OnAck(1, At(20));
   EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 1}));
-  machine.OnRendered(true, At(160));
+  machine.OnRendered(true, false, At(160));
   EXPECT_THAT(machine.OnView(2, At(170)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 2}));
 }
 
@@ -133,16 +133,50 @@ TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
   ViewMachine machine;
   machine.OnView(1, At(0));
   machine.OnView(2, At(10));
-  EXPECT_THAT(machine.OnRendered(false, At(300)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 8}));
+  EXPECT_THAT(machine.OnRendered(false, false, At(300)), testing::Contains(ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 8}));
   machine.OnEncoded(At(301));
   machine.OnAck(1, At(310));
-  EXPECT_THAT(machine.OnRendered(false, At(600)),
+  EXPECT_THAT(machine.OnRendered(false, false, At(600)),
               ElementsAre(Is(Kind::kEncode), ViewAction{.kind = Kind::kRender, .seq = 2, .coarseness = 4}));
   machine.OnEncoded(At(601));
   machine.OnAck(2, At(610));
   // The finer picture is given up for a new view.
   EXPECT_THAT(machine.OnView(3, At(620)), ElementsAre(ViewAction{.kind = Kind::kCancelRender},
                                                       ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
+}
+
+TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
+  ViewMachine machine;
+  std::uint64_t frames = 0;
+  const auto rendered = [&](int begin, int ms) {  // the next view; returns what it rendered
+    const auto actions = machine.OnView(std::uint64_t(begin), At(begin));
+    EXPECT_FALSE(actions.empty());
+    const ViewAction render = actions.back();
+    EXPECT_EQ(render.kind, Kind::kRender);
+    machine.OnRendered(true, true, At(begin + ms));
+    machine.OnEncoded(At(begin + ms + 1));
+    machine.OnAck(++frames, At(begin + ms + 2));
+    return render;
+  };
+  EXPECT_FALSE(rendered(100, 40).plain);
+  EXPECT_FALSE(rendered(200, 60).plain);
+  EXPECT_TRUE(rendered(300, 30).plain);
+  EXPECT_TRUE(rendered(400, 20).plain) << "with shadows it might take longer than 50 ms";
+  EXPECT_FALSE(rendered(500, 60).plain);
+  EXPECT_TRUE(rendered(600, 30).plain);
+  // The view stands still: the same picture with its shadows, however long it takes.
+  EXPECT_THAT(machine.OnTime(At(750)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 600}));
+  machine.OnRendered(true, true, At(900));
+  EXPECT_TRUE(machine.wake_time() == std::nullopt || *machine.wake_time() >= At(900));
+}
+
+TEST(ViewMachineTest, PicturesWithoutShadowsAreNotDrawnTwice) {
+  ViewMachine machine;
+  machine.OnView(1, At(0));
+  machine.OnRendered(true, false, At(80));
+  machine.OnEncoded(At(81));
+  machine.OnAck(1, At(90));
+  EXPECT_THAT(machine.OnTime(At(150)), ElementsAre(ViewAction{.kind = Kind::kEncode, .final = true}));
 }
 
 TEST(ViewMachineTest, ARefusedViewIsDoneWith) {
@@ -244,7 +278,7 @@ TEST(ViewMachineTest, AnySpeedsEndWithTheLastViewLossless) {
           renders = false;
           rendered_seq = rendering_seq;
           rendered_coarseness = coarseness <= finest_from ? 1 : coarseness;
-          apply(machine.OnRendered(rendered_coarseness == 1, now));
+          apply(machine.OnRendered(rendered_coarseness == 1, false, now));
           break;
         case Event::kEncoded:
           if (event.number != encoding || !encodes) break;

@@ -135,6 +135,45 @@ TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
   }
 }
 
+// The light volume is a level, which workers read, or which the coordinator holds.
+TEST_F(InPartsTest, ShadowsAreThoseOfVoxelsInMemory) {
+  const std::shared_ptr<const Volume> ball = TestSphere(150);
+  const std::string path = Zarr(ball);
+  const auto shaded = [](const RendererKind* renderer) {
+    FrameRequest request = TestRequest(renderer, 30, 3);
+    request.level = "0";
+    request.shading.shadows = request.shading.ambient_occlusion = 1;
+    return request;
+  };
+  std::vector<Picture> held;
+  Start(path, 2, 0);
+  for (const RendererKind* renderer : VoxelRenderers()) {
+    if (!renderer->Can(Ability::kShadows)) continue;
+    Result<Picture> picture = Render(shaded(renderer));
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    held.push_back(*std::move(picture));
+  }
+  Start(path);
+  auto expected = held.begin();
+  for (const RendererKind* renderer : VoxelRenderers()) {
+    if (!renderer->Can(Ability::kShadows)) continue;
+    const FrameRequest request = shaded(renderer);
+    const Result<Picture> picture = Render(request);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_LE(LargestDifference(picture->image, (expected++)->image, request.size), AllowedDifference(request)) << renderer->name();
+  }
+}
+
+TEST_F(InPartsTest, ShadowsOfAVolumeWithoutACoarseLevelAreRefusedInOneLine) {
+  const std::shared_ptr<const Volume> ball = TestSphere(150);
+  Start(Nrrd(*ball));
+  FrameRequest request = TestRequest(Splatting(), 30, 3);
+  request.shading.shadows = 1;
+  const Result<Picture> picture = Render(request);
+  ASSERT_FALSE(picture.ok());
+  EXPECT_THAT(picture.status().message(), HasSubstr("at most 128 voxels a side, and its coarsest one has 150 x 150 x 150"));
+}
+
 // ---------------------------------------------------------------- compressed streams
 
 class StreamsInPartsTest : public InPartsTest {

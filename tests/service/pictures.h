@@ -11,6 +11,7 @@
 
 #include "client/client.h"
 #include "common/mesh/lattice.h"
+#include "common/mesh/mesh_part.h"
 #include "common/planning/frame_plan.h"
 #include "common/volume/sphere.h"
 #include "tests/support/renderers.h"
@@ -43,7 +44,7 @@ inline LocalImage RenderDirectly(const FrameRequest& request, const Volume& volu
   VoxelBlock copy = MakeVoxelBlock(volume.block.box, volume.block.type);
   copy.bytes = volume.block.bytes;
   BoxLayers layers;
-  layers.cells = volume.cells;
+  if (volume.cells != nullptr) layers.cells = std::make_shared<const Mesh>(MeshCutter(volume.cells).Cut(volume.block.box));
   BoxData data(std::move(copy), std::move(layers));
   RenderControl control;
   RankReport report;

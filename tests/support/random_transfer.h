@@ -24,6 +24,8 @@ inline TransferFunction RandomTransfer(Random& random) {
     transfer.opacities.push_back({value, random.Chance(0.4) ? 0 : random.Real(0, 1), random.Real(0.01, 0.99), sharpness});
   }
   transfer.opacity_distance = random.Real(0.5, 4);
+  const auto share = [&] { return float(random.Real(0, 1)); };
+  if (random.Chance(0.5)) transfer.material = Material{share(), share(), share(), float(random.Real(1, 1000))};
   return transfer;
 }
 

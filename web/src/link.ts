@@ -3,7 +3,7 @@
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import { limitsOf, parametersIn } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
-import type { ColorMap } from "./transfer";
+import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
 
 interface Field<T> { name: string; write: (value: T) => string; read: (text: string) => T | undefined }
@@ -67,15 +67,20 @@ const many = <T extends readonly number[]>(name: string, count: number): Field<r
 const map: Field<ColorMap> = {
   name: "function",
   write: value => [encodeURIComponent(value.name), value.colors.map(p => [p.x, p.r, p.g, p.b].join(",")).join(";"),
-    value.opacities.map(p => (p.mid === 0.5 && p.sharp === 0 ? [p.x, p.y] : [p.x, p.y, p.mid, p.sharp]).join(",")).join(";")].join("|"),
+    value.opacities.map(p => (p.mid === 0.5 && p.sharp === 0 ? [p.x, p.y] : [p.x, p.y, p.mid, p.sharp]).join(",")).join(";"),
+    ...(value.material ? [MATERIAL.map(name => value.material?.[name] ?? "").join(",")] : [])].join("|"),
   read: value => {
-    const [name, colorText, opacityText] = value.split("|");
+    const [name, colorText, opacityText, materialText] = value.split("|");
     const colors = list(colorText ?? "", ";", item => { const n = numbers(item, 4); return n && { x: n[0] as number, r: n[1] as number, g: n[2] as number, b: n[3] as number }; });
     const opacities = list(opacityText ?? "", ";", item => {
       const n = numbers(item, 4) ?? [...(numbers(item, 2) ?? []), 0.5, 0];
       return n.length === 4 ? { x: n[0] as number, y: n[1] as number, mid: n[2] as number, sharp: n[3] as number } : undefined;
     });
-    return colors?.length && opacities?.length ? { name: decodeURIComponent(name ?? ""), colors, opacities } : undefined;
+    if (!colors?.length || !opacities?.length) return undefined;
+    const map = { name: decodeURIComponent(name ?? ""), colors, opacities };
+    if (materialText === undefined) return map;
+    const texts = materialText.split(",");
+    return { ...map, material: Object.fromEntries(MATERIAL.flatMap((each, i) => { const n = texts[i] ? number(texts[i] as string) : undefined; return n === undefined ? [] : [[each, n]]; })) };
   },
 };
 const opacities: Field<Readonly<Record<string, number>>> = {
@@ -104,7 +109,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   azimuth: real("azimuth"), elevation: real("elevation"), roll: real("roll"),
   zoom: real("zoom"), lookAt: nullable(point("look-at")), projection: oneOf("projection", "orthographic", "perspective"),
   renderer: text("renderer", NAME), 
-  shading: text("shading", NAME), lights: many<Vec3>("light", 3), background: text("background", COLOR),
+  shading: text("shading", NAME), lights: many<Vec3>("light", 3), shadows: real("shadows"), ambientOcclusion: real("ambient-occlusion"), background: text("background", COLOR),
   preset: text("transfer", NAME), map: nullable(map), range: nullable(range("scalar-range")), opacityDistance: real("opacity-distance"), slopes,
   surfaces, surfacesAlone: flag("surfaces-alone"), clipBox: nullable(clipBox), clipPlanes: many<ClipPlane>("clip-plane", 4),
   clipMode: oneOf("clip-mode", "keep", "cut-away"),

@@ -1,7 +1,7 @@
 // Sections of the panel: renderer, isosurfaces, light and background.
 import { axesOf } from "./camera";
 import type { Context } from "./context";
-import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, toggle } from "./controls";
+import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
 import { automaticRenderer, can, limitsOf, type Offer, parametersOf, rendererThatCan, renderers, settled, titleOf, titlesThatCan, words } from "./offers";
 import { projectionOf } from "./options";
@@ -144,16 +144,24 @@ export function lightSection(context: Context): HTMLElement {
     };
   });
   const at = (right: number, up: number): void => store.update({ lights: [...store.state.lights, fromEye(right, up, context)] }, "light");
-  const hint = h("p", { class: "hint" }, "The light is at the eye. Fixed lights stay in place when the volume turns; they start at one side of the present view.");
+  const hint = h("p", { class: "hint" }, "The light is at the eye, or beside it for shadows. Fixed lights stay in place when the volume turns; they start at one side of the present view.");
   const adders = h("div", { class: "button-row" }, button("Left", "add", () => at(-50, 35), "quiet"), button("Above", "add", () => at(0, 70), "quiet"), button("Right", "add", () => at(50, 35), "quiet"));
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Towards x"), h("span", {}, "y"), h("span", {}, "z"));
-  const element = section("Light", false, hint, head, list.element, adders);
+  const percent = (value: number): string => `${Math.round(100 * value)} %`;
+  const shadows = slider("Shadows", 0, 1, 0.05, percent, value => store.update({ shadows: value }, "shadows"));
+  const occlusion = slider("Ambient occlusion", 0, 1, 0.05, percent, value => store.update({ ambientOcclusion: value }, "ambient occlusion"));
+  const element = section("Light", false, hint, head, list.element, adders, shadows.element, occlusion.element);
   const update = (): void => {
     const { lights, renderer } = store.state;
-    element.hidden = !can("lights", renderer);
+    const lit = can("lights", renderer), shadowed = can("shadows", renderer);
+    element.hidden = !lit && !shadowed;
+    shadows.set(store.state.shadows);
+    occlusion.set(store.state.ambientOcclusion);
+    shadows.element.hidden = occlusion.element.hidden = !shadowed;
     list.set(lights);
-    head.hidden = lights.length === 0;
-    hint.hidden = lights.length > 0;
+    list.element.hidden = adders.hidden = !lit;
+    head.hidden = !lit || lights.length === 0;
+    hint.hidden = !lit || lights.length > 0;
     for (const child of adders.children) (child as HTMLButtonElement).disabled = lights.length >= MOST_LIGHTS;
   };
   store.subscribe(update, LOOK);

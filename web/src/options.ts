@@ -48,7 +48,11 @@ export function renderOptions(state: State): Options {
   if (state.lookAt) options["look-at"] = state.lookAt.join(",");
   else options["fit"] = true;
   for (const { name } of parametersOf(renderer)) if (state.parameters[name] !== undefined) options[name] = state.parameters[name];
-  if (state.lights.length > 0 && can("lights", renderer)) options["light"] = state.lights.map(light => light.join(","));
+  if (can("shadows", renderer)) {
+    if (state.shadows > 0) options["shadows"] = state.shadows;
+    if (state.ambientOcclusion > 0) options["ambient-occlusion"] = state.ambientOcclusion;
+  }
+  if (state.lights.length > 0 && (can("lights", renderer) || can("shadows", renderer))) options["light"] = state.lights.map(light => light.join(","));
   const surfaces = can("isosurfaces", renderer) ? state.surfaces : [];
   if (surfaces.length > 0) options["isovalue"] = surfaces.map(s => `${s.value}:${s.color}:${s.opacity}`).join(",");
   if (can("transfer", renderer) && (surfaces.length === 0 || !state.surfacesAlone)) Object.assign(options, transferOptions(state));

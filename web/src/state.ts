@@ -25,7 +25,9 @@ export interface State {
   renderer: string;
   parameters: Readonly<Record<string, string>>; // of renderers, by their names; those that are missing have their standard values
   shading: string;
-  lights: readonly Vec3[]; // none: a light at the eye
+  lights: readonly Vec3[]; // none: a light at the eye, or with shadows beside it
+  shadows: number; // strengths
+  ambientOcclusion: number;
   background: string;
   preset: string;
   map: ColorMap | null; // instead of the preset
@@ -63,7 +65,7 @@ export interface State {
 export const INITIAL: State = {
   dataset: "",
   ...PATIENT_START, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
-  renderer: "", parameters: {}, shading: "phong", lights: [], background: "#0d1014",
+  renderer: "", parameters: {}, shading: "phong", lights: [], shadows: 0, ambientOcclusion: 0, background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
@@ -73,7 +75,7 @@ export const INITIAL: State = {
 };
 
 // What undo brings back: the look, not the place from which one looks.
-export const LOOK = ["renderer", "parameters", "shading", "lights", "background", "preset", "map", "range", "opacityDistance", "slopes",
+export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
   "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "window", "level", "measures"] as const;
 const UNDO_STEPS = 200;

@@ -3,7 +3,9 @@ import { clamp, rounded } from "./vec";
 
 export interface ColorPoint { x: number; r: number; g: number; b: number } // colours from 0 to 1
 export interface OpacityPoint { x: number; y: number; mid: number; sharp: number }
-export interface ColorMap { name: string; colors: readonly ColorPoint[]; opacities: readonly OpacityPoint[] } // both ascend and are not empty
+export const MATERIAL = ["ambient", "diffuse", "specular", "shininess"] as const;
+export type Material = Readonly<Partial<Record<(typeof MATERIAL)[number], number>>>; // the page shows none of it, and keeps it
+export interface ColorMap { name: string; colors: readonly ColorPoint[]; opacities: readonly OpacityPoint[]; material?: Material } // both lists ascend and are not empty
 
 const MOST_POINTS = 4096;
 
@@ -16,7 +18,7 @@ export function rangeOf(map: ColorMap): [number, number] {
 export function stretched(map: ColorMap, [low, high]: readonly [number, number]): ColorMap {
   const [from, to] = rangeOf(map);
   const move = (x: number): number => rounded(to > from ? low + ((x - from) / (to - from)) * (high - low) : low);
-  return { name: map.name, colors: map.colors.map(p => ({ ...p, x: move(p.x) })), opacities: map.opacities.map(p => ({ ...p, x: move(p.x) })) };
+  return { ...map, colors: map.colors.map(p => ({ ...p, x: move(p.x) })), opacities: map.opacities.map(p => ({ ...p, x: move(p.x) })) };
 }
 
 function between<P extends { x: number }>(points: readonly P[], x: number): [P, P, number] {
@@ -65,6 +67,7 @@ export function toParaView(map: ColorMap): object[] {
     Name: map.name, ColorSpace: "RGB",
     RGBPoints: map.colors.flatMap(p => [p.x, p.r, p.g, p.b]),
     Points: map.opacities.flatMap(p => [p.x, p.y, p.mid, p.sharp]),
+    ...(map.material && { Material: map.material }),
   }];
 }
 
@@ -81,6 +84,16 @@ function groups(list: unknown, field: string): number[][] {
   return points;
 }
 
+function materialOf(json: unknown): Material {
+  if (typeof json !== "object" || json === null) throw new Error("Material is not an object");
+  for (const [name, value] of Object.entries(json)) {
+    if (!(MATERIAL as readonly string[]).includes(name)) throw new Error(`Material has the field "${name}", must be one of: ${MATERIAL.join(", ")}`);
+    const [least, most] = name === "shininess" ? [1, 1000] : [0, 1];
+    if (typeof value !== "number" || !(value >= least && value <= most)) throw new Error(`Material.${name} is ${String(value)}, must be in [${least}, ${most}]`);
+  }
+  return json as Material;
+}
+
 // From the JSON of a preset or of a list of presets, of which the first counts. Throws an Error with a sentence.
 export function parseParaView(json: unknown): ColorMap {
   const preset = (Array.isArray(json) ? json[0] : json) as Record<string, unknown> | null | undefined;
@@ -93,7 +106,8 @@ export function parseParaView(json: unknown): ColorMap {
     ? [{ x: first.x, y: 0, mid: 0.5, sharp: 0 }, { x: last.x, y: 1, mid: 0.5, sharp: 0 }]
     : groups(preset["Points"], "Points").map(([x = 0, y, mid, sharp]) => ({ x: rounded(x, 8), y: share(y), mid: share(mid ?? 0.5), sharp: share(sharp) }));
   if (opacities.length === 0) throw new Error("Points is empty");
-  return { name: typeof preset["Name"] === "string" ? preset["Name"].slice(0, 80) : "dropped", colors, opacities };
+  const map = { name: typeof preset["Name"] === "string" ? preset["Name"].slice(0, 80) : "dropped", colors, opacities };
+  return preset["Material"] === undefined ? map : { ...map, material: materialOf(preset["Material"]) };
 }
 
 const channel = (c: number): string => Math.round(clamp(c, 0, 1) * 255).toString(16).padStart(2, "0");

@@ -19,6 +19,11 @@ inline float LevelOf(const ShadeTables& tables, const OctetWork& octet, float sl
   return std::clamp(std::sqrt(octet.across + slope * slope) * tables.level_scale - tables.level_offset, 0.0F, tables.last_level);
 }
 
+inline PhongFactors Shared(const PhongFactors& factors, const OctetShares& shares, std::size_t voxel) {
+  return {factors.diffuse * shares.scale[voxel][0] + shares.add[voxel][0],
+          factors.specular * shares.scale[voxel][1] + shares.add[voxel][1]};
+}
+
 }  // namespace slabstream
 #endif
 
@@ -89,7 +94,7 @@ constexpr auto kQuadLanes = [] {
   return lanes;
 }();
 
-template <bool kLevels>
+template <bool kLevels, bool kLit>
 HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
   const QuadTag d;
   const HalfQuadTag half;
@@ -120,7 +125,9 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<
     }
     for (std::size_t begin = 0; begin < kOctet; begin += 4) {
       const auto color = LoadVoxels([&](std::size_t i) { return colors + 4 * std::size_t{record(i).bin}; }, begin);
-      const auto factors = hn::Combine(d, zero_one, LoadPairs([&](std::size_t i) { return &by_normal[record(i).normal].diffuse; }, begin));
+      auto pairs = LoadPairs([&](std::size_t i) { return &by_normal[record(i).normal].diffuse; }, begin);
+      if constexpr (kLit) pairs = hn::MulAdd(pairs, hn::Load(half, octet.shares->scale[begin]), hn::Load(half, octet.shares->add[begin]));
+      const auto factors = hn::Combine(d, zero_one, pairs);
       // 1 in the fourth channel.
       const auto shaded = hn::Min(hn::MulAdd(color, hn::TableLookupLanes(factors, first), hn::TableLookupLanes(factors, second)), one);
       auto opacity = hn::Broadcast<3>(color);
@@ -133,7 +140,7 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<
 
 #else
 
-template <bool kLevels>
+template <bool kLevels, bool kLit>
 HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
   const VoxelTag d;
   // The fourth channel is 1 under every light.
@@ -148,7 +155,8 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<
     for (int i = 0; i < kOctet; ++i) hn::Store(hn::Zero(d), d, octet.rgba + 4 * i);
     for (std::uint32_t rest = octet.occupied; rest != 0; rest &= rest - 1, ++record) {
       const int i = std::countr_zero(rest);
-      const PhongFactors factors = by_normal[record->normal];
+      PhongFactors factors = by_normal[record->normal];
+      if constexpr (kLit) factors = Shared(factors, *octet.shares, std::size_t(i));
       const auto color = hn::Load(d, colors + 4 * std::size_t{record->bin});
       auto opacity = hn::Broadcast<3>(color);
       if constexpr (kLevels) {
@@ -167,7 +175,12 @@ HWY_INLINE void ShadeAll(const ShadeTables& tables, float slope_step, std::span<
 #endif
 
 void Shade(const ShadeTables& tables, float slope_step, std::span<const OctetWork> octets) {
-  tables.levels > 1 ? ShadeAll<true>(tables, slope_step, octets) : ShadeAll<false>(tables, slope_step, octets);
+  if (octets.empty()) return;
+  if (octets.front().shares != nullptr) {
+    tables.levels > 1 ? ShadeAll<true, true>(tables, slope_step, octets) : ShadeAll<false, true>(tables, slope_step, octets);
+  } else {
+    tables.levels > 1 ? ShadeAll<true, false>(tables, slope_step, octets) : ShadeAll<false, false>(tables, slope_step, octets);
+  }
 }
 
 #endif
@@ -202,7 +215,8 @@ void ShadeOctetsReference(const ShadeTables& tables, float slope_step, std::span
         std::fill_n(out, 4, 0.0F);
         continue;
       }
-      const PhongFactors& factors = tables.by_normal[record->normal];
+      PhongFactors factors = tables.by_normal[record->normal];
+      if (octet.shares != nullptr) factors = Shared(factors, *octet.shares, std::size_t(i));
       const float* color = &tables.color[4 * std::size_t{record->bin}];
       float opacity = color[3];
       if (tables.levels > 1) {

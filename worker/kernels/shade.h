@@ -24,12 +24,20 @@ struct ShadeTables {
   float level_scale = 0, level_offset = 0, last_level = 0;
 };
 
+// Shadows and ambient occlusion of the voxels of an octet: the factors of a normal are multiplied by `scale`, then `add` is added; diffuse,
+// then specular.
+struct OctetShares {
+  alignas(64) float scale[kOctet][2];
+  alignas(64) float add[kOctet][2];
+};
+
 // An octet with at least one occupied voxel.
 struct OctetWork {
   const VoxelRecord* records = nullptr;  // of its occupied voxels, in order
   float* rgba = nullptr;                 // 4 * kOctet floats, 64-byte aligned: opacity * (shaded colour, 1), or 0 for empty voxels
   std::uint32_t occupied = 0;            // bit i: voxel i
   float slope = 0, across = 1;           // s of voxel 0, and 1 + t^2. One level: not read
+  const OctetShares* shares = nullptr;   // of all octets of a call, or of none
 };
 
 // slope_step: from voxel to voxel.

@@ -13,6 +13,7 @@
 #include "common/view/phong.h"
 #include "worker/kernels/draw_faces.h"
 #include "worker/kernels/power-inl.h"
+#include "worker/light/light_at-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
@@ -96,6 +97,40 @@ HWY_INLINE void FetchFaces(const FaceShading& shading, const std::uint64_t* HWY_
   }
 }
 
+// Shadows and ambient occlusion on the points that pixels see.
+class LightOnPixels {
+ public:
+  // hit(axis): the points' positions, finite where `seen`.
+  template <class Hit>
+  HWY_INLINE LightOnPixels(const FaceShading& shading, hn::Mask<FloatTag> seen, Hit&& hit) : shading_(shading) {
+    if (!any()) return;
+    const auto position = [&](std::size_t i) HWY_ATTR { return hn::IfThenElseZero(seen, hit(i)); };
+    place_ = PlaceInLight(FloatTag(), *shading.frame_light, position(0), position(1), position(2));
+    first_ = SharesAt(FloatTag(), *shading.frame_light, place_, 0);
+  }
+
+  bool any() const { return shading_.frame_light != nullptr; }
+  // The others need any().
+  HWY_INLINE Floats open() const { return first_.open; }
+  HWY_INLINE Floats Reached(int light) const {
+    return light == 0 || shading_.frame_light->lights == 1 ? first_.reached
+                                                           : SharesAt(FloatTag(), *shading_.frame_light, place_, light).reached;
+  }
+  // Of pixels without a normal: |N.L| is 1/2 on average. If nothing is lit: the mean of the lights.
+  HWY_INLINE Floats WithoutNormal() const {
+    auto sum = hn::Zero(FloatTag());
+    for (int i = 0; i < shading_.light_count; ++i) sum = hn::Add(sum, Reached(i));
+    const float ambient = shading_.phong ? shading_.ambient : 0;
+    const float each = shading_.phong ? shading_.diffuse * 0.5F : 1 / float(shading_.light_count);
+    return hn::Mul(first_.open, hn::Add(Set(ambient), hn::Mul(Set(each), sum)));
+  }
+
+ private:
+  const FaceShading& shading_;
+  LightPlace<FloatTag> place_;
+  LightShares<FloatTag> first_;
+};
+
 HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY_RESTRICT keys, const Staged& staged, std::int32_t column,
                             std::int32_t row, float* HWY_RESTRICT rgba, float* HWY_RESTRICT depth_out,
                             std::uint32_t* HWY_RESTRICT voxel_out) {
@@ -135,17 +170,22 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
   append_rest(x);
   hn::StoreU(hn::IfThenZeroElse(is_empty, index), du, voxel_out);
 
+  // Depths of empty pixels are infinite; their results are not used.
+  const auto px = hn::Add(hn::Iota(df, float(column)), Set(0.5F)), py = Set(float(row) + 0.5F);
+  const auto hit = [&](std::size_t i) {
+    const auto origin =
+        hn::Add(hn::Add(Set(shading.origin[i]), hn::Mul(px, Set(shading.origin_x[i]))), hn::Mul(py, Set(shading.origin_y[i])));
+    const auto direction =
+        hn::Add(hn::Add(Set(shading.direction[i]), hn::Mul(px, Set(shading.direction_x[i]))), hn::Mul(py, Set(shading.direction_y[i])));
+    return hn::Add(origin, hn::Mul(depth, direction));
+  };
+  const LightOnPixels light(shading, seen, hit);
   auto diffuse = Set(shading.diffuse_without_normal), specular = hn::Zero(df);
+  if (light.any()) diffuse = light.WithoutNormal();
   if (shading.phong) {
-    // The point's position in its cell, 0 ... 1. Depths of empty pixels are infinite; their results are not used.
-    const auto px = hn::Add(hn::Iota(df, float(column)), Set(0.5F)), py = Set(float(row) + 0.5F);
+    // The point's position in its cell, 0 ... 1.
     const auto within_cell = [&](std::size_t i, Uints voxel) {
-      const auto origin =
-          hn::Add(hn::Add(Set(shading.origin[i]), hn::Mul(px, Set(shading.origin_x[i]))), hn::Mul(py, Set(shading.origin_y[i])));
-      const auto direction =
-          hn::Add(hn::Add(Set(shading.direction[i]), hn::Mul(px, Set(shading.direction_x[i]))), hn::Mul(py, Set(shading.direction_y[i])));
-      const auto hit = hn::Add(origin, hn::Mul(depth, direction));
-      const auto t = hn::Add(hn::Sub(hit, hn::ConvertTo(df, hn::BitCast(di, voxel))), Set(0.5F));
+      const auto t = hn::Add(hn::Sub(hit(i), hn::ConvertTo(df, hn::BitCast(di, voxel))), Set(0.5F));
       return hn::IfThenElseZero(seen, hn::Min(hn::Max(t, hn::Zero(df)), Set(1)));
     };
     const auto in_x = within_cell(0, x), in_y = within_cell(1, y), in_z = within_cell(2, z);
@@ -164,11 +204,19 @@ HWY_INLINE void ShadePixels(const FaceShading& shading, const std::uint64_t* HWY
     auto lit = hn::Zero(df), shine = hn::Zero(df);
     for (int i = 0; i < shading.light_count; ++i) {
       const auto n_l = Dot(n, shading.light[i]);
-      lit = hn::Add(lit, hn::Abs(n_l));
       const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(shading.light_to_viewer[i]));
-      shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(shading.shininess)));
+      auto facing = hn::Abs(n_l), shines = PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(shading.shininess));
+      if (light.any()) {
+        const auto reached = light.Reached(i);
+        facing = hn::Mul(facing, reached);
+        shines = hn::Mul(shines, reached);
+      }
+      lit = hn::Add(lit, facing);
+      shine = hn::Add(shine, shines);
     }
-    diffuse = hn::IfThenElse(has_normal, hn::Add(Set(shading.ambient), hn::Mul(Set(shading.diffuse), lit)), diffuse);
+    auto of_normal = hn::Add(Set(shading.ambient), hn::Mul(Set(shading.diffuse), lit));
+    if (light.any()) of_normal = hn::Mul(light.open(), of_normal);
+    diffuse = hn::IfThenElse(has_normal, of_normal, diffuse);
     specular = hn::IfThenElseZero(has_normal, hn::Mul(Set(shading.specular), shine));
   }
 

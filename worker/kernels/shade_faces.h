@@ -1,7 +1,8 @@
 // The second pass of the Z-buffer: keys of pixels (draw_faces.h) become colours, depths and indices. Each pixel is shaded once.
 //
 // The depth gives the point that was hit. The normals at the four corners of the face are blended bilinearly, normalised, and lit by Phong
-// (phong.h), all in single precision without fused operations: the same bits on every instruction set.
+// (phong.h) with the shares of FrameLight at the point, all in single precision without fused operations: the same bits on every
+// instruction set.
 #pragma once
 
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include "common/view/camera.h"
 #include "common/view/shading.h"
 #include "worker/kernels/surface_face.h"
+#include "worker/light/frame_light.h"
 
 namespace slabstream {
 
@@ -32,6 +34,8 @@ struct FaceShading {
   float to_viewer[3]{};                                         // unit
   float ambient = 0, diffuse = 0, specular = 0, shininess = 1;
   float diffuse_without_normal = 1;
+
+  const FrameLight::View* frame_light = nullptr;  // shadows and ambient occlusion; null: there are none
 
   std::uint32_t bricks_x = 0, bricks_y = 0;  // of the whole volume, for FaceIndex
 };

@@ -10,6 +10,7 @@ RayBox MakeRayBox(const PaddedVoxels& voxels, const Index3& cells, const Sampled
   result.type = voxels.type;
   result.samples = voxels.samples.get();
   result.origin = {voxels.box.begin.x - 1, voxels.box.begin.y - 1, voxels.box.begin.z - 1};
+  result.padded = voxels.box.size() + Uniform(2 * kPad);
   result.row = voxels.row;
   result.slice = std::int32_t(voxels.slice);
   result.cells = cells;

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "worker/kernels/power-inl.h"
+#include "worker/light/light_at-inl.h"
 #include "worker/rays/ray_look.h"
 #include "worker/rays/ray_packet-inl.h"
 
@@ -76,7 +77,20 @@ struct Light {
   Floats diffuse, specular;
 };
 
-HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
+// fraction^shininess. Whole numbers take a few multiplications.
+HWY_INLINE Floats Shine(const RayLook& look, Floats fraction) {
+  if (look.whole_shininess == 0) return PowerOfFraction(fraction, Set(look.shininess));
+  auto power = Set(1);
+  for (int rest = look.whole_shininess;; fraction = hn::Mul(fraction, fraction)) {
+    if (rest % 2 != 0) power = hn::Mul(power, fraction);
+    rest /= 2;
+    if (rest == 0) return power;
+  }
+}
+
+// `open`: share of what surfaces scatter. reached(number of a light): the share of its light.
+template <class Reached>
+HWY_INLINE Light LightFrom(const RayLook& look, const Gradient& g, Floats open, Reached&& reached) {
   const FloatTag df;
   const auto dot = [&](const Float3& v)
                        HWY_ATTR { return hn::Add(hn::Add(hn::Mul(g.x, Set(v[0])), hn::Mul(g.y, Set(v[1]))), hn::Mul(g.z, Set(v[2]))); };
@@ -86,15 +100,45 @@ HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
   const auto has_gradient = hn::And(hn::Gt(square, hn::Zero(df)), hn::Le(square, Set(std::numeric_limits<float>::max())));
   const auto per_length = hn::Div(Set(1), hn::Sqrt(hn::IfThenElse(has_gradient, square, Set(1))));
   const auto n_v = hn::Mul(dot(look.viewer), per_length);
-  auto lit = hn::Zero(df), shine = hn::Zero(df);
-  for (const RayLook::Light& light : look.lights) {
+  auto lit = hn::Zero(df), lit_without = hn::Zero(df), shine = hn::Zero(df);
+  for (std::size_t i = 0; i < look.lights.size(); ++i) {
+    const RayLook::Light& light = look.lights[i];
+    const auto share = reached(int(i));
     const auto n_l = hn::Mul(dot(light.direction), per_length);
-    lit = hn::Add(lit, hn::Abs(n_l));
+    lit = hn::Add(lit, hn::Mul(share, hn::Abs(n_l)));
+    lit_without = hn::Add(lit_without, share);
     const auto r_v = hn::Sub(hn::Mul(hn::Add(n_l, n_l), n_v), Set(light.to_viewer));
-    shine = hn::Add(shine, PowerOfFraction(hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)), Set(look.shininess)));
+    shine = hn::Add(shine, hn::Mul(share, Shine(look, hn::Min(hn::Max(r_v, hn::Zero(df)), Set(1)))));
   }
-  return {hn::IfThenElse(has_gradient, hn::MulAdd(lit, Set(look.diffuse), Set(look.ambient)), Set(look.diffuse_without_gradient)),
+  const auto facing = hn::IfThenElse(has_gradient, lit, hn::Mul(lit_without, Set(0.5F)));
+  return {hn::Mul(open, hn::MulAdd(facing, Set(look.diffuse), Set(look.ambient))),
           hn::IfThenElseZero(has_gradient, hn::Mul(shine, Set(look.specular)))};
+}
+HWY_INLINE Light LightOf(const RayLook& look, const Gradient& g) {
+  return LightFrom(look, g, Set(1), [](int) HWY_ATTR { return Set(1); });
+}
+
+// The light on matter without surfaces, at places whose positions `light` maps: the mean of the lights.
+HWY_INLINE Light MatterLightAt(const FrameLight::View& light, const SamplePlace& place) {
+  const FloatTag df;
+  const auto& [x, y, z] = place.position;
+  const auto at = PlaceInLight(df, light, x, y, z);
+  const auto first = SharesAt(df, light, at, 0);
+  auto sum = first.reached;
+  for (int i = 1; i < light.lights; ++i) sum = hn::Add(sum, SharesAt(df, light, at, i).reached);
+  return {hn::Mul(first.open, hn::Mul(sum, Set(1.0F / float(light.lights)))), hn::Zero(df)};
+}
+
+// LightOf with shadows and ambient occlusion, at places whose positions `light` maps.
+HWY_INLINE Light LightAt(const RayLook& look, const Gradient& g, const FrameLight::View& light, const SamplePlace& place) {
+  if (!look.phong) return MatterLightAt(light, place);
+  const FloatTag df;
+  const auto& [x, y, z] = place.position;
+  const auto at = PlaceInLight(df, light, x, y, z);
+  const auto first = SharesAt(df, light, at, 0);
+  const auto reached = [&](int number)
+                           HWY_ATTR { return number == 0 || light.lights == 1 ? first.reached : SharesAt(df, light, at, number).reached; };
+  return LightFrom(look, g, first.open, reached);
 }
 
 }  // namespace slabstream::HWY_NAMESPACE

@@ -13,6 +13,7 @@
 
 #include "common/classification/classification_table.h"
 #include "common/frame/frame_setup.h"
+#include "worker/light/frame_light.h"
 #include "worker/renderers/box_voxels.h"
 #include "worker/renderers/brick_ranges.h"
 
@@ -42,6 +43,10 @@ class BoxData {
   void TakeVoxels() { samples_ = voxels_->samples(); }
   void LeaveVoxels() { samples_ = {}; }
 
+  // Shadows and ambient occlusion of the frame that is rendered; null: it has none.
+  void SetLight(std::shared_ptr<const FrameLight> light) { light_ = std::move(light); }
+  const FrameLight* light() const { return light_.get(); }
+
   const BoxLayers& layers() const { return voxels_->layers(); }
   // The types of volume and layers: the one whose samples take most bytes.
   ScalarType widest_type() const;
@@ -70,6 +75,7 @@ class BoxData {
   std::optional<std::tuple<const RendererKind*, TransferFunction, ValueRange>> classified_;  // table_ was made from these
   ClassificationTable table_;
   std::map<std::type_index, std::unique_ptr<BoxCache>> caches_;
+  std::shared_ptr<const FrameLight> light_;
 };
 
 }  // namespace slabstream

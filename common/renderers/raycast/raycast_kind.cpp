@@ -11,6 +11,9 @@
 namespace slabstream::raycast {
 namespace {
 
+// One sample a voxel leaves rings on smooth surfaces under steep transfer functions; docs/rendering.md has a table of errors and times.
+constexpr double kSamplesAVoxel = 2;
+
 // The extinction of a voxel length of the largest opacity that many voxels have, finite, >= 0.
 double Extinction(const CostBasis& basis) {
   const ClassificationTable table = Classify(*basis.transfer, basis.summary->description, basis.summary->range);
@@ -21,7 +24,7 @@ double Extinction(const CostBasis& basis) {
 // passes through: in cells that are drawn in part. Rays leap through the others.
 class RaycastCost : public AnalyticCost {
  public:
-  explicit RaycastCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters)) {
+  explicit RaycastCost(const CostBasis& basis) : drawn_(*basis.drawn), sampling_rate_(SamplingRateOf(basis.parameters, kSamplesAVoxel)) {
     const double extinction = Extinction(basis);
     opaque_depth_ = kEnd / std::max(extinction, 1e-9);
     surfaces_alone_ = !(extinction > 0) && !basis.transfer->isosurfaces.empty();
@@ -77,8 +80,8 @@ class RaycastKind : public RendererKind {
                       .reach = kRayReach,
                       .derived_from_stored = kRayDerived,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
-                                    Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels},
-                      .parameters = {SamplingRate()}}) {}
+                                    Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows},
+                      .parameters = {SamplingRate(kSamplesAVoxel)}}) {}
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);

@@ -55,8 +55,8 @@ class SliceKind : public RendererKind {
   SliceKind()
       : RendererKind({.name = "slice",
                       .title = "slicing",
-                      .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture, without lights",
-                      .abilities = {Ability::kPerspective, Ability::kCells, Ability::kTransfer},
+                      .purpose = "the cells of an unstructured grid, cut by planes parallel to the picture",
+                      .abilities = {Ability::kPerspective, Ability::kCells, Ability::kLights, Ability::kTransfer, Ability::kShadows},
                       .stages = {Stage::kTransform, Stage::kSample},
                       .parameters = {SamplingRate(kPlanes)}}) {}
 

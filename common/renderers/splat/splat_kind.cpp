@@ -24,7 +24,7 @@ class SplatKind : public RendererKind {
                       .purpose = "soft footprints of all visible voxels; for translucent volumes",
                       .derived_from_stored = 2,  // bricks of the voxels, and their cells
                       .along_slices = true,
-                      .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer},
+                      .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer, Ability::kShadows},
                       .footprint = 4,
                       .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite}}) {}
 

@@ -46,7 +46,7 @@ class ZBufferKind : public RendererKind {
                       .purpose = "the surfaces of opaque voxels; for solid objects",
                       .format = PixelFormat::kDepth,
                       .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kLabels, Ability::kLights,
-                                    Ability::kDepthShading, Ability::kTransfer},
+                                    Ability::kDepthShading, Ability::kTransfer, Ability::kShadows},
                       .stages = {Stage::kZBuffer, Stage::kShade}}) {}
 
   // A voxel is opaque if it has half of the largest opacity in the volume's range of values, or at least an isovalue: then it has the

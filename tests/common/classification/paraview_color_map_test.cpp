@@ -56,6 +56,19 @@ TEST(ParaViewColorMap, WithoutPointsRisesOverTheColours) {
   EXPECT_EQ(transfer->Opacity(30), 1);
 }
 
+TEST(ParaViewColorMap, MayHaveAMaterial) {
+  const auto material = [](const std::string& fields) {
+    const std::string json = R"({"RGBPoints": [0, 0, 0, 0], "Material": )" + fields + "}";
+    const Result<TransferFunction> transfer = ParseParaViewColorMap(json, "map.json");
+    EXPECT_TRUE(transfer.ok()) << transfer.status().message();
+    return transfer->material;
+  };
+  EXPECT_EQ(material("{}"), Material());
+  EXPECT_EQ(material(R"({"specular": 0.75, "shininess": 80})"), (Material{.specular = 0.75F, .shininess = 80}));
+  EXPECT_EQ(material(R"({"ambient": 0, "diffuse": 1, "specular": 0.5, "shininess": 1})"), (Material{0, 1, 0.5F, 1}));
+  EXPECT_EQ(ParseParaViewColorMap(kExported, "bone.json")->material, std::nullopt);
+}
+
 TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
   const struct {
     std::string json, named;
@@ -76,6 +89,12 @@ TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
       {R"({"RGBPoints": [1, 0, 0, 0, 0, 0, 0, 0]})", "value of colour point 1 is 0"},
       {R"({"RGBPoints": [0, 0, 0, 0], "Points": [0, 2, 0.5, 0]})", "opacity of opacity point 0 is 2"},
       {R"({"RGBPoints": [0, 0, 0, 0], "Points": null})", "Points is not an array"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Material": 1})", "Material is not an object"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Material": {"diffuse": "0.5"}})", "Material.diffuse is not a number"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Material": {"gloss": 1}})",
+       "Material has the field \"gloss\", must be one of: ambient, diffuse, specular, shininess"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Material": {"specular": 7}})", "specular of the material is 7, but must lie in [0, 1]"},
+      {R"({"RGBPoints": [0, 0, 0, 0], "Material": {"shininess": 0}})", "shininess of the material is 0, but must lie in [1, 1000]"},
       {R"({"RGBPoints": [)" +
            [] {
              std::string s = "0";

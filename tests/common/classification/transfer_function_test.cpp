@@ -134,6 +134,20 @@ TEST(Validate, NamesEveryFieldThatIsWrong) {
   }
 }
 
+TEST(Validate, NamesTheNumberOfAMaterialThatIsWrong) {
+  TransferFunction transfer = {{{0, kRed}}, {{0, 1}}};
+  const auto message = [&](const Material& material) {
+    transfer.material = material;
+    return Validate(transfer).message();
+  };
+  EXPECT_EQ(message({}), "");
+  EXPECT_EQ(message({0, 1, 0, 1000}), "");
+  EXPECT_EQ(message({.ambient = -1}), "ambient of the material is -1, but must lie in [0, 1]");
+  EXPECT_EQ(message({.diffuse = 2}), "diffuse of the material is 2, but must lie in [0, 1]");
+  EXPECT_EQ(message({.specular = std::numeric_limits<float>::quiet_NaN()}), "specular of the material is nan, but must lie in [0, 1]");
+  EXPECT_EQ(message({.shininess = 0.5F}), "shininess of the material is 0.5, but must lie in [1, 1000]");
+}
+
 TEST(MaxOpacity, IsTheLargestOfDenseSamples) {
   Random random(3);
   SCOPED_TRACE(random.trace());

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "common/mesh/lattice.h"
+#include "common/mesh/point_gradients.h"
 #include "tests/common/mesh/mesh_samples.h"
 
 namespace slabstream {
@@ -40,7 +41,8 @@ Box SomeBox(Random& random, const Index3& size) {
 // Bit for bit, since a value may be NaN.
 bool Same(const Mesh& a, const Mesh& b) {
   const auto bits = [](float value) { return std::bit_cast<std::uint32_t>(value); };
-  return a.points == b.points && a.tetrahedra == b.tetrahedra && a.at == b.at && std::ranges::equal(a.values, b.values, {}, bits, bits);
+  return a.points == b.points && a.tetrahedra == b.tetrahedra && a.at == b.at && std::ranges::equal(a.values, b.values, {}, bits, bits) &&
+         a.gradients == b.gradients;
 }
 
 TEST(MeshCutter, CutsTheCellsThatTouchTheBoxInTheirOrder) {
@@ -78,6 +80,10 @@ TEST(MeshCutter, CutsTheCellsThatTouchTheBoxInTheirOrder) {
       expected.tetrahedra.push_back({numbers[t[0]], numbers[t[1]], numbers[t[2]], numbers[t[3]]});
       if (mesh->at == ValuesAt::kCells) expected.values.push_back(mesh->values[cell]);
     }
+    const AlignedVector<Vector3<float>> gradients = PointGradients(*mesh);
+    for (std::size_t point = 0; point < kept.size(); ++point) {
+      if (kept[point]) expected.gradients.push_back(gradients[point]);
+    }
     EXPECT_TRUE(Same(MeshCutter(mesh).Cut(box), expected));
   }
 }
@@ -88,7 +94,9 @@ TEST(MeshCutter, OfTheWholeLatticeTakesTheWholeMeshAndOfNothingNothing) {
   const Index3 size = {20, 30, 40};
   const auto mesh = std::make_shared<const Mesh>(SomeMesh(random, size));
   const MeshCutter cutter(mesh);
-  EXPECT_TRUE(Same(cutter.Cut({{0, 0, 0}, size}), *mesh));
+  Mesh lit = *mesh;
+  lit.gradients = PointGradients(*mesh);
+  EXPECT_TRUE(Same(cutter.Cut({{0, 0, 0}, size}), lit));
   EXPECT_TRUE(cutter.Cut({{5, 5, 5}, {5, 9, 9}}).tetrahedra.empty());
   EXPECT_GE(cutter.bytes(), mesh->bytes());
 }
@@ -98,7 +106,8 @@ TEST(MeshBytes, BecomeTheSameMesh) {
   SCOPED_TRACE(random.trace());
   for (int round = 0; round < 20; ++round) {
     const Index3 size = {random.Integer(1, 20), random.Integer(1, 20), random.Integer(1, 20)};
-    const Mesh mesh = round == 0 ? Mesh() : SomeMesh(random, size);
+    Mesh mesh = round == 0 ? Mesh() : SomeMesh(random, size);
+    if (round % 2 == 0) mesh.gradients = PointGradients(mesh);
     const Result<Mesh> decoded = DecodeMesh(EncodeMesh(mesh));
     ASSERT_TRUE(decoded.ok()) << decoded.status().message();
     EXPECT_TRUE(Same(*decoded, mesh));
@@ -137,12 +146,19 @@ TEST(MeshBytes, SayWhatIsWrongWithThem) {
   bytes = EncodeMesh(good);
   bytes[16] = std::byte{2};
   EXPECT_EQ(DecodeMesh(bytes).status().message(), "mesh: values are at 2, must be at 0 or 1");
+  bytes = EncodeMesh(good);
+  bytes[20] = std::byte{2};
+  EXPECT_EQ(DecodeMesh(bytes).status().message(), "mesh: lit is 2, must be 0, or 1 if there are points");
+  bytes[20] = std::byte{1};
+  EXPECT_EQ(DecodeMesh(bytes).status().message(), "mesh: has 104 bytes, must have 152 for 4 points and 1 tetrahedra");
 }
 
 TEST(MeshBytes, ThatAreCutOffOrAlteredDoNoHarm) {
   Random random(94);
   SCOPED_TRACE(random.trace());
-  const std::vector<std::byte> good = EncodeMesh(MakeTetrahedralCube({4, 4, 4}, 2, random, 0.2, [](const Vec3& p) { return p.x; }));
+  Mesh mesh = MakeTetrahedralCube({4, 4, 4}, 2, random, 0.2, [](const Vec3& p) { return p.x; });
+  mesh.gradients = PointGradients(mesh);
+  const std::vector<std::byte> good = EncodeMesh(mesh);
   for (std::size_t length = 0; length < good.size(); ++length) EXPECT_FALSE(DecodeMesh(std::span(good).first(length)).ok());
   for (int i = 0; i < 5000; ++i) {
     std::vector<std::byte> bytes = good;

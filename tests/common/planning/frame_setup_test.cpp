@@ -57,6 +57,22 @@ TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
   EXPECT_EQ(setup.halo, kHalo);
 }
 
+TEST(PlanFrame, TheMaterialOfATransferFunctionIsLit) {
+  FrameRequest request = SomeRequest();
+  const VolumeSummary summary = FullSummary({20, 20, 20});
+  TransferFunction function = {.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  request.transfer.choice = function;
+  const FrameSetup plain = SetupOf(request, summary);
+  EXPECT_EQ(plain.shading, request.shading);
+  function.material = {.ambient = 0.5F, .diffuse = 0.25F, .specular = 0.75F, .shininess = 80};
+  request.transfer.choice = function;
+  const FrameSetup setup = SetupOf(request, summary);
+  EXPECT_EQ(setup.shading, (Shading{.ambient = 0.5F, .diffuse = 0.25F, .specular = 0.75F, .shininess = 80}));
+  EXPECT_EQ(setup.transfer, plain.transfer) << "nothing is classified anew";
+  request.shading.specular = 0.125F;  // what a request says itself
+  EXPECT_EQ(SetupOf(request, summary).shading, (Shading{.ambient = 0.5F, .diffuse = 0.25F, .specular = 0.125F, .shininess = 80}));
+}
+
 // Splatting renders a grid along the slices and the display worker makes the picture of it; the Z-buffer renders the supersampled picture.
 TEST(PlanFrame, TheFrameIsWhatThePipelineRenders) {
   FrameRequest request = SomeRequest();

@@ -294,6 +294,8 @@ TEST(FieldChecks, Clients) {
       {[&](auto& e) { frame(e)->mutable_transfer()->mutable_function(); }, "SubmitFrame.frame"},  // without points
       {[&](auto& e) { frame(e)->mutable_transfer()->set_opacity_distance(0); }, "SubmitFrame.frame: transfer.opacity_distance"},
       {[&](auto& e) { frame(e)->mutable_shading()->set_shininess(0); }, "SubmitFrame.frame: shading.shininess"},
+      {[&](auto& e) { frame(e)->mutable_shading()->set_shadows(1.5); },
+       "SubmitFrame.frame: shading.shadows is 1.5, but must lie in [0, 1]"},
       {[&](auto& e) { frame(e)->set_termination(0.75); }, "SubmitFrame.frame: termination"},
       {[&](auto& e) { frame(e)->mutable_policy()->set_groups(1025); }, "SubmitFrame.frame.policy.groups: 1025 is not in [0, 1024]"},
       {[&](auto& e) { frame(e)->mutable_policy()->set_teams(1025); }, "SubmitFrame.frame.policy.teams: 1025 is not in [1, 1024]"},

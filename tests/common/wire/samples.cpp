@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "common/volume/light_volume.h"
 #include "common/wire/limits.h"
 
 namespace slabstream {
@@ -38,11 +39,15 @@ VolumeDescription Description() {
 TransferFunction Curve() {
   return {{{-1e308, {0, 0.25F, 1}}, {0, {1, 1, 1}}, {0, {0, 0, 0}}, {1e308, {0.5F, 0.5F, 0.5F}}},
           {{-1, 0, 0.5, 0}, {7, 1, 0.001, 1}},
-          kMaxOpacityDistance};
+          kMaxOpacityDistance,
+          {},
+          {},
+          Material{0, 1, 0.5F, 1000}};
 }
 
 Shading ManyLights() {
   Shading shading{.model = ShadingModel::kNone, .lights = {}, .ambient = 0, .diffuse = 1, .specular = 0.5F, .shininess = 1000};
+  shading.occlusion_radius = 0.5F;
   for (int i = 0; i < kMaxLights; ++i) shading.lights.push_back({-1.0 * i, 1e-3, 1e3});
   return shading;
 }
@@ -62,6 +67,14 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   SetView(view, {640, 480}, setup);
   setup.transfer = Curve();
   setup.shading = ManyLights();
+  if (renderer->Can(Ability::kShadows)) {
+    setup.shading.shadows = 0.25F;
+    setup.shading.ambient_occlusion = 1;
+    setup.light = CoarserLevel{kMax64 - 7, setup.description};
+    setup.light->description.geometry = LightGeometry(setup.description.geometry);
+    if (ranks > 1)
+      setup.light->stored = StoredAt{.source = "/data/scan.ome.zarr", .level = 5, .version = 1, .block = {{0, 0, 0}, {64, 32, 1}}};
+  }
   setup.termination = 0;
   setup.halo = 16;
   const Index3 size = setup.description.geometry.size;

@@ -22,6 +22,9 @@ TEST(Shading, ValidateNamesTheFieldAndTheLimits) {
   EXPECT_EQ(message([](auto& s) { s.diffuse = 2; }), "shading.diffuse is 2, but must lie in [0, 1]");
   EXPECT_NE(message([&](auto& s) { s.specular = kNan; }).find("shading.specular"), std::string::npos);
   EXPECT_EQ(message([](auto& s) { s.shininess = 0; }), "shading.shininess is 0, but must lie in [1, 1000]");
+  EXPECT_EQ(message([](auto& s) { s.shadows = 1.5F; }), "shading.shadows is 1.5, but must lie in [0, 1]");
+  EXPECT_EQ(message([](auto& s) { s.ambient_occlusion = -1; }), "shading.ambient_occlusion is -1, but must lie in [0, 1]");
+  EXPECT_EQ(message([](auto& s) { s.occlusion_radius = 2; }), "shading.occlusion_radius is 2, but must lie in [0.01, 1] longest sides");
   EXPECT_NE(message([](auto& s) { s.lights.resize(9, Vec3{0, 0, 1}); }).find("shading.lights has 9"), std::string::npos);
 }
 

@@ -133,6 +133,9 @@ Changes<Shading> ChangesOfShading() {
       {"diffuse", [](auto& s) { s.diffuse = 0.7F; }},
       {"specular", [](auto& s) { s.specular = 0.3F; }},
       {"shininess", [](auto& s) { s.shininess = 30; }},
+      {"shadows", [](auto& s) { s.shadows = 0.5F; }},
+      {"ambient-occlusion", [](auto& s) { s.ambient_occlusion = 0.5F; }},
+      {"occlusion-radius", [](auto& s) { s.occlusion_radius = 0.5F; }},
   };
 }
 

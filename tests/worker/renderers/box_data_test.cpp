@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 
+#include "common/mesh/mesh_part.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
 #include "tests/worker/renderers/render_support.h"
@@ -291,7 +292,8 @@ TEST(Renderers, DrawPaddedVoxelsAsAnyOthers) {
       RankReport report;
       return MakeRenderer(*kind)->Render(data, blobs.block.box, setup, {}, RenderControl(), report).value();
     };
-    BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), BoxLayers{.cells = blobs.cells}));
+    const auto cells = std::make_shared<const Mesh>(MeshCutter(blobs.cells).Cut(blobs.block.box));
+    BoxData data(std::make_shared<BoxVoxels>(WrittenRowByRow(blobs.block), BoxLayers{.cells = cells}));
     const LocalImage drawn = render(data), expected = render(*BoxFor(*kind, blobs, blobs.block.box));
     EXPECT_EQ(drawn.bounds, expected.bounds);
     EXPECT_TRUE(std::ranges::equal(drawn.rgba, expected.rgba));

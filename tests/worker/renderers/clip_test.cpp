@@ -255,8 +255,8 @@ TEST(Slices, ShowTheValuesInTheirPlane) {
 void ExpectFlatCut(const RendererKind* renderer, float tolerance) {
   std::mt19937 random(kSeed);
   // Values vary from voxel to voxel, so that gradients point everywhere; all are opaque, in one colour.
-  const Volume volume =
-      MakeVolume({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, [&](const Index3&) { return 100.0 + double(random() % 100); });
+  const Volume volume = VolumeFor(
+      *renderer, MakeVolume({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, [&](const Index3&) { return 100.0 + double(random() % 100); }));
   for (int view = 0; view < 6; ++view) {
     SetupOptions options;
     options.renderer = renderer;
@@ -283,6 +283,7 @@ void ExpectFlatCut(const RendererKind* renderer, float tolerance) {
 }
 
 TEST(ClippedRaycasting, LightsCutsAsFlatFaces) { ExpectFlatCut(FindRenderer("raycast"), 0.002F); }
+TEST(ClippedSlicing, LightsCutsAsFlatFaces) { ExpectFlatCut(FindRenderer("slice"), 0.002F); }
 TEST(ClippedZBuffer, LightsCutsAsFlatFaces) { ExpectFlatCut(ZBuffer(), 0.002F); }
 // Normals are coded within 0.8 degrees.
 TEST(ClippedSplatting, LightsCutsAsFlatFaces) { ExpectFlatCut(Splatting(), 0.03F); }

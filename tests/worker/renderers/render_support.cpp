@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <type_traits>
 
@@ -11,6 +12,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/kernels/combine.h"
 #include "common/mesh/mesh_part.h"
+#include "common/volume/light_volume.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/renderers.h"
 
@@ -73,7 +75,19 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options) {
   setup.transfer = options.transfer;
   setup.shading = options.shading;
   setup.termination = options.termination;
+  if (setup.shading.needs_light_volume()) {
+    // What is kept between frames is kept by these numbers.
+    static std::atomic<DatasetId> last = 0;
+    setup.dataset = ++last;
+    setup.light = CoarserLevel{LightVolumeOf(setup.dataset), volume.description};
+    setup.light->description.geometry = LightGeometry(volume.description.geometry);
+  }
   return setup;
+}
+
+std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup) {
+  if (!setup.light) return nullptr;
+  return MakeFrameLight([&] { return MakeLightVolume(volume.block, volume.description).block; }, setup);
 }
 
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel) {
@@ -138,6 +152,7 @@ namespace {
 
 LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
   const auto data = BoxFor(*setup.renderer, volume, box, setup.halo);
+  data->SetLight(LightOf(volume, setup));
   RankReport report;
   return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
 }

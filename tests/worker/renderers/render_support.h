@@ -40,6 +40,8 @@ struct SetupOptions {
   double termination = 0;
 };
 FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
+// Null: the setup needs none.
+std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup);
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1);
 
 // Physical length of the ray of a pixel inside the volume.

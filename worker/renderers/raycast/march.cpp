@@ -10,11 +10,18 @@
 #include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
+#include "worker/renderers/raycast/gradient_bricks-inl.h"
 #include "worker/renderers/raycast/layer_samples-inl.h"
 #include "worker/renderers/raycast/surface_walk-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
+
+// The light on samples with this gradient, if the frame has any light.
+HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, const SamplePlace& place) {
+  return work.light != nullptr ? LightAt(*work.look, gradient, *work.light, place) : LightOf(*work.look, gradient);
+}
+HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.light != nullptr; }
 
 // Adds a crossing with an isosurface as labels have it: tinted, thinned or taken away like a sample there, and not in the place of a label
 // that is matter.
@@ -45,7 +52,7 @@ HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Mask rays, Floats 
   for (auto crossing = due(); !hn::AllFalse(df, crossing); crossing = due()) {
     count += hn::CountTrue(df, crossing);
     Light light = {Set(1), hn::Zero(df)};
-    if (look.phong) light = LightOf(look, GradientAt(LoadNeighbours<T>(*work.box, walk.place(), crossing), walk.place()));
+    if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, walk.place(), crossing), walk.place()), walk.place());
     const float* const colors = look.surface_looks.data();
     if (work.layers != nullptr && work.layers->labels != nullptr) {
       AddLabelled(work, crossing, walk.place(), walk.look(), light, sums);
@@ -69,18 +76,18 @@ HWY_INLINE LayeredLight LightOfLayers(const MarchWork& work, const SamplePlace& 
   if (!hn::AllFalse(df, matter)) {
     gradient = Choose(matter, IndicatorGradientAt(*work.layers, *work.box, place, at, sample.label), gradient);
   }
-  const Light volume = LightOf(*work.look, gradient);
+  const Light volume = LightOn(work, gradient, place);
   if (hn::AllFalse(df, hn::And(visible, hn::Gt(sample.overlay_share, hn::Zero(df))))) return {volume, volume};
-  return {volume, LightOf(*work.look, Choose(on_face, gradient, GradientAt(sample.overlay, place)))};
+  return {volume, LightOn(work, Choose(on_face, gradient, GradientAt(sample.overlay, place)), place)};
 }
 
 // Adds samples with layers.
-HWY_INLINE void AddLayered(const MarchWork& work, Mask rays, Floats opacity, Ints entry, const LayeredSample& sample,
+HWY_INLINE void AddLayered(const MarchWork& work, Mask rays, Floats opacity, const Entries& entries, const LayeredSample& sample,
                            const LayeredLight& light, Sums& sums) {
   const FloatTag df;
   const RayLayers& layers = *work.layers;
   sums.AddChannels(rays, opacity, [&](std::size_t channel) HWY_ATTR {
-    auto color = hn::GatherIndex(df, work.look->entries.data() + channel, entry);
+    auto color = entries.part[channel];
     if (layers.labels != nullptr) {
       color = Lerp(sample.tint, color, hn::GatherIndex(df, layers.labels->entries.data() + channel, sample.label_entry));
     }
@@ -100,46 +107,71 @@ struct Stride {
   Mask sampled;
   Floats steps;
 };
-// Rays in empty space leap ahead; the others go on to their next sample.
-HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask alive) {
+// Rays in empty space leap ahead; the others go on to their next sample. `inside`: rays in the box, some of which may have ended.
+HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask inside, Mask alive) {
   const FloatTag df;
   const IntTag di;
-  const auto cell = CellOf<kCellShift>(place, work.box->cells, alive);
+  const auto cell = CellOf<kCellShift>(place, work.box->cells, inside);
   const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
   const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
   return {hn::AndNot(empty, alive),
           hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
 }
 
+// Samples, from the stored voxels alone. A gradient is computed where it is asked for.
+template <class T>
+struct StoredSamples {
+  Neighbours<T> neighbours;
+  Floats value;
+
+  HWY_INLINE StoredSamples(const MarchWork& work, const SamplePlace& place, Mask sampled, GradientBricks* /*bricks*/, RayBricks& /*rays*/)
+      : neighbours(LoadNeighbours<T>(*work.box, place, sampled)), value(Interpolate(neighbours, place)) {}
+  HWY_INLINE Gradient GradientOf(const SamplePlace& place) const { return GradientAt(neighbours, place); }
+};
+// Samples, from bricks that have the gradients, too.
+template <class T>
+struct LitSamples {
+  Floats value;
+  Gradient gradient;
+
+  HWY_INLINE LitSamples(const MarchWork& work, const SamplePlace& place, Mask sampled, GradientBricks* bricks, RayBricks& rays) {
+    const Ints at = CornersOf<T>(*work.box, place, sampled, *bricks, rays);
+    const LitSample sample = InterpolateCorners<T>(bricks->corners(), at, place);
+    value = sample.value;
+    gradient = sample.gradient;
+  }
+  HWY_INLINE const Gradient& GradientOf(const SamplePlace& /*place*/) const { return gradient; }
+};
+
 // Samples after classification. Lanes that are not visible mean nothing.
 template <Samples kSamples>
 struct Classified {
-  Ints entry;
+  Entries entries;
   Floats opacity;
   Mask visible;
   Gradient gradient;  // if opacities depend on it
   std::conditional_t<kSamples == Samples::kLayered, LayeredSample, std::monostate> layered;
 };
-template <class T, Samples kSamples>
-HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const SamplePlace& place, const Neighbours<T>& neighbours,
-                                                Mask sampled) {
+// `at`: as in Neighbours, of kLayered.
+template <Samples kSamples, class Voxels>
+HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const SamplePlace& place, const Voxels& voxels, Mask sampled,
+                                                Ints at) {
   const FloatTag df;
   const RayLook& look = *work.look;
   const auto zero = hn::Zero(df);
   Classified<kSamples> of;
-  const auto value = Interpolate(neighbours, place);
-  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-  of.entry = EntryOf(look, value, finite);
-  of.opacity = hn::GatherIndex(df, look.entries.data() + 3, of.entry);
+  const auto finite = hn::Le(hn::Abs(voxels.value), Set(std::numeric_limits<float>::max()));
+  of.entries = EntriesAt(look.entries.data(), EntryOf(look, voxels.value, finite));
+  of.opacity = of.entries.part[3];
   of.visible = hn::And(hn::And(sampled, finite), hn::Gt(of.opacity, zero));
   of.gradient = {zero, zero, zero};
   if (kSamples != Samples::kPlain && !look.gradient_factors.empty() && !hn::AllFalse(df, of.visible)) {
-    of.gradient = GradientAt(neighbours, place);
+    of.gradient = voxels.GradientOf(place);
     of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
     of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
   }
   if constexpr (kSamples == Samples::kLayered) {
-    of.layered = WithLayers(*work.layers, *work.box, place, neighbours.at, hn::IfThenElseZero(finite, of.opacity));
+    of.layered = WithLayers(*work.layers, *work.box, place, at, hn::IfThenElseZero(finite, of.opacity));
     of.opacity = of.layered.opacity;
     of.visible = hn::And(sampled, hn::Gt(of.opacity, zero));
   }
@@ -157,30 +189,31 @@ HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, 
 }
 
 // Lights samples k and adds those that are visible.
-template <class T, Samples kSamples>
-HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floats k, const PacketPart* part,
-                           const Neighbours<T>& neighbours, const Classified<kSamples>& samples, Floats opacity, Sums& sums) {
+template <Samples kSamples, class Voxels>
+HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floats k, const PacketPart* part, const Voxels& voxels, Ints at,
+                           const Classified<kSamples>& samples, Floats opacity, Sums& sums) {
   const RayLook& look = *work.look;
   Light light = {Set(1), hn::Zero(FloatTag())};
   [[maybe_unused]] LayeredLight lights = {light, light};
-  if (look.phong) {
+  if (IsLit(work)) {
     const bool has_gradient = kSamples != Samples::kPlain && !look.gradient_factors.empty();
-    Gradient gradient = has_gradient ? samples.gradient : GradientAt(neighbours, place);
+    Gradient gradient = has_gradient ? samples.gradient : voxels.GradientOf(place);
     [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
     if constexpr (kSamples != Samples::kPlain) {
       on_face = hn::Lt(k, part->face_end);
       gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
     }
     if constexpr (kSamples == Samples::kLayered) {
-      lights = LightOfLayers(work, place, neighbours.at, samples.layered, samples.visible, gradient, on_face);
+      lights = LightOfLayers(work, place, at, samples.layered, samples.visible, gradient, on_face);
     } else {
-      light = LightOf(look, gradient);
+      light = LightOn(work, gradient, place);
     }
   }
   if constexpr (kSamples == Samples::kLayered) {
-    AddLayered(work, samples.visible, opacity, samples.entry, samples.layered, lights, sums);
+    AddLayered(work, samples.visible, opacity, samples.entries, samples.layered, lights, sums);
   } else {
-    sums.Add(samples.visible, opacity, look.entries.data(), samples.entry, light);
+    sums.AddChannels(samples.visible, opacity,
+                     [&](std::size_t channel) HWY_ATTR { return Sums::Lit(samples.entries.part[channel], light); });
   }
 }
 
@@ -189,10 +222,11 @@ struct MarchingPacket {
   const RayPacket& of_frame;
   const RayPacket& among;
   const LeapScales& leaps;
+  GradientBricks* bricks;
 };
 
 // Samples `owned` of the rays, which lie in `part`; of kPlain it is null. Returns how many samples were shaded.
-template <class T, Samples kSamples>
+template <class T, Samples kSamples, class Voxels>
 HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned,
                                       const PacketPart* part, Sums& gathered) {
   constexpr bool kAll = kSamples != Samples::kPlain;
@@ -204,7 +238,8 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
 
   // Each ray advances separately: its next sample is k.
   auto k = owned.begin;
-  auto alive = hn::Lt(k, owned.end);
+  // Addresses depend on `inside` alone, so that loads need not wait for the samples before.
+  auto inside = hn::Lt(k, owned.end), alive = inside;
   std::uint64_t shaded = 0;
   SurfaceWalk<T> surfaces(work, packet.among);
   const bool has_surfaces = kAll && !look.isovalues.empty();
@@ -219,18 +254,22 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   if (has_ends) ends = EndSamplesOf(*work.rays, packet.of_frame, LeapScalesOf(packet.of_frame), part);
 
   Sums sums = gathered;
+  RayBricks bricks;
   bool in_matter = false;  // most of the last samples were visible
   while (!hn::AllFalse(df, alive)) {
     const SamplePlace place = PlaceSample(packet.among, *work.box, k);
     Stride stride = {alive, one};
-    if (!in_matter) stride = LeapFrom(work, packet.leaps, place, alive);
+    if (!in_matter) stride = LeapFrom(work, packet.leaps, place, inside, alive);
     const auto this_k = k;
     k = hn::Add(k, stride.steps);
-    alive = hn::And(alive, hn::Lt(k, owned.end));
+    inside = hn::Lt(k, owned.end);
+    alive = hn::And(alive, inside);
     if (hn::AllFalse(df, stride.sampled)) continue;
 
-    const Neighbours<T> neighbours = LoadNeighbours<T>(*work.box, place, stride.sampled);
-    const Classified<kSamples> samples = ClassifySamples<T, kSamples>(work, place, neighbours, stride.sampled);
+    const Voxels voxels(work, place, stride.sampled, packet.bricks, bricks);
+    Ints at = hn::Zero(IntTag());
+    if constexpr (kSamples == Samples::kLayered) at = IndexBefore(*work.box, place, stride.sampled);
+    const Classified<kSamples> samples = ClassifySamples<kSamples>(work, place, voxels, stride.sampled, at);
     const std::size_t count = hn::CountTrue(df, samples.visible);
     in_matter = count > kLanes / 2;
     if (count == 0) continue;
@@ -239,7 +278,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
       if (has_surfaces) shaded += AddSurfaces<T>(work, samples.visible, this_k, surfaces, sums);
     }
     const auto opacity = has_ends ? OpacityAtEnds(ends, this_k, samples.visible, samples.opacity) : samples.opacity;
-    AddSamples<T, kSamples>(work, place, this_k, part, neighbours, samples, opacity, sums);
+    AddSamples<kSamples>(work, place, this_k, part, voxels, at, samples, opacity, sums);
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
   }
   if constexpr (kAll) {
@@ -250,59 +289,69 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
 }
 
 // Apart from plain frames, so that these have the registers for themselves.
-template <class T, Samples kSamples>
+template <class T, Samples kSamples, class Voxels>
 HWY_NOINLINE std::uint64_t MarchParts(const MarchWork& work, const MarchingPacket& packet, const SampleInterval& owned, Sums& sums) {
   PacketPart parts[2];
   PartsOf(work.rays->clip, packet.of_frame, parts);
   std::uint64_t shaded = 0;
   for (PacketPart& part : parts) {
     for (std::size_t i = 0; i < 3; ++i) part.face[i] = hn::Div(part.face[i], Set(work.box->scale[i]));  // like a gradient there
-    shaded += MarchSamples<T, kSamples>(work, packet, part.Of(owned), &part, sums);
+    shaded += MarchSamples<T, kSamples, Voxels>(work, packet, part.Of(owned), &part, sums);
   }
   return shaded;
 }
 
 // The rays of one packet.
-template <class T>
-HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, float* HWY_RESTRICT rgba) {
+template <class T, class Voxels>
+HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_frame, GradientBricks* bricks, float* HWY_RESTRICT rgba) {
   const auto zero = hn::Zero(FloatTag());
   const SampleInterval owned = OwnedSamples(of_frame, *work.box);
   const RayPacket among = AmongVoxels(of_frame, *work.box);
   const LeapScales leaps = LeapScalesOf(among);
-  const MarchingPacket packet = {of_frame, among, leaps};
+  const MarchingPacket packet = {of_frame, among, leaps, bricks};
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
   const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty();
   if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
-    shaded = MarchSamples<T, Samples::kPlain>(work, packet, owned, nullptr, sums);
+    shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
   } else if (work.layers == nullptr) {
-    shaded = MarchParts<T, Samples::kAll>(work, packet, owned, sums);
+    shaded = MarchParts<T, Samples::kAll, Voxels>(work, packet, owned, sums);
   } else {
-    shaded = MarchParts<T, Samples::kLayered>(work, packet, owned, sums);
+    shaded = MarchParts<T, Samples::kLayered, Voxels>(work, packet, owned, sums);
   }
   if (shaded != 0) hn::StoreInterleaved4(sums.red, sums.green, sums.blue, sums.alpha, FloatTag(), rgba);
   return shaded;
 }
 
-template <class T>
-std::uint64_t March(const MarchWork& work, const PixelBounds& tile, float* HWY_RESTRICT rgba, std::size_t floats_a_row) {
+template <class T, class Voxels>
+HWY_NOINLINE std::uint64_t MarchPackets(const MarchWork& work, const PixelBounds& tile, GradientBricks* bricks, float* HWY_RESTRICT rgba,
+                                        std::size_t floats_a_row) {
   std::uint64_t shaded = 0;
   ForEachPacket(*work.rays, tile, rgba, floats_a_row, [&](const RayPacket& packet, float* HWY_RESTRICT pixels) HWY_ATTR {
-    const std::uint64_t found = MarchPacket<T>(work, packet, pixels);
+    const std::uint64_t found = MarchPacket<T, Voxels>(work, packet, bricks, pixels);
     shaded += found;
     return found != 0;
   });
   return shaded;
 }
 
-std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-  switch (work.box->type) {
-    case ScalarType::kUint8: return March<std::uint8_t>(work, tile, rgba, floats_a_row);
-    case ScalarType::kUint16: return March<std::uint16_t>(work, tile, rgba, floats_a_row);
-    case ScalarType::kFloat32: break;
+template <class T>
+std::uint64_t March(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* HWY_RESTRICT rgba,
+                    std::size_t floats_a_row) {
+  if constexpr (!std::is_same_v<T, float>) {
+    if (work.look->phong || !work.look->gradient_factors.empty()) {
+      bricks.Enter(*work.box);
+      return MarchPackets<T, LitSamples<T>>(work, tile, &bricks, rgba, floats_a_row);
+    }
   }
-  return March<float>(work, tile, rgba, floats_a_row);
+  return MarchPackets<T, StoredSamples<T>>(work, tile, nullptr, rgba, floats_a_row);
+}
+
+std::uint64_t MarchAny(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row) {
+  if (work.box->type == ScalarType::kUint8) return March<std::uint8_t>(work, tile, bricks, rgba, floats_a_row);
+  if (work.box->type == ScalarType::kUint16) return March<std::uint16_t>(work, tile, bricks, rgba, floats_a_row);
+  return March<float>(work, tile, bricks, rgba, floats_a_row);
 }
 
 }  // namespace slabstream::HWY_NAMESPACE
@@ -312,8 +361,8 @@ HWY_AFTER_NAMESPACE();
 namespace slabstream {
 HWY_EXPORT(MarchAny);
 
-std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
-  return HWY_DYNAMIC_DISPATCH(MarchAny)(work, tile, rgba, floats_a_row);
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row) {
+  return HWY_DYNAMIC_DISPATCH(MarchAny)(work, tile, bricks, rgba, floats_a_row);
 }
 
 }  // namespace slabstream

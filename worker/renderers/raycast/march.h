@@ -6,6 +6,7 @@
 //   gradient    central differences of stored samples over two voxels, interpolated like the samples; that of the interpolated volume
 //   opacity     times the factor that the gradient's magnitude has (RayLook::gradient_factors), if there is such a curve
 //   shaded      as Phong::AtNormal and WithoutGradient define it
+//   light       shadows and ambient occlusion at the sample (LightAt), if there are any
 //   layers      the label of the nearest voxel, and the overlay interpolated and classified like the volume (RayLayers); mixed with the
 //               volume's sample as docs/rendering.md says
 //
@@ -16,8 +17,10 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "worker/light/frame_light.h"
 #include "worker/rays/ray_box.h"
 #include "worker/rays/ray_look.h"
+#include "worker/renderers/raycast/gradient_bricks.h"
 #include "worker/renderers/raycast/ray_layers.h"
 
 namespace slabstream {
@@ -29,10 +32,11 @@ struct MarchWork {
   const std::uint8_t* empty_distance = nullptr;  // EmptyDistances of the box's cells
   float termination = 0;                         // a ray ends where it transmits less; 0: never
   const RayLayers* layers = nullptr;             // null: none is shown
+  const FrameLight::View* light = nullptr;       // shadows and ambient occlusion, by positions in the box; null: there are none
 };
 
 // Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without
-// a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded.
-std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, float* rgba, std::size_t floats_a_row);
+// a visible sample may stay unwritten: they must be 0 before. Returns how many samples were shaded. `bricks`: the calling thread's.
+std::uint64_t MarchTile(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* rgba, std::size_t floats_a_row);
 
 }  // namespace slabstream

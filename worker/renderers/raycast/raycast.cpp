@@ -4,6 +4,8 @@
 //   1. once a padded box: pad its voxels (RayVolume) and find the range of each small cell
 //   2. once a transfer function, and look of layers: for each cell, find the distance to the nearest visible one (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
+#include <tbb/enumerable_thread_specific.h>
+
 #include <cmath>
 #include <optional>
 #include <span>
@@ -146,7 +148,10 @@ class RaycastRenderer : public Renderer {
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
+    std::optional<FrameLight::View> light;
+    if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
     std::atomic<std::uint64_t> shaded = 0;
+    tbb::enumerable_thread_specific<GradientBricks> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
@@ -156,8 +161,9 @@ class RaycastRenderer : public Renderer {
                                   .look = &look,
                                   .empty_distance = visible[piece].distances.data(),
                                   .termination = float(setup.termination),
-                                  .layers = layers ? &*layers : nullptr};
-          shaded += MarchTile(work, tile, rgba, floats_a_row);
+                                  .layers = layers ? &*layers : nullptr,
+                                  .light = light ? &*light : nullptr};
+          shaded += MarchTile(work, tile, bricks.local(), rgba, floats_a_row);
         });
     report.drawn_voxels += std::uint64_t(std::ceil(double(shaded) * VoxelsASample(rays, setup.camera, setup.description.geometry)));
     clock.Finish(Stage::kRender, control);

@@ -18,10 +18,18 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::slice::HWY_NAMESPACE {
 
-// `points` and `values` (finite) are in ascending order of the points' numbers. x is counted from `x_begin`. `scaled`: values are
-// multiplied by s. False: the cell is so flat that no sample lies in it; `shape` is undefined then.
-HWY_INLINE bool MakeCellShape(const std::array<const FramePoint*, 4>& points, const std::array<float, 4>& values, double x_begin,
-                              bool scaled, CellShape& shape) {
+// What a cell has at its points, in ascending order of their numbers.
+struct CellCorners {
+  std::array<const FramePoint*, 4> points;
+  std::array<float, 4> values;                     // finite
+  std::array<const Vector3<float>*, 4> gradients;  // null: the cell is not lit
+  bool scaled_value, scaled_gradient;              // linear in data space under perspective: multiplied by s, so linear in frame space
+};
+
+// x is counted from `x_begin`. False: the cell is so flat that no sample lies in it; `shape` is undefined then.
+HWY_INLINE bool MakeCellShape(const CellCorners& corners, double x_begin, CellShape& shape) {
+  const auto& points = corners.points;
+  const auto& values = corners.values;
   constexpr double kFlat = 1e-7;  // height over a face, in pixels and planes
   constexpr double kInfinity = 1e300;
   const auto from = [&](std::size_t a, std::size_t b) {
@@ -57,14 +65,20 @@ HWY_INLINE bool MakeCellShape(const std::array<const FramePoint*, 4>& points, co
     shape.behind[i] = before ? kInfinity : 0;
   }
 
-  double v[4];
-  for (std::size_t i = 0; i < 4; ++i) v[i] = double(values[i]) * (scaled ? points[i]->s : 1);
-  const double part = 1 / volume, a = (v[1] - v[0]) * part, b = (v[0] - v[2]) * part, c = (v[3] - v[0]) * part;
-  const Vec3 gradient = a * normals[1] + b * normals[2] + c * normals[3];
-  shape.value_x = gradient.x;
-  shape.value_y = gradient.y;
-  shape.value_s = gradient.z;
-  shape.value = v[0] - gradient.x * (points[0]->x - x_begin) - gradient.y * points[0]->y - gradient.z * points[0]->s;
+  const double part = 1 / volume;
+  const auto through = [&](double v0, double v1, double v2, double v3) -> LinearFunction {
+    const double a = (v1 - v0) * part, b = (v0 - v2) * part, c = (v3 - v0) * part;
+    const Vec3 g = a * normals[1] + b * normals[2] + c * normals[3];
+    return {v0 - g.x * (points[0]->x - x_begin) - g.y * points[0]->y - g.z * points[0]->s, g.z, g.y, g.x};
+  };
+  const auto of_points = [&](bool scaled, auto&& value) {
+    const auto at = [&](std::size_t i) { return double(value(i)) * (scaled ? points[i]->s : 1); };
+    return through(at(0), at(1), at(2), at(3));
+  };
+  shape.value = of_points(corners.scaled_value, [&](std::size_t i) { return values[i]; });
+  for (int axis = 0; corners.gradients[0] != nullptr && axis < 3; ++axis) {
+    shape.slope[axis] = of_points(corners.scaled_gradient, [&](std::size_t i) { return (*corners.gradients[i])[axis]; });
+  }
   shape.least = std::min(std::min(values[0], values[1]), std::min(values[2], values[3]));
   shape.greatest = std::max(std::max(values[0], values[1]), std::max(values[2], values[3]));
   return true;

@@ -6,14 +6,19 @@
 
 namespace slabstream::slice {
 
+// The function at + s * per_s + y * per_y + x * per_x.
+struct LinearFunction {
+  double at, per_s, per_y, per_x;
+};
+
 struct CellShape {
   // Faces. Face 0 lies before the cell (x >= root), face 3 behind it, and the others as the numbers say that are added to their roots: 0 or
   // an infinity.
   double at[4], per_s[4], per_y[4];
   double before[2], behind[2];  // of faces 1 and 2
-  // The value, divided by FrameSpace::ScaleOf(k): value + s * value_s + y * value_y + x * value_x.
-  double value, value_s, value_y, value_x;
-  float least, greatest;  // of the cell's values
+  LinearFunction value;         // divided by FrameSpace::ScaleOf(k)
+  float least, greatest;        // of the cell's values
+  LinearFunction slope[3];      // the gradient's components, of any scale that they share; of cells that are lit
 };
 
 }  // namespace slabstream::slice

@@ -6,6 +6,7 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <cmath>
+#include <optional>
 
 #include "worker/rays/ray_box.h"
 #include "worker/rays/render_tiles.h"
@@ -55,6 +56,8 @@ class SliceRenderer : public Renderer {
 
     const FrameSpace space(setup.camera, geometry, planes_per_voxel, setup.clip);
     SliceWork work = {.space = &space, .mesh = &mesh, .look = &look, .termination = float(setup.termination)};
+    std::optional<FrameLight::View> light;
+    if (data.light() != nullptr) work.light = &light.emplace(data.light()->Seen());
     const RayReach reach = SetBox(box, work);
     FramePoints& points = data.CacheOf<FramePoints>();
     space.Place(mesh.points, points);

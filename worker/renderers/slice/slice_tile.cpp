@@ -34,17 +34,21 @@ struct TilePart {
   alignas(64) float begin[kTilePixels], end[kTilePixels];   // samples of the box
   alignas(64) float first[kTilePixels], last[kTilePixels];  // EndSamples
   alignas(64) float first_excess[kTilePixels], last_excess[kTilePixels];
+  alignas(64) float face[3][kTilePixels], face_end[kTilePixels];  // PacketPart; of clipped frames that are lit
 };
+
+constexpr std::size_t kChunkFloats = kChunkPlanes * kTilePixels + kRowPadding;  // [plane][y][x]
 
 struct TileRoom {
   TilePart parts[2];
-  alignas(64) float length[kTilePixels];  // of a step of each ray, in distances of planes
+  alignas(64) float length[kTilePixels];                          // of a step of each ray, in distances of planes
+  alignas(64) float first[3][kTilePixels], move[3][kTilePixels];  // of each ray (RayPacket); with a FrameLight
   alignas(64) float red[kTilePixels], green[kTilePixels], blue[kTilePixels], alpha[kTilePixels];
-  alignas(64) float values[kChunkPlanes * kTilePixels + kRowPadding];  // [plane][y][x], NaN: no cell
-  std::vector<std::size_t> chunk_first;                                // of `ordered`, by chunk
-  std::vector<std::uint32_t> ordered;                                  // the tile's cells
-  std::vector<ActiveMacrocell> cells;                                  // rooms of active cells
-  std::vector<std::uint32_t> active, vacant;                           // of `cells`
+  alignas(64) float values[4][kChunkFloats];  // the value, NaN: no cell; then the gradient's components, of frames that are lit
+  std::vector<std::size_t> chunk_first;       // of `ordered`, by chunk
+  std::vector<std::uint32_t> ordered;         // the tile's cells
+  std::vector<ActiveMacrocell> cells;         // rooms of active cells
+  std::vector<std::uint32_t> active, vacant;  // of `cells`
 };
 
 }  // namespace slabstream::slice
@@ -65,7 +69,7 @@ struct Chunk {
   std::int32_t begin = 0;
   double s[kChunkPlanes], scale[kChunkPlanes];  // FrameSpace::SOf, ScaleOf
   double tile_y = 0;                            // of the tile's first row
-  float* values = nullptr;                      // [plane][y][x]
+  float* values = nullptr;                      // TileRoom::values
 };
 
 // Rows of a plane, or planes of a row, one to a lane.
@@ -82,12 +86,29 @@ HWY_INLINE Lanes LanesAt(const CellShape& shape, Doubles s, Doubles scale) {
   return lanes;
 }
 
-// Writes the values of a cell's samples on the rows y of these lanes. A lane's row begins at `to` + lane * `stride`.
+// A linear function on rows, one to a lane: at x = 0, and its change from pixel to pixel.
+struct OnRows {
+  float firsts[8], changes[8];
+
+  HWY_INLINE OnRows(const LinearFunction& f, const Lanes& lanes, Doubles y, Doubles scale) {
+    const DoubleTag dd;
+    const hn::Rebind<float, DoubleTag> dv;
+    const auto set = [&](double value) HWY_ATTR { return hn::Set(dd, value); };
+    // Values far outside the range are cut off, so that none overflows.
+    const auto limited = [&](Doubles v, double limit) HWY_ATTR { return hn::DemoteTo(dv, hn::Min(hn::Max(v, set(-limit)), set(limit))); };
+    const auto at_zero = hn::Add(hn::Add(set(f.at), hn::Mul(lanes.s, set(f.per_s))), hn::Mul(set(f.per_y), y));
+    hn::StoreU(limited(hn::Mul(at_zero, scale), 1e38), dv, firsts);
+    hn::StoreU(limited(hn::Mul(set(f.per_x), scale), 1e36), dv, changes);
+  }
+};
+
+// Writes the values, and if kLit the gradients, of a cell's samples on the rows y of these lanes. A lane's row begins at `to` + lane *
+// `stride`.
+template <bool kLit>
 HWY_INLINE void CutRows(const CellShape& shape, const Lanes& lanes, Doubles y, hn::Mask<DoubleTag> valid, float* to, std::size_t stride) {
   const DoubleTag dd;
   const FloatTag df;
   const hn::Rebind<std::int32_t, DoubleTag> di;
-  const hn::Rebind<float, DoubleTag> dv;
   const auto set = [&](double value) HWY_ATTR { return hn::Set(dd, value); };
   const auto root = [&](std::size_t i) HWY_ATTR { return hn::Add(lanes.root[i], hn::Mul(set(shape.per_y[i]), y)); };
   const auto r1 = root(1), r2 = root(2);
@@ -101,27 +122,37 @@ HWY_INLINE void CutRows(const CellShape& shape, const Lanes& lanes, Doubles y, h
   if (bits[0] == 0) return;
 
   std::int32_t begins[8], ends[8];
-  float firsts[8], changes[8];
   hn::StoreU(hn::DemoteTo(di, left), di, begins);
   hn::StoreU(hn::DemoteTo(di, right), di, ends);
-  // Values far outside the range are cut off, so that none overflows.
-  const auto limited = [&](Doubles v, double limit) HWY_ATTR { return hn::DemoteTo(dv, hn::Min(hn::Max(v, set(-limit)), set(limit))); };
-  const auto at_zero = hn::Add(hn::Add(set(shape.value), hn::Mul(lanes.s, set(shape.value_s))), hn::Mul(set(shape.value_y), y));
-  hn::StoreU(limited(hn::Mul(at_zero, lanes.scale), 1e38), dv, firsts);
-  hn::StoreU(limited(hn::Mul(set(shape.value_x), lanes.scale), 1e36), dv, changes);
+  const OnRows value(shape.value, lanes, y, lanes.scale);
   const auto least = Set(shape.least), greatest = Set(shape.greatest);
   for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
     const auto lane = std::size_t(std::countr_zero(rest));
-    const auto first = Set(firsts[lane]), change = Set(changes[lane]);
+    const auto first = Set(value.firsts[lane]), change = Set(value.changes[lane]);
     for (std::int32_t x = begins[lane]; x < ends[lane]; x += std::int32_t(kLanes)) {
-      const auto value = hn::Add(first, hn::Mul(change, hn::Iota(df, float(x))));
-      hn::BlendedStore(hn::Min(hn::Max(value, least), greatest), hn::FirstN(df, std::size_t(ends[lane] - x)), df, to + lane * stride + x);
+      const auto at = hn::Add(first, hn::Mul(change, hn::Iota(df, float(x))));
+      hn::BlendedStore(hn::Min(hn::Max(at, least), greatest), hn::FirstN(df, std::size_t(ends[lane] - x)), df, to + lane * stride + x);
+    }
+  }
+  if constexpr (kLit) {
+    for (const LinearFunction& slope : shape.slope) {
+      to += kChunkFloats;
+      const OnRows of(slope, lanes, y, set(1));
+      for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
+        const auto lane = std::size_t(std::countr_zero(rest));
+        const auto first = Set(of.firsts[lane]), change = Set(of.changes[lane]);
+        for (std::int32_t x = begins[lane]; x < ends[lane]; x += std::int32_t(kLanes)) {
+          const auto at = hn::Add(first, hn::Mul(change, hn::Iota(df, float(x))));
+          hn::BlendedStore(at, hn::FirstN(df, std::size_t(ends[lane] - x)), df, to + lane * stride + x);
+        }
+      }
     }
   }
 }
 
 // Writes the values of a cell's samples in the chunk's planes [k_begin, k_end). Rows or planes are taken to lanes, whichever needs fewer
 // vectors; every sample has the same bits either way.
+template <bool kLit>
 HWY_NOINLINE void CutCell(const ActiveMacrocell& cell, const Chunk& chunk, std::int32_t k_begin, std::int32_t k_end) {
   const DoubleTag dd;
   const CellShape& shape = cell.shape;
@@ -135,7 +166,7 @@ HWY_NOINLINE void CutCell(const ActiveMacrocell& cell, const Chunk& chunk, std::
     for (std::int32_t k = k_begin - chunk.begin; k < k_end - chunk.begin; ++k) {
       const Lanes lanes = LanesAt(shape, hn::Set(dd, chunk.s[k]), hn::Set(dd, chunk.scale[k]));
       for (std::int32_t row = cell.y_begin; row < cell.y_end; row += kDoubles) {
-        CutRows(shape, lanes, hn::Iota(dd, chunk.tile_y + row), first_lanes(cell.y_end - row), row_at(k, row), kTileWidth);
+        CutRows<kLit>(shape, lanes, hn::Iota(dd, chunk.tile_y + row), first_lanes(cell.y_end - row), row_at(k, row), kTileWidth);
       }
     }
     return;
@@ -145,7 +176,7 @@ HWY_NOINLINE void CutCell(const ActiveMacrocell& cell, const Chunk& chunk, std::
     const Lanes lanes = LanesAt(shape, hn::LoadU(dd, chunk.s + k), hn::LoadU(dd, chunk.scale + k));
     const auto valid = hn::AndNot(first_lanes(k_begin - chunk.begin - k), first_lanes(k_end - chunk.begin - k));
     for (std::int32_t row = cell.y_begin; row < cell.y_end; ++row) {
-      CutRows(shape, lanes, hn::Set(dd, chunk.tile_y + row), valid, row_at(k, row), kTilePixels);
+      CutRows<kLit>(shape, lanes, hn::Set(dd, chunk.tile_y + row), valid, row_at(k, row), kTilePixels);
     }
   }
 }
@@ -170,6 +201,10 @@ HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileR
         }
       };
       const SampleInterval owned = SamplesInside(packet, work.low, work.high, work.k_begin, work.k_end);
+      for (std::size_t i = 0; work.light != nullptr && i < 3; ++i) {
+        spread(packet.first[i], room.first[i]);
+        spread(packet.move[i], room.move[i]);
+      }
       PacketPart cut[2];
       if (clipped) PartsOf(rays.clip, packet, cut);
       for (std::size_t i = 0; i < (clipped ? 2 : 1); ++i) {
@@ -177,6 +212,10 @@ HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileR
         const SampleInterval samples = part != nullptr ? part->Of(owned) : owned;
         spread(samples.begin, room.parts[i].begin);
         spread(samples.end, room.parts[i].end);
+        if (clipped && work.look->phong) {
+          for (std::size_t axis = 0; axis < 3; ++axis) spread(part->face[axis], room.parts[i].face[axis]);
+          spread(part->face_end, room.parts[i].face_end);
+        }
         if (!has_ends) continue;
         const EndSamples ends = EndSamplesOf(rays, packet, LeapScalesOf(packet), part);
         spread(ends.first, room.parts[i].first);
@@ -193,6 +232,30 @@ HWY_NOINLINE void FindRays(const SliceWork& work, const PixelBounds& tile, TileR
       room.length[y * kTileWidth + x] = std::sqrt(1 + (from_x * from_x + from_y * from_y) * rays.pixel_squared);
     }
   }
+}
+
+// The light on samples of a plane. `at`: of the first one, in a buffer of TileRoom::values. `in(i)`: those that lie in part i of their
+// rays.
+template <bool kClipped>
+HWY_INLINE Light LightOnSamples(const SliceWork& work, const TileRoom& room, std::size_t at, std::size_t pixel, Floats plane, auto&& in) {
+  const FloatTag df;
+  const RayLook& look = *work.look;
+  Gradient gradient = {hn::Zero(df), hn::Zero(df), hn::Zero(df)};
+  if (look.phong) {
+    gradient = {hn::Load(df, room.values[1] + at), hn::Load(df, room.values[2] + at), hn::Load(df, room.values[3] + at)};
+    for (std::size_t i = 0; kClipped && i < 2; ++i) {
+      const TilePart& part = room.parts[i];
+      const auto face = [&](std::size_t axis) HWY_ATTR { return hn::Load(df, part.face[axis] + pixel); };
+      const auto on_face = hn::And(in(i), hn::Lt(plane, hn::Load(df, part.face_end + pixel)));
+      gradient = Choose(on_face, {face(0), face(1), face(2)}, gradient);
+    }
+    if (work.light == nullptr) return LightOf(look, gradient);
+  }
+  SamplePlace place;
+  for (std::size_t i = 0; i < 3; ++i) {
+    place.position[i] = hn::Add(hn::Load(df, room.first[i] + pixel), hn::Mul(plane, hn::Load(df, room.move[i] + pixel)));
+  }
+  return LightAt(look, gradient, *work.light, place);
 }
 
 // Adds the samples of the chunk's planes [k_begin, k_end). Returns how many were drawn; `alive`: whether a ray goes on.
@@ -220,7 +283,8 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
     alive = true;
     std::uint64_t count = 0;
     for (std::int32_t k = k_begin; k < k_end; ++k) {
-      const auto value = hn::Load(df, room.values + std::size_t(k - chunk) * kTilePixels + pixel);
+      const std::size_t at = std::size_t(k - chunk) * kTilePixels + pixel;
+      const auto value = hn::Load(df, room.values[0] + at);
       auto present = hn::Eq(value, value);
       if (hn::AllFalse(df, present)) continue;
       const auto plane = Set(float(k));
@@ -249,7 +313,9 @@ HWY_NOINLINE std::uint64_t Compose(const SliceWork& work, std::int32_t chunk, st
       if (!hn::AllFalse(df, uneven)) {
         opacity = hn::IfThenElse(uneven, hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), length)), opacity);
       }
-      sums.Add(visible, opacity, entries, entry, {one, zero});
+      Light light = {one, zero};
+      if (look.phong || work.light != nullptr) light = LightOnSamples<kClipped>(work, room, at, pixel, plane, in);
+      sums.Add(visible, opacity, entries, entry, light);
     }
     if (count == 0) continue;
     drawn += count;
@@ -295,18 +361,21 @@ HWY_NOINLINE void Activate(const SliceWork& work, std::uint32_t cell, std::int32
   order(0, 2);
   order(1, 3);
   order(1, 2);
-  std::array<const FramePoint*, 4> points{};
-  std::array<float, 4> values{};
+  static constexpr Vector3<float> kNone = {};
+  CellCorners corners{};
+  corners.scaled_gradient = work.space->perspective();
+  corners.scaled_value = corners.scaled_gradient && mesh.at == ValuesAt::kPoints;
   for (std::size_t i = 0; i < 4; ++i) {
-    points[i] = &work.points->points[t[i]];
-    values[i] = mesh.values[mesh.at == ValuesAt::kCells ? cell : t[i]];
+    corners.points[i] = &work.points->points[t[i]];
+    corners.values[i] = mesh.values[mesh.at == ValuesAt::kCells ? cell : t[i]];
+    if (work.look->phong) corners.gradients[i] = mesh.gradients.empty() ? &kNone : &mesh.gradients[t[i]];
   }
   if (room.vacant.empty()) {
     room.vacant.push_back(std::uint32_t(room.cells.size()));
     room.cells.emplace_back();
   }
   ActiveMacrocell& active = room.cells[room.vacant.back()];
-  if (!MakeCellShape(points, values, x0, work.space->perspective() && mesh.at == ValuesAt::kPoints, active.shape)) return;
+  if (!MakeCellShape(corners, x0, active.shape)) return;
   active.k_begin = std::max(bounds.k_begin, work.k_begin);
   active.k_end = std::min(bounds.k_end, work.k_end);
   active.y_begin = std::max(bounds.y_begin - y0, 0);
@@ -342,7 +411,7 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
   bool alive = true;
   Chunk planes;
   planes.tile_y = y0;
-  planes.values = room.values;
+  planes.values = room.values[0];
   const bool clipped = !work.space->rays().clip.empty();
   const std::int32_t chunks = std::int32_t(room.chunk_first.size()) - 1;
   for (std::int32_t number = 0; alive && (number < chunks || !room.active.empty()); ++number) {
@@ -357,7 +426,7 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     const std::int32_t k_begin = std::max(chunk, work.k_begin), k_end = std::min(chunk + kChunkPlanes, work.k_end);
     if (room.active.empty() || k_begin >= k_end) continue;
     const auto nothing = Set(std::numeric_limits<float>::quiet_NaN());
-    for (std::size_t i = 0; i < kChunkPlanes * kTilePixels; i += kLanes) hn::Store(nothing, df, room.values + i);
+    for (std::size_t i = 0; i < kChunkPlanes * kTilePixels; i += kLanes) hn::Store(nothing, df, room.values[0] + i);
     planes.begin = chunk;
     for (std::int32_t k = 0; k < kChunkPlanes; ++k) {
       planes.s[k] = work.space->SOf(chunk + k);
@@ -366,7 +435,7 @@ std::uint64_t Slice(const SliceWork& work, const PixelBounds& tile, std::span<co
     std::size_t kept = 0;
     for (const std::uint32_t place : room.active) {
       const ActiveMacrocell& cell = room.cells[place];
-      CutCell(cell, planes, std::max(cell.k_begin, k_begin), std::min(cell.k_end, k_end));
+      (work.look->phong ? CutCell<true> : CutCell<false>)(cell, planes, std::max(cell.k_begin, k_begin), std::min(cell.k_end, k_end));
       if (cell.k_end > k_end) {
         room.active[kept++] = place;
       } else {

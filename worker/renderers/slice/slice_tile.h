@@ -3,8 +3,9 @@
 // Planes are taken in chunks, nearest first. A list holds the cells that reach into the chunk:
 //
 //   1. cells that begin in the chunk join the list, each as a CellShape
-//   2. cut: every cell writes the values of its samples, interval by interval, into a buffer [plane][row][x] that is empty before
-//   3. compose: samples that the box owns are classified by RayLook and blend front to back
+//   2. cut: every cell writes the values of its samples, interval by interval, into a buffer [plane][row][x] that is empty before; if the
+//      frame is lit, their gradients, too
+//   3. compose: samples that the box owns are classified and lit by RayLook, with shadows and ambient occlusion, and blend front to back
 //   4. cells that end in the chunk leave the list
 #pragma once
 
@@ -14,6 +15,7 @@
 #include <span>
 
 #include "common/mesh/mesh.h"
+#include "worker/light/frame_light.h"
 #include "worker/rays/ray_look.h"
 #include "worker/renderers/slice/cell_bins.h"
 #include "worker/renderers/slice/frame_space.h"
@@ -25,10 +27,11 @@ struct SliceWork {
   const Mesh* mesh = nullptr;
   const FramePoints* points = nullptr;  // of the mesh
   const RayLook* look = nullptr;
-  Float3 low{}, high{};                 // the box owns the positions p with low <= p < high on every axis
-  bool at_border = false;               // the box touches the volume's border
-  std::int32_t k_begin = 0, k_end = 0;  // its samples are among these
-  float termination = 0;                // a ray ends where it transmits less; 0: never
+  Float3 low{}, high{};                     // the box owns the positions p with low <= p < high on every axis
+  bool at_border = false;                   // the box touches the volume's border
+  std::int32_t k_begin = 0, k_end = 0;      // its samples are among these
+  float termination = 0;                    // a ray ends where it transmits less; 0: never
+  const FrameLight::View* light = nullptr;  // shadows and ambient occlusion; null: there are none
 };
 
 // Room for what a tile computes. One tile at a time.

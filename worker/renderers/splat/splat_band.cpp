@@ -70,6 +70,7 @@ void SplatBand::AddSlice(std::int32_t k) {
   clock_.Charge(Stage::kTransform);
   if (octets_.empty()) return;
   if (clipped_) LightCuts();
+  if (pass_.light) LightOctets(*pass_.light, pass_.cells.axes, slice_, octet_places_, octets_, shares_);
   ShadeAndFilter(slice);
   CompositeRows(slice);
   clock_.Charge(Stage::kComposite);
@@ -194,7 +195,7 @@ void SplatBand::FindOctets(std::int32_t beam) {
       Insert(filled, reached[octet]);
       octets_.push_back(
           {records, shaded + 4 * std::ptrdiff_t{octet * kOctet}, occupied, slopes_.AlongU((pass_.first_octet + octet) * kOctet), across});
-      if (clipped_) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
+      if (clipped_ || pass_.light) octet_places_.push_back({(pass_.first_octet + octet) * kOctet, beam});
       drawn += kOctetCount[occupied];
     }
   }

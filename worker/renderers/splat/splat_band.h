@@ -17,11 +17,6 @@
 
 namespace slabstream {
 
-// In a slice.
-struct VoxelPlace {
-  std::int32_t u = 0, v = 0;
-};
-
 class SplatBand {
  public:
   // Rows [y_begin, y_end) of `image`, which has the bounds of the pass. Both must outlive the band. Stage times and counts go to `report`.
@@ -82,7 +77,8 @@ class SplatBand {
   std::vector<SegmentWord> filled_;               // [beam][word]: needed segments that the beam's voxels reach
   std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any segment is filled
   std::vector<OctetWork> octets_;                 // beam by beam
-  std::vector<VoxelPlace> octet_places_;          // of a clipped volume: the first voxel of each octet
+  std::vector<VoxelPlace> octet_places_;          // of a clipped volume, or with a FrameLight: the first voxel of each octet
+  std::vector<OctetShares> shares_;               // with a FrameLight: of octets_
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_
   AlignedVector<float> shaded_;                   // [kShadedBeams][voxel][4]: zero except for the current octets

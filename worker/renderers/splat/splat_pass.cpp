@@ -5,13 +5,14 @@
 namespace slabstream {
 
 SplatPass::SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
-                     const OcclusionMask& hidden_tiles)
+                     const OcclusionMask& hidden_tiles, const FrameLight* frame_light)
     : cells(occupied_voxels),
       setup(frame_setup),
       hidden(hidden_tiles),
       clip(frame_setup),
       opacity(frame_setup),
       tables(opacity.Tables(table)) {
+  if (frame_light != nullptr) light.emplace(setup.shading, setup.camera.view_direction, *frame_light);
   const auto [c, u, v] = cells.axes;
   const Box& occupied = cells.occupied;
   for (std::int32_t k = occupied.begin[c]; k < occupied.end[c]; ++k) {

@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/image/occlusion_mask.h"
 #include "worker/kernels/segment_set.h"
+#include "worker/renderers/splat/light_octets.h"
 #include "worker/renderers/splat/occupied_voxels.h"
 #include "worker/renderers/splat/sheet_opacity.h"
 #include "worker/renderers/splat/slice_clip.h"
@@ -15,8 +17,9 @@
 namespace slabstream {
 
 struct SplatPass {
+  // `frame_light`: null: there is none.
   SplatPass(const OccupiedVoxels& occupied_voxels, const ClassificationTable& table, const FrameSetup& frame_setup, const Box& box,
-            const OcclusionMask& hidden_tiles);
+            const OcclusionMask& hidden_tiles, const FrameLight* frame_light = nullptr);
 
   const SliceSamples& Slice(std::int32_t k) const { return slices[std::size_t(k - cells.occupied.begin[cells.axes.c])]; }
   // By octet of a beam, from first_octet on: the segments that its voxels reach and the box owns, counted from the image's left border.
@@ -30,6 +33,7 @@ struct SplatPass {
   SliceClip clip;
   SheetOpacity opacity;
   ShadeTables tables;
+  std::optional<OctetLight> light;
   Footprints footprints;
   std::vector<SliceSamples> slices;               // of the occupied slices
   PixelBounds bounds;                             // of the image: whole segments; empty if nothing shows

@@ -41,7 +41,7 @@ class SplattingRenderer : public Renderer {
     clock.Charge(Stage::kPrepare);
     LocalImage image = MakeLocalImage(PixelFormat::kRgba, {});
     if (!cells.occupied.empty()) {
-      const SplatPass pass(cells, table, setup, box, hidden);
+      const SplatPass pass(cells, table, setup, box, hidden, data.light());
       if (!hidden.HidesAll(pass.bounds)) image = MakeLocalImage(PixelFormat::kRgba, pass.bounds);
       clock.Charge(Stage::kTransform);
       const std::int32_t bands = (image.bounds.height() + kBandRows - 1) / kBandRows;

@@ -36,6 +36,7 @@ CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const
       table_(data.Classification(setup)),
       opaque_(opaque),
       labels_(labels),
+      frame_light_(data.light()),
       bricks_(CubesOver(setup.description.geometry.size, kFaceBrick)) {
   const Camera& camera = setup.camera;
   const Camera::Ray first = camera.RayAt(0, 0), right = camera.RayAt(camera.width, 0), down = camera.RayAt(0, camera.height);
@@ -47,8 +48,18 @@ CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const
   const Phong phong(setup.shading, camera.view_direction);
   const bool lit = setup.shading.model == ShadingModel::kPhong;
   for (const HalfSpace& side : setup.clip.sides) {
-    light_.push_back(lit ? phong.AtNormal(Normalized(side.normal / setup.description.geometry.spacing)) : PhongFactors{});
+    const Vec3 normal = Normalized(side.normal / setup.description.geometry.spacing);
+    light_.push_back(lit ? phong.AtNormal(normal) : PhongFactors{});
+    if (frame_light_ == nullptr) continue;
+    for (const Vec3& light : phong.lights()) {
+      Shading alone = setup.shading;
+      alone.lights = {light};
+      const PhongFactors factors = Phong(alone, camera.view_direction).AtNormal(normal);
+      const float each = 1 / float(phong.lights().size());
+      of_each_light_.push_back(lit ? PhongFactors{factors.diffuse - setup.shading.ambient, factors.specular} : PhongFactors{each, 0});
+    }
   }
+  if (lit) ambient_ = setup.shading.ambient;
 }
 
 bool CutFaces::IsWhole(const Box& part) const { return region_.KeepsAll(part, margin_); }
@@ -148,13 +159,32 @@ void CutFaces::TakeSeen(const KeyBand& band, std::vector<CutPixel>& cuts) {
   cuts.resize(seen);
 }
 
+PhongFactors CutFaces::LightOn(const CutPixel& cut) const {
+  if (frame_light_ == nullptr) return light_[cut.side];
+  Vec3 at;
+  for (const Axis axis : kAxes) {
+    const auto i = std::size_t(Number(axis));
+    at[axis] = origin_[i].At(cut.x + 0.5, cut.y + 0.5) + double(cut.depth) * direction_[i].At(cut.x + 0.5, cut.y + 0.5);
+  }
+  const FrameLight::Shares shares = frame_light_->At(at);
+  const std::size_t lights = of_each_light_.size() / light_.size();
+  PhongFactors sum = {ambient_, 0};
+  for (std::size_t i = 0; i < lights; ++i) {
+    const PhongFactors& factors = of_each_light_[cut.side * lights + i];
+    const float reached = shares.reached[std::min(i, std::size_t(frame_light_->lights) - 1)];
+    sum.diffuse += reached * factors.diffuse;
+    sum.specular += reached * factors.specular;
+  }
+  return {shares.open * sum.diffuse, sum.specular};
+}
+
 void CutFaces::Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const {
   for (const CutPixel& cut : cuts) {
     const std::size_t pixel =
         std::size_t(cut.y - image.bounds.y_begin) * std::size_t(image.bounds.width()) + std::size_t(cut.x - image.bounds.x_begin);
     const float* const of_bin = shading.colors + 4 * std::size_t{cut.bin};
     const float* const of_label = shading.labels != nullptr ? shading.label_colors + 4 * std::size_t{cut.label} : nullptr;
-    const PhongFactors& light = light_[cut.side];
+    const PhongFactors light = LightOn(cut);
     for (std::size_t c = 0; c < 3; ++c) {
       const float color = of_label != nullptr ? of_bin[c] * (1 - of_label[3]) + of_label[c] : of_bin[c];
       image.rgba[4 * pixel + c] = std::clamp(color * light.diffuse + light.specular, 0.0F, 1.0F);

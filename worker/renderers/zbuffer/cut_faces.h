@@ -60,6 +60,7 @@ class CutFaces {
   void Shade(const std::vector<CutPixel>& cuts, const FaceShading& shading, LocalImage& image) const;
 
  private:
+  PhongFactors LightOn(const CutPixel& cut) const;
   void DrawRow(const KeyBand& band, std::int32_t y, ClipRays::Columns columns, std::vector<CutPixel>& cuts) const;
 
   const ClipRegion& region_;
@@ -72,9 +73,12 @@ class CutFaces {
   const float least_depth_;                          // of a cut; kNeverMet: there is none
   std::array<LinearInImage, 3> origin_, direction_;  // of a pixel's ray, data space: origin + depth * direction
   std::vector<PhongFactors> light_;                  // by side
+  std::vector<PhongFactors> of_each_light_;          // with a FrameLight: [side][light], without the ambient light
+  float ambient_ = 0;
   const ClassificationTable& table_;
   const BinSelection& opaque_;
   const ShownLabels* const labels_;
+  const FrameLight* const frame_light_;
   const Index3 bricks_;
 };
 

@@ -189,6 +189,8 @@ class ZBufferRenderer : public Renderer {
     LocalImage image = MakeUnwrittenImage(PixelFormat::kDepth, scene.bounds);
     const std::vector<std::int32_t> begins = CutIntoBands(surface, scene, kBandsPerThread * tbb::this_task_arena::max_concurrency());
     FaceShading shading = MakeFaceShading(setup.camera, setup.shading, setup.description.geometry.size);
+    std::optional<FrameLight::View> light;
+    if (data.light() != nullptr) shading.frame_light = &light.emplace(data.light()->Seen());
     shading.sites = surface.sites.data();
     shading.normals = surface.normals.data();
     std::vector<float> colors;

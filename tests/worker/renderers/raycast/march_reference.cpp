@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <type_traits>
 #include <vector>
 
 #include "tests/worker/rays/pixel_ray.h"
@@ -190,8 +191,11 @@ class ReferenceMarch {
 
   // `steps`: the length that the sample stands for. `face`: the normal of the cut face that it lies on, or null.
   void Add(const Float3& p, double steps, const Float3* face, std::array<float, 4>& sum) const {
-    Part volume = PartOf(EntryAt(look_, Interpolated(samples(), p, {}))), overlay;
-    Float3 gradient = GradientAt(samples(), p);
+    const bool has_whole_weights = !std::is_same_v<T, float> && (look_.phong || !look_.gradient_factors.empty());
+    const ValueAndGradient at =
+        has_whole_weights ? AtWholeWeights(p) : ValueAndGradient{Interpolated(samples(), p, {}), GradientAt(samples(), p)};
+    Part volume = PartOf(EntryAt(look_, at.value)), overlay;
+    Float3 gradient = at.gradient;
     if (!look_.gradient_factors.empty()) {
       volume.opacity = 1 - std::pow(1 - volume.opacity * GradientFactor(gradient), double(look_.step_exponent));
     }
@@ -293,6 +297,38 @@ class ReferenceMarch {
     return {Interpolated(of, p, {1, 0, 0}) - Interpolated(of, p, {-1, 0, 0}),
             Interpolated(of, p, {0, 1, 0}) - Interpolated(of, p, {0, -1, 0}),
             Interpolated(of, p, {0, 0, 1}) - Interpolated(of, p, {0, 0, -1})};
+  }
+
+  // Of whole numbers that are lit: eight weights in 2^-14, which sum to 1.
+  struct ValueAndGradient {
+    float value;
+    Float3 gradient;
+  };
+  ValueAndGradient AtWholeWeights(const Float3& p) const {
+    const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
+    const auto split = [&](float weight, std::size_t axis, int side) {
+      const float second = std::nearbyint((p[axis] - floor[axis]) * weight);
+      return side == 1 ? second : weight - second;
+    };
+    double sums[4] = {};
+    for (int corner = 0; corner < 8; ++corner) {
+      const int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+      const auto weight = double(split(split(split(16384, 2, dz), 1, dy), 0, dx));
+      const std::array<double, 4> voxel =
+          VoxelAndGradient(std::int32_t(floor[0]) + dx, std::int32_t(floor[1]) + dy, std::int32_t(floor[2]) + dz);
+      for (std::size_t i = 0; i < 4; ++i) sums[i] += weight / 16384 * voxel[i];
+    }
+    return {float(sums[0]), {float(sums[1]), float(sums[2]), float(sums[3])}};
+  }
+  // Differences over two voxels; those of halved samples where one of the three does not fit into 16 bits.
+  std::array<double, 4> VoxelAndGradient(std::int32_t x, std::int32_t y, std::int32_t z) const {
+    const auto differences = [&](int divisor) {
+      const auto voxel = [&](int dx, int dy, int dz) { return std::floor(double(Voxel(x + dx, y + dy, z + dz)) / divisor); };
+      return std::array<double, 3>{voxel(1, 0, 0) - voxel(-1, 0, 0), voxel(0, 1, 0) - voxel(0, -1, 0), voxel(0, 0, 1) - voxel(0, 0, -1)};
+    };
+    std::array<double, 3> d = differences(1);
+    if (std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])}) > 32767) d = differences(2);
+    return {double(Voxel(x, y, z)), d[0], d[1], d[2]};
   }
 
   double GradientFactor(const Float3& gradient) const {

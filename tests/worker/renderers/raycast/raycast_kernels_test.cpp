@@ -41,7 +41,8 @@ struct Scene {
 
 LocalImage Marched(const Scene& scene, float termination = 0) {
   LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, scene.camera.width, scene.camera.height});
-  MarchTile(scene.Work(termination), image.bounds, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
+  GradientBricks bricks;
+  MarchTile(scene.Work(termination), image.bounds, bricks, image.rgba.data(), 4 * std::size_t(image.bounds.width()));
   return image;
 }
 LocalImage MarchedByReference(const Scene& scene) {
@@ -161,6 +162,46 @@ TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
     });
   }
   EXPECT_GT(all_seen, 20000);
+}
+
+// Differences of neighbours that do not fit into 16 bits.
+TEST(MarchTile, LightsVoxelsOfTheWholeRangeOf16Bits) {
+  Random random(87);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(87);
+  const Volume volume =
+      MakeVolume({{18, 21, 15}, {1, 1, 1}}, ScalarType::kUint16, [&](const Index3&) { return 65535 * random.Integer(0, 8) / 8; });
+  SetupOptions options;
+  options.transfer.opacities = {{0, 0.1, 0.5, 0}, {65535, 0.4, 0.5, 0}};
+  options.size = {45, 38};
+  for (Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+    options.view = RandomView(projection, views);
+    const Scene scene(volume, volume.block.box, MakeSetup(volume, options), 1);
+    const LocalImage expected = MarchedByReference(scene);
+    ForEachTarget([&] { EXPECT_LE(LargestDifference(Marched(scene), expected), 1e-4F); });
+  }
+}
+
+// More bricks than there is room for, and those of other voxels.
+TEST(MarchTile, ForgetsBricksWithoutATrace) {
+  std::mt19937 views(88);
+  SetupOptions options;
+  options.view = RandomView(Projection::kPerspective, views);
+  options.transfer = Ramp(0.01);
+  options.size = {64, 64};
+  GradientBricks kept;
+  const Volume a = MakeBlobs({{90, 90, 90}, {1, 1, 1}}, ScalarType::kUint8, 1),
+               b = MakeBlobs({{90, 90, 90}, {1, 1, 1}}, ScalarType::kUint8, 2);
+  const Scene scenes[] = {{a, a.block.box, MakeSetup(a, options), 1}, {b, b.block.box, MakeSetup(b, options), 1}};
+  for (const Scene& scene : scenes) {
+    const LocalImage whole = Marched(scene);
+    LocalImage tiled = MakeLocalImage(PixelFormat::kRgba, whole.bounds);
+    for (std::int32_t y = 0; y < 64; y += 16) {
+      for (std::int32_t x = 0; x < 64; x += 16)
+        MarchTile(scene.Work(), {x, y, x + 16, y + 16}, kept, &tiled.rgba[4 * std::size_t(64 * y + x)], 256);
+    }
+    EXPECT_EQ(LargestDifference(tiled, whole), 0);
+  }
 }
 
 // Empty space that is leapt over, and rays that end early, do not show.

@@ -1,0 +1,218 @@
+#include "worker/light/frame_light.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <list>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "common/renderers/renderer_kind.h"
+#include "common/view/phong.h"
+#include "worker/light/extinction.h"
+#include "worker/light/occlusion.h"
+#include "worker/light/transmittance.h"
+
+namespace slabstream {
+namespace {
+
+using Bytes255 = std::vector<std::uint8_t>;
+
+// What an Extinction is made from.
+struct MatterKey {
+  DatasetId dataset = 0, light = 0;
+  const RendererKind* renderer = nullptr;
+  TransferFunction transfer;
+  ValueRange range;
+  ClipRegion clip;
+  friend bool operator==(const MatterKey&, const MatterKey&) = default;
+};
+
+MatterKey KeyOf(const FrameSetup& setup) {
+  MatterKey key = {setup.dataset, setup.light->dataset, setup.renderer, setup.transfer, setup.range, setup.clip};
+  for (ColorPoint& point : key.transfer.colors) point.color = {};  // colours take no light
+  return key;
+}
+
+// The shares of one light, or of openness alone.
+struct Lit {
+  std::vector<Vec3> lights;
+  float shadows = 0, occlusion = 0, radius = 0;
+  int fast = 0;
+  friend bool operator==(const Lit&, const Lit&) = default;
+};
+
+// Of one volume under one transfer function. One thread at a time makes something of it.
+class Matter {
+ public:
+  explicit Matter(MatterKey key) : key_(std::move(key)) {}
+
+  const MatterKey& key() const { return key_; }
+
+  std::shared_ptr<const FrameLight> Of(const std::function<VoxelBlock()>& values, const FrameSetup& setup) {
+    const std::lock_guard lock(mutex_);
+    if (!extinction_) extinction_ = ExtinctionOf(values(), setup);
+    const Shading& shading = setup.shading;
+    const Lit lit = {shading.shadows > 0 ? Phong(shading, setup.camera.view_direction).lights() : std::vector<Vec3>{Vec3{}},
+                     shading.shadows, shading.ambient_occlusion, shading.occlusion_radius,
+                     !setup.sheets.empty() && setup.camera.traversal_axis == Axis::kX ? 1 : 0};
+    for (auto made = made_.begin(); made != made_.end(); ++made) {
+      if (made->first != lit) continue;
+      made_.splice(made_.begin(), made_, made);
+      return made_.front().second;
+    }
+    auto light = std::make_shared<FrameLight>();
+    light->size = extinction_->size;
+    light->lights = int(lit.lights.size());
+    const GridMap map = MapBetween(setup.description.geometry, setup.light->description.geometry);
+    for (int axis = 0; axis < 3; ++axis) {
+      light->scale[std::size_t(axis)] = float(map.scale[axis]);
+      light->offset[std::size_t(axis)] = float(map.offset[axis]);
+    }
+    const Index3 whole = light->size + Uniform(1);
+    light->fast = lit.fast;
+    light->stride = lit.fast == 0 ? std::array{2, 2 * whole.x, 2 * whole.x * whole.y} : std::array{2 * whole.y * whole.z, 2, 2 * whole.y};
+    light->light = 2 * whole.x * whole.y * whole.z;
+    light->shares.resize(std::size_t(light->light) * lit.lights.size() + FrameLight::kSharesPadding);
+    FindOpen(shading);
+    Bytes255 reached(shading.shadows > 0 ? extinction_->each.size() : 0);
+    for (std::size_t i = 0; i < lit.lights.size(); ++i) {
+      if (shading.shadows > 0) {
+        const Vec3& to_light = lit.lights[i];
+        if (SweepsAlongX(*extinction_, to_light) && turned_.each.empty()) turned_ = Turned(*extinction_);
+        FindTransmittance(*extinction_, turned_, to_light, shading.shadows, reached.data());
+      }
+      Pack(reached, i, *light);
+    }
+    made_.emplace_front(lit, light);
+    if (made_.size() > kMostMade) made_.pop_back();
+    return light;
+  }
+
+ private:
+  static constexpr std::size_t kMostMade = 2;
+
+  // A flat surface, which has an openness of about 1/2, keeps its light.
+  void FindOpen(const Shading& shading) {
+    const std::pair wanted(shading.ambient_occlusion, shading.occlusion_radius);
+    if (open_of_ == wanted) return;
+    open_.clear();
+    open_of_ = wanted;
+    if (!(shading.ambient_occlusion > 0)) return;
+    const Vec3 sides = ToVec3(extinction_->size) * extinction_->spacing;
+    const std::vector<float> openness = FindOpenness(*extinction_, shading.occlusion_radius * std::max({sides.x, sides.y, sides.z}));
+    open_.resize(openness.size());
+    const float strength = shading.ambient_occlusion;
+    std::ranges::transform(openness, open_.begin(),
+                           [strength](float open) { return std::uint8_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F); });
+  }
+
+  // `reached`: empty: all of the light.
+  void Pack(const Bytes255& reached, std::size_t number, FrameLight& light) const {
+    const Index3& size = light.size;
+    const Bytes255 all(std::size_t(size.x), 255);
+    const auto row_of = [&](const Bytes255& shares, std::size_t voxel) { return shares.empty() ? all.data() : shares.data() + voxel; };
+    tbb::parallel_for(std::int32_t{0}, size.z + 1, [&](std::int32_t z) {
+      std::uint8_t* const slice = light.shares.data() + number * std::size_t(light.light) + std::ptrdiff_t{z} * light.stride[2];
+      for (std::int32_t y = 0; y <= size.y; ++y) {
+        const std::size_t row = NumberIn(size, {0, std::min(y, size.y - 1), std::min(z, size.z - 1)});
+        const std::uint8_t *const open = row_of(open_, row), *const through = row_of(reached, row);
+        std::uint8_t* out = slice + std::ptrdiff_t{y} * light.stride[1];
+        if (light.fast == 0) {
+          for (std::int32_t x = 0; x < size.x; ++x) {
+            out[2 * x] = open[x];
+            out[2 * x + 1] = through[x];
+          }
+          out += 2 * size.x;
+        } else {
+          for (std::int32_t x = 0; x < size.x; ++x, out += light.stride[0]) {
+            out[0] = open[x];
+            out[1] = through[x];
+          }
+        }
+        out[0] = open[size.x - 1];
+        out[1] = through[size.x - 1];
+      }
+    });
+  }
+
+  const MatterKey key_;
+  std::mutex mutex_;
+  std::optional<Extinction> extinction_;
+  TurnedExtinction turned_;
+  std::optional<std::pair<float, float>> open_of_;
+  Bytes255 open_;                                                      // empty: all is open
+  std::list<std::pair<Lit, std::shared_ptr<const FrameLight>>> made_;  // the latest first
+};
+
+// The latest looks. The oldest one goes.
+class LightCache {
+ public:
+  std::shared_ptr<Matter> Of(const FrameSetup& setup) {
+    constexpr std::size_t kMostLooks = 2;  // LightBytes counts as many
+    MatterKey key = KeyOf(setup);
+    const std::lock_guard lock(mutex_);
+    const auto found = std::ranges::find_if(looks_, [&](const auto& matter) { return matter->key() == key; });
+    if (found != looks_.end()) {
+      looks_.splice(looks_.begin(), looks_, found);
+    } else {
+      looks_.push_front(std::make_shared<Matter>(std::move(key)));
+      if (looks_.size() > kMostLooks) looks_.pop_back();
+    }
+    return looks_.front();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::list<std::shared_ptr<Matter>> looks_;
+};
+
+}  // namespace
+
+FrameLight::View FrameLight::Seen(const GridMap& map) const {
+  View view{.shares = shares.data(), .lights = lights, .fast = fast, .stride = stride, .light = light};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = std::size_t(axis);
+    view.scale[i] = float(double(scale[i]) / map.scale[axis]);
+    view.offset[i] = float(double(offset[i]) - double(scale[i]) * map.offset[axis] / map.scale[axis]);
+    view.last[i] = float(size[axis] - 1);
+  }
+  return view;
+}
+
+FrameLight::Shares FrameLight::At(const Vec3& p) const {
+  std::array<std::int32_t, 3> below{};
+  std::array<float, 3> t{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto i = std::size_t(axis);
+    const float at = std::clamp(float(p[axis]) * scale[i] + offset[i], 0.0F, float(size[axis] - 1));
+    below[i] = std::int32_t(at);
+    t[i] = at - float(below[i]);
+  }
+  const std::size_t f = std::size_t(fast), u = fast == 0 ? 1 : 0;
+  const auto y = std::int32_t(t[u] * 256 + 0.5F), z = std::int32_t(t[2] * 256 + 0.5F);
+  const std::int32_t yz = y * z >> 8;
+  Shares result;
+  for (int n = 0; n < lights; ++n) {
+    const auto share = [&](std::int32_t byte) {
+      const std::uint8_t* at = shares.data() + n * light + below[0] * stride[0] + below[1] * stride[1] + below[2] * stride[2] + byte;
+      const auto sum = [&](std::int32_t x) {
+        return float((256 - y - z + yz) * at[x] + (y - yz) * at[x + stride[u]] + (z - yz) * at[x + stride[2]] +
+                     yz * at[x + stride[u] + stride[2]]);
+      };
+      return (sum(0) + t[f] * (sum(2) - sum(0))) * (1.0F / (255 * 256));
+    };
+    result.open = share(0);
+    result.reached[std::size_t(n)] = share(1);
+  }
+  return result;
+}
+
+std::shared_ptr<const FrameLight> MakeFrameLight(const std::function<VoxelBlock()>& values, const FrameSetup& setup) {
+  static LightCache cache;
+  return cache.Of(setup)->Of(values, setup);
+}
+
+}  // namespace slabstream

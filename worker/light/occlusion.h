@@ -1,0 +1,21 @@
+// How open the surroundings of each voxel of a light volume are (local ambient occlusion: Hernell, Ljung and Ynnerman 2010): the mean
+// transmittance of ways of one length, the radius, that lead away in 26 directions, those of the voxel's neighbours. The directions are
+// weighted as points of Lebedev's quadrature on the sphere (1976), so the mean of functions up to degree 7 is exact on a cubic grid.
+//
+// It is found on a coarser grid, at most kMaxOcclusionSide voxels a side and kMostOcclusionSteps in a radius, and interpolated linearly.
+#pragma once
+
+#include <cstdint>
+
+#include "worker/light/extinction.h"
+
+namespace slabstream {
+
+inline constexpr std::int32_t kMaxOcclusionSide = 64;
+inline constexpr std::int32_t kMostOcclusionSteps = 8;
+
+// `radius`: in the unit of the world, > 0. Of the voxels of the grid that `extinction` is on; x fastest, in [0, 1]. A voxel in the flat
+// surface of opaque matter has about 1/2. Parallel; the result is the same for any number of threads and any instruction set.
+std::vector<float> FindOpenness(const Extinction& extinction, double radius);
+
+}  // namespace slabstream

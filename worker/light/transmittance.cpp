@@ -1,0 +1,225 @@
+#include "worker/light/transmittance.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/light/transmittance.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "common/base/aligned_buffer.h"
+#include "worker/light/exponential-inl.h"
+
+#ifndef SLABSTREAM_WORKER_LIGHT_TRANSMITTANCE_CPP_  // shared by all instruction sets
+#define SLABSTREAM_WORKER_LIGHT_TRANSMITTANCE_CPP_
+namespace slabstream {
+
+// Rays are numbered (a, b) in the first plane, where ray (a, b) meets voxel (a, b) of the plane's axes u and v. In plane k, from the light
+// on, it is at (a + k * shift_u, b + k * shift_v).
+struct Sweep {
+  const float* each = nullptr;  // extinction
+  std::int32_t nu = 0, nv = 0, planes = 0;
+  std::ptrdiff_t row = 0, plane = 0;  // voxels from one to the next along v, and away from the light
+  std::ptrdiff_t first = 0;           // voxel (0, 0) of the plane nearest to the light
+  double shift_u = 0, shift_v = 0;
+  float step = 1;  // length of a ray between two planes
+  float strength = 1;
+  std::uint8_t* out = nullptr;  // laid out like `each`
+};
+
+inline constexpr std::int32_t kBandRays = 16;  // rows of rays that a task follows: their transmittances stay in the cache
+inline constexpr std::int32_t kMargin = 16;    // floats beside a row, which whole registers may touch
+
+inline std::int32_t Floor(double x) { return std::int32_t(std::floor(x)); }
+
+}  // namespace slabstream
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Follows rows [b_begin, b_end) of rays, and writes the voxels between row b and row b + 1 of these. Row b_end is followed, too.
+void FollowBand(const Sweep& s, std::int32_t b_begin, std::int32_t b_end) {
+  const hn::CappedTag<float, 16> d;
+  const auto lanes = std::ptrdiff_t(hn::Lanes(d));
+  const auto set = [&](float value) HWY_ATTR { return hn::Set(d, value); };
+  const auto lerp = [&](float t, auto a, auto b) HWY_ATTR { return hn::Add(a, hn::Mul(set(t), hn::Sub(b, a))); };
+  const double last_shift = (s.planes - 1) * s.shift_u;
+  const std::int32_t a_begin = std::min(0, Floor(-last_shift)) - 1;
+  const std::int32_t a_end = std::max(0, Floor(-last_shift) + 1) + s.nu + 1;
+  const std::ptrdiff_t ray_row = (a_end - a_begin + 2 * kMargin + 15) / 16 * 16;
+  AlignedVector<float> rays(std::size_t(ray_row) * std::size_t(b_end - b_begin + 1), 1.0F);
+  const auto ray = [&](std::int32_t b) { return rays.data() + std::ptrdiff_t(b - b_begin) * ray_row + kMargin - a_begin; };
+  // What a step through two neighbouring rows of voxels transmits; 1 beside the volume.
+  const std::ptrdiff_t voxel_row = (s.nu + 2 * kMargin + 15) / 16 * 16;
+  AlignedVector<float> matter(2 * std::size_t(voxel_row), 1.0F);
+  const auto load_row = [&](std::int32_t k, std::int32_t j, float* row) HWY_ATTR {
+    if (j < 0 || j >= s.nv) return std::fill_n(row, s.nu, 1.0F), void();
+    const float* each = s.each + s.first + k * s.plane + j * s.row;
+    std::ptrdiff_t i = 0;
+    const auto length = set(s.step);
+    for (; i + lanes <= s.nu; i += lanes) hn::StoreU(ExpOfMinus(hn::Mul(hn::LoadU(d, each + i), length)), d, row + i);
+    if (i < s.nu) {
+      HWY_ALIGN float rest[16] = {};
+      std::copy_n(each + i, s.nu - i, rest);
+      hn::Store(ExpOfMinus(hn::Mul(hn::Load(d, rest), length)), d, rest);
+      std::copy_n(rest, s.nu - i, row + i);
+    }
+  };
+
+  // Adds plane k to the rays.
+  const auto add_plane = [&](std::int32_t k) HWY_ATTR {
+    const double at_u = k * s.shift_u, at_v = k * s.shift_v;
+    const std::int32_t floor_u = Floor(at_u), floor_v = Floor(at_v);
+    const auto t_u = float(at_u - floor_u), t_v = float(at_v - floor_v);
+    float *below = matter.data() + kMargin, *above = below + voxel_row;
+    std::int32_t held = -2;  // the row in `above`
+    for (std::int32_t b = b_begin; b <= b_end; ++b) {
+      const std::int32_t j = b + floor_v;
+      if (j < -1 || j >= s.nv) continue;
+      if (held == j) {
+        std::swap(below, above);
+      } else {
+        load_row(k, j, below);
+      }
+      load_row(k, j + 1, above);
+      held = j + 1;
+      float* to = ray(b) - floor_u;  // by voxel
+      for (std::ptrdiff_t i = -1; i < s.nu; i += lanes) {
+        const auto first = lerp(t_v, hn::LoadU(d, below + i), hn::LoadU(d, above + i));
+        const auto next = lerp(t_v, hn::LoadU(d, below + i + 1), hn::LoadU(d, above + i + 1));
+        hn::StoreU(hn::Mul(hn::LoadU(d, to + i), lerp(t_u, first, next)), d, to + i);
+      }
+    }
+  };
+  // Writes the band's voxels of plane k.
+  const auto write_plane = [&](std::int32_t k) HWY_ATTR {
+    const double at_u = -k * s.shift_u, at_v = -k * s.shift_v;
+    const std::int32_t floor_u = Floor(at_u), floor_v = Floor(at_v);
+    const auto t_u = float(at_u - floor_u), t_v = float(at_v - floor_v);
+    const std::int32_t j_begin = std::max(0, b_begin - floor_v), j_end = std::min(s.nv, b_end - floor_v);
+    for (std::int32_t j = j_begin; j < j_end; ++j) {
+      const float *below = ray(j + floor_v) + floor_u, *above = below + ray_row;
+      std::uint8_t* out = s.out + s.first + k * s.plane + j * s.row;
+      for (std::ptrdiff_t i = 0; i < s.nu; i += lanes) {
+        const auto first = lerp(t_v, hn::LoadU(d, below + i), hn::LoadU(d, above + i));
+        const auto next = lerp(t_v, hn::LoadU(d, below + i + 1), hn::LoadU(d, above + i + 1));
+        const auto lit = hn::Sub(set(1), hn::Mul(set(s.strength), hn::Sub(set(1), lerp(t_u, first, next))));
+        const hn::Rebind<std::int32_t, decltype(d)> di;
+        const auto bytes =
+            hn::DemoteTo(hn::Rebind<std::uint8_t, decltype(d)>(), hn::ConvertTo(di, hn::Add(hn::Mul(lit, set(255)), set(0.5F))));
+        HWY_ALIGN std::uint8_t eight[16];
+        hn::StoreU(bytes, hn::Rebind<std::uint8_t, decltype(d)>(), eight);
+        std::copy_n(eight, std::min<std::ptrdiff_t>(lanes, s.nu - i), out + i);
+      }
+    }
+  };
+  // Half a step and one more, kShadowOffset, lie between a voxel and the matter that shades it.
+  for (std::int32_t k = 0; k < s.planes; ++k) {
+    if (k >= 2) add_plane(k - 2);
+    write_plane(k);
+  }
+}
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace slabstream {
+namespace {
+
+HWY_EXPORT(FollowBand);
+
+void Run(const Sweep& sweep) {
+  // Rows of rays that any voxel lies on.
+  const double last = -(sweep.planes - 1) * sweep.shift_v;
+  const std::int32_t begin = std::min(0, Floor(last)), end = std::max(0, Floor(last)) + sweep.nv;
+  const std::int32_t bands = (end - begin + kBandRays - 1) / kBandRays;
+  tbb::parallel_for(std::int32_t{0}, bands, [&](std::int32_t band) {
+    HWY_DYNAMIC_DISPATCH(FollowBand)(sweep, begin + band * kBandRays, std::min(begin + (band + 1) * kBandRays, end));
+  });
+}
+
+// out[z][y][x] = turned[x][z][y], square by square.
+void TurnBack(const std::vector<std::uint8_t>& turned, const Index3& size, std::uint8_t* out) {
+  constexpr std::int32_t kSquare = 32;
+  const std::ptrdiff_t from_x = std::ptrdiff_t{size.y} * size.z;
+  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+    const std::uint8_t* const from = turned.data() + std::ptrdiff_t{z} * size.y;
+    std::uint8_t* const to = out + std::ptrdiff_t{z} * size.y * size.x;
+    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
+      const std::int32_t y_end = std::min(y_begin + kSquare, size.y);
+      for (std::int32_t x_begin = 0; x_begin < size.x; x_begin += kSquare) {
+        const std::int32_t x_end = std::min(x_begin + kSquare, size.x);
+        for (std::int32_t x = x_begin; x < x_end; ++x) {
+          const std::uint8_t* const column = from + x * from_x;
+          std::uint8_t* const to_x = to + x;
+          for (std::int32_t y = y_begin; y < y_end; ++y) to_x[std::ptrdiff_t{y} * size.x] = column[y];
+        }
+      }
+    }
+  });
+}
+
+int SweepAxis(const Extinction& extinction, const Vec3& to_light) {
+  const Vec3 steps = Absolute(to_light / extinction.spacing);
+  return steps.x > std::max(steps.y, steps.z) ? 0 : steps.y > steps.z ? 1 : 2;
+}
+
+}  // namespace
+
+bool SweepsAlongX(const Extinction& extinction, const Vec3& to_light) { return SweepAxis(extinction, to_light) == 0; }
+
+TurnedExtinction Turned(const Extinction& extinction) {
+  const Index3& size = extinction.size;
+  TurnedExtinction turned{.axes = {1, 2, 0}, .each = std::vector<float>(extinction.each.size())};
+  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
+    constexpr std::int32_t kSquare = 16;
+    for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {
+      for (std::int32_t x = 0; x < size.x; ++x) {
+        for (std::int32_t y = y_begin; y < std::min(y_begin + kSquare, size.y); ++y) {
+          turned.each[NumberIn({size.y, size.z, size.x}, {y, z, x})] = extinction.each[NumberIn(size, {x, y, z})];
+        }
+      }
+    }
+  });
+  return turned;
+}
+
+void FindTransmittance(const Extinction& extinction, const TurnedExtinction& turned, const Vec3& to_light, double strength,
+                       std::uint8_t* out) {
+  const Index3& size = extinction.size;
+  const int c = SweepAxis(extinction, to_light);
+  const int u = c == 0 ? 1 : 0, v = c == 2 ? 1 : 2;
+  // The layout's steps from voxel to voxel.
+  Vector3<std::ptrdiff_t> stride = {1, size.x, std::ptrdiff_t{size.x} * size.y};
+  if (c == 0) stride = {std::ptrdiff_t{size.y} * size.z, 1, size.y};
+  std::vector<std::uint8_t> turned_out(c == 0 ? CountIn(size) : 0);
+
+  const Vec3 steps = to_light / extinction.spacing;  // towards the light, in voxels
+  const double per_plane = std::abs(steps[c]);
+  const bool from_above = steps[c] > 0;  // the light is on the side of the last plane
+  Sweep sweep{.each = c == 0 ? turned.each.data() : extinction.each.data(),
+              .nu = size[u],
+              .nv = size[v],
+              .planes = size[c],
+              .row = stride[v],
+              .plane = from_above ? -stride[c] : stride[c],
+              .first = from_above ? (size[c] - 1) * stride[c] : 0,
+              .shift_u = -steps[u] / per_plane,
+              .shift_v = -steps[v] / per_plane,
+              .step = float(1 / per_plane),
+              .strength = float(strength),
+              .out = c == 0 ? turned_out.data() : out};
+  Run(sweep);
+  if (c == 0) TurnBack(turned_out, size, out);
+}
+
+}  // namespace slabstream
+#endif

@@ -1,0 +1,342 @@
+// Values and gradients at samples, interpolated from GradientBricks. Included once for each instruction set, hence the unusual include
+// guard.
+//
+// A sample's eight corners have weights that are multiples of 2^-14, at least 0, and sum to 1. So a value lies between those of its
+// corners, as empty space requires. All sums are whole numbers: every instruction set gives the same bits.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <type_traits>
+
+#include "worker/rays/sample_look-inl.h"
+#include "worker/renderers/raycast/gradient_bricks.h"
+
+#if defined(SLABSTREAM_WORKER_RENDERERS_RAYCAST_GRADIENT_BRICKS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef SLABSTREAM_WORKER_RENDERERS_RAYCAST_GRADIENT_BRICKS_INL_H_
+#undef SLABSTREAM_WORKER_RENDERERS_RAYCAST_GRADIENT_BRICKS_INL_H_
+#else
+#define SLABSTREAM_WORKER_RENDERERS_RAYCAST_GRADIENT_BRICKS_INL_H_
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+
+// --- Making bricks.
+
+#if HWY_TARGET != HWY_SCALAR
+using ShortTag = hn::CappedTag<std::int16_t, 16>;
+using Shorts = hn::Vec<ShortTag>;
+
+struct CornerVectors {
+  Shorts value, x, y, z;
+};
+// Of the voxels from `at` on along x. `row` and `slice`: strides.
+HWY_INLINE CornerVectors CornersAt(const std::uint8_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+  const ShortTag ds;
+  const auto load = [&](std::ptrdiff_t offset)
+                        HWY_ATTR { return hn::PromoteTo(ds, hn::LoadU(hn::Rebind<std::uint8_t, ShortTag>(), at + offset)); };
+  return {load(0), hn::Sub(load(1), load(-1)), hn::Sub(load(row), load(-row)), hn::Sub(load(slice), load(-slice))};
+}
+// Values minus 32768. Where a difference does not fit into 16 bits, all three are those of halved samples.
+HWY_INLINE CornerVectors CornersAt(const std::uint16_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+  const ShortTag ds;
+  const hn::RebindToUnsigned<ShortTag> du;
+  struct Difference {
+    Shorts exact, of_halves, size;  // size: negative if `exact` does not fit
+  };
+  const auto difference = [&](std::ptrdiff_t offset) HWY_ATTR {
+    const auto before = hn::LoadU(du, at - offset), after = hn::LoadU(du, at + offset);
+    const auto size = hn::Or(hn::SaturatedSub(after, before), hn::SaturatedSub(before, after));
+    return Difference{hn::BitCast(ds, hn::Sub(after, before)),
+                      hn::BitCast(ds, hn::Sub(hn::ShiftRight<1>(after), hn::ShiftRight<1>(before))), hn::BitCast(ds, size)};
+  };
+  const Difference x = difference(1), y = difference(row), z = difference(slice);
+  const auto large = hn::Lt(hn::Or(hn::Or(x.size, y.size), z.size), hn::Zero(ds));
+  return {hn::BitCast(ds, hn::Xor(hn::LoadU(du, at), hn::Set(du, 0x8000))), hn::IfThenElse(large, x.of_halves, x.exact),
+          hn::IfThenElse(large, y.of_halves, y.exact), hn::IfThenElse(large, z.of_halves, z.exact)};
+}
+
+// The corners of `rows` rows and `slices` slices. `first`: the sample of the first one.
+template <class T>
+HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t slice, std::int32_t rows, std::int32_t slices,
+                            GradientCorner* corners) {
+  const ShortTag ds;
+  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(ds));
+  for (std::int32_t z = 0; z < slices; ++z) {
+    for (std::int32_t y = 0; y < rows; ++y) {
+      const T* const from = first + z * slice + y * row;
+      GradientCorner* const to = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
+      // What is written beyond a row, the next one overwrites.
+      for (std::int32_t x = 0; x < GradientBricks::kRow; x += kAtOnce) {
+        const CornerVectors c = CornersAt(from + x, row, slice);
+        hn::StoreInterleaved4(c.value, c.x, c.y, c.z, ds, &to[x].value);
+      }
+    }
+  }
+}
+
+#else
+HWY_INLINE GradientCorner CornerAt(const std::uint8_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+  const auto difference = [&](std::ptrdiff_t offset) { return std::int16_t(at[offset] - at[-offset]); };
+  return {at[0], difference(1), difference(row), difference(slice)};
+}
+HWY_INLINE GradientCorner CornerAt(const std::uint16_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+  const auto difference = [&](std::ptrdiff_t offset) { return at[offset] - at[-offset]; };
+  const auto of_halves = [&](std::ptrdiff_t offset) { return at[offset] / 2 - at[-offset] / 2; };
+  const std::int32_t x = difference(1), y = difference(row), z = difference(slice);
+  const bool large = std::max({std::abs(x), std::abs(y), std::abs(z)}) > 32767;
+  return {std::int16_t(at[0] - 32768), std::int16_t(large ? of_halves(1) : x), std::int16_t(large ? of_halves(row) : y),
+          std::int16_t(large ? of_halves(slice) : z)};
+}
+
+template <class T>
+HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t slice, std::int32_t rows, std::int32_t slices,
+                            GradientCorner* corners) {
+  for (std::int32_t z = 0; z < slices; ++z) {
+    for (std::int32_t y = 0; y < rows; ++y) {
+      for (std::int32_t x = 0; x < GradientBricks::kRow; ++x) {
+        corners[z * GradientBricks::kSlice + y * GradientBricks::kRow + x] = CornerAt(first + z * slice + y * row + x, row, slice);
+      }
+    }
+  }
+}
+#endif
+
+template <class T>
+HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBricks& bricks, std::int32_t first) {
+  constexpr std::int32_t kRead = 18;  // samples along x, from the one before the first corner: whole registers
+  const Index3 counts = bricks.CountsOf(box);
+  const Index3 begin = GradientBricks::kSide * Index3{number % counts.x, number / counts.x % counts.y, number / counts.x / counts.y};
+  // Samples of the padded voxels that the brick's corners need, from `begin` on.
+  const Index3 left = box.padded - begin;
+  const std::int32_t rows = std::min(GradientBricks::kRow, left.y - 2), slices = std::min(GradientBricks::kRow, left.z - 2);
+  const T* const samples = reinterpret_cast<const T*>(box.samples);
+  const T* const from = samples + std::ptrdiff_t{begin.z} * box.slice + std::ptrdiff_t{begin.y} * box.row + begin.x;
+  GradientCorner* const corners = bricks.corners() + first;
+  const T* const end = samples + std::ptrdiff_t{box.padded.z} * box.slice;
+  if (from + std::ptrdiff_t{slices + 1} * box.slice + std::ptrdiff_t{rows + 1} * box.row + kRead <= end) {
+    MakeCorners(from + 1 + box.row + box.slice, box.row, box.slice, rows, slices, corners);
+    return;
+  }
+  // Whole registers would read beyond the last sample.
+  constexpr std::int32_t kAround = GradientBricks::kRow + 2;
+  T copy[kAround * kAround * kRead] = {};
+  for (std::int32_t z = 0; z < slices + 2; ++z) {
+    for (std::int32_t y = 0; y < rows + 2; ++y) {
+      std::copy_n(from + std::ptrdiff_t{z} * box.slice + std::ptrdiff_t{y} * box.row, std::min(kAround, left.x),
+                  copy + (z * kAround + y) * kRead);
+    }
+  }
+  MakeCorners(copy + 1 + kRead + kAround * kRead, kRead, kAround * kRead, rows, slices, corners);
+}
+
+// --- Reading them.
+
+// Lanes as numbers in memory. From a store that it sees the compiler would take them lane by lane, which takes registers longer.
+struct LaneNumbers {
+  HWY_ALIGN std::int32_t number[kLanes];
+
+  HWY_INLINE explicit LaneNumbers(Ints lanes) {
+    hn::Store(lanes, IntTag(), number);
+    asm("" : "+m"(number));
+  }
+  HWY_INLINE std::int32_t operator[](std::size_t lane) const { return number[lane]; }
+};
+
+// The brick in which each ray is.
+struct RayBricks {
+  Ints number, first;  // kNone: of a ray that has not been in a brick
+
+  HWY_INLINE RayBricks() : number(SetInt(GradientBricks::kNone)), first(hn::Zero(IntTag())) {}
+};
+
+// Finds the bricks `numbers` of the lanes `needed`.
+template <class T>
+HWY_NOINLINE void FindBricks(const RayBox& box, Ints numbers, Mask alive, Mask needed, GradientBricks& bricks, RayBricks& rays) {
+  using IntMask = hn::Mask<IntTag>;
+  const IntTag di;
+  const LaneNumbers number(numbers);
+  const auto alive_i = hn::RebindMask(di, alive);
+  IntMask missing = hn::RebindMask(di, needed);
+  for (std::intptr_t lane = hn::FindFirstTrue(di, missing); lane >= 0; lane = hn::FindFirstTrue(di, missing)) {
+    const std::int32_t brick = number[std::size_t(lane)];
+    std::int32_t first = bricks.Find(brick);
+    if (first == GradientBricks::kNone) {
+      if (bricks.full()) {  // all rays lose their bricks
+        bricks.Clear();
+        rays.number = SetInt(GradientBricks::kNone);
+        missing = alive_i;
+        continue;
+      }
+      first = bricks.Add(brick);
+      MakeBrick<T>(box, brick, bricks, first);
+    }
+    const IntMask found = hn::And(missing, hn::Eq(numbers, SetInt(brick)));
+    rays.number = hn::IfThenElse(found, numbers, rays.number);
+    rays.first = hn::IfThenElse(found, SetInt(first), rays.first);
+    missing = hn::AndNot(found, missing);
+  }
+}
+
+// The first corner of each sample; of rays that are not `alive` any corner. What is read thus never waits for what became of a ray.
+template <class T>
+HWY_INLINE Ints CornersOf(const RayBox& box, const SamplePlace& place, Mask alive, GradientBricks& bricks, RayBricks& rays) {
+  constexpr int kShift = GradientBricks::kShift;
+  const IntTag di;
+  const Index3 counts = bricks.CountsOf(box);
+  const auto row = hn::Add(hn::Mul(hn::ShiftRight<kShift>(place.voxel[2]), SetInt(counts.y)), hn::ShiftRight<kShift>(place.voxel[1]));
+  const auto number = hn::Add(hn::Mul(row, SetInt(counts.x)), hn::ShiftRight<kShift>(place.voxel[0]));
+  const auto needed = hn::And(hn::RebindMask(di, alive), hn::Ne(number, rays.number));
+  if (!hn::AllFalse(di, needed)) FindBricks<T>(box, number, alive, hn::RebindMask(FloatTag(), needed), bricks, rays);
+  const auto within = SetInt(GradientBricks::kSide - 1);
+  const auto z = hn::And(place.voxel[2], within), y = hn::And(place.voxel[1], within), x = hn::And(place.voxel[0], within);
+  const auto nine = [&](Ints i) HWY_ATTR { return hn::Add(hn::ShiftLeft<3>(i), i); };
+  static_assert(GradientBricks::kRow == 9);
+  return hn::Add(rays.first, hn::Add(nine(hn::Add(nine(z), y)), x));
+}
+
+// The weights of the two corners along x, in 2^-14: the first in the lower half of a lane, the second in the upper one.
+struct CornerWeights {
+  Ints pairs[2][2];  // [z][y]
+};
+HWY_INLINE CornerWeights WeightsAt(const SamplePlace& place) {
+  const IntTag di;
+  const auto one = Set(1 << 14);
+  CornerWeights weights;
+  const auto z1 = hn::Round(hn::Mul(place.fraction[2], one)), z0 = hn::Sub(one, z1);
+  for (int z = 0; z < 2; ++z) {
+    const auto both = z == 0 ? z0 : z1;
+    const auto y1 = hn::Round(hn::Mul(place.fraction[1], both)), y0 = hn::Sub(both, y1);
+    for (int y = 0; y < 2; ++y) {
+      const auto pair = y == 0 ? y0 : y1;
+      const auto x1 = hn::NearestInt(hn::Mul(place.fraction[0], pair));
+      weights.pairs[z][y] = hn::Add(hn::Sub(hn::ConvertTo(di, pair), x1), hn::ShiftLeft<16>(x1));
+    }
+  }
+  return weights;
+}
+
+struct LitSample {
+  Floats value;
+  Gradient gradient;
+};
+// The table's entries, four floats each: lane by lane `at`, in floats.
+struct Entries {
+  Floats part[4];
+};
+
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE Entries EntriesAt(const float* table, Ints at) {
+  const FloatTag df;
+  return {{hn::GatherIndex(df, table, at), hn::GatherIndex(df, table + 1, at), hn::GatherIndex(df, table + 2, at),
+           hn::GatherIndex(df, table + 3, at)}};
+}
+
+template <class T>
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, Ints at, const SamplePlace& place) {
+  const CornerWeights weights = WeightsAt(place);
+  std::int32_t value = 0, x = 0, y = 0, z = 0;
+  const auto add = [&](const GradientCorner& corner, std::int32_t weight) {
+    value += corner.value * weight;
+    x += corner.x * weight;
+    y += corner.y * weight;
+    z += corner.z * weight;
+  };
+  for (int slice = 0; slice < 2; ++slice) {
+    for (int row = 0; row < 2; ++row) {
+      const GradientCorner* const pair = corners + hn::GetLane(at) + slice * GradientBricks::kSlice + row * GradientBricks::kRow;
+      const std::int32_t both = hn::GetLane(weights.pairs[slice][row]);
+      add(pair[0], both & 0xFFFF);
+      add(pair[1], both >> 16);
+    }
+  }
+  const auto of = [](std::int32_t sum) { return Set(float(sum) * (1.0F / (1 << 14))); };
+  if constexpr (sizeof(T) == 2) value += 32768 << 14;
+  return {of(value), {of(x), of(y), of(z)}};
+}
+#else
+// Four registers of four numbers a block as four registers of one number each, by block: 4x4 matrices turned over.
+template <class D>
+HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
+  const hn::RepartitionToWide<D> dw;
+  const auto lower = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveLower(d, a, b); };
+  const auto upper = [&](hn::Vec<D> a, hn::Vec<D> b) HWY_ATTR { return hn::InterleaveUpper(d, a, b); };
+  const auto a = hn::BitCast(dw, lower(v[0], v[1])), b = hn::BitCast(dw, lower(v[2], v[3]));
+  const auto e = hn::BitCast(dw, upper(v[0], v[1])), f = hn::BitCast(dw, upper(v[2], v[3]));
+  v[0] = hn::BitCast(d, hn::InterleaveLower(dw, a, b));
+  v[1] = hn::BitCast(d, hn::InterleaveUpper(dw, a, b));
+  v[2] = hn::BitCast(d, hn::InterleaveLower(dw, e, f));
+  v[3] = hn::BitCast(d, hn::InterleaveUpper(dw, e, f));
+}
+
+// A register whose block b is load(4 b).
+template <class Tag, class Load>
+HWY_INLINE auto FromBlocks(Tag d, Load&& load) {
+  constexpr std::size_t kBlocks = hn::MaxLanes(FloatTag()) / 4;
+  if constexpr (kBlocks == 1) {
+    return load(0);
+  } else if constexpr (kBlocks == 2) {
+    return hn::Combine(d, load(4), load(0));
+  } else {
+    const hn::Half<Tag> half;
+    return hn::Combine(d, hn::Combine(half, load(12), load(8)), hn::Combine(half, load(4), load(0)));
+  }
+}
+
+HWY_INLINE Entries EntriesAt(const float* table, Ints at) {
+  const FloatTag df;
+  const LaneNumbers index(at);
+  Entries entries;
+  for (std::size_t group = 0; group < 4; ++group) {
+    entries.part[group] =
+        FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<float, 4>(), table + index[lane + group]); });
+  }
+  TurnBlocks(df, entries.part);
+  return entries;
+}
+
+// `at`: CornersOf.
+template <class T>
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, Ints at, const SamplePlace& place) {
+  const FloatTag df;
+  const IntTag di;
+  const hn::RepartitionToNarrow<IntTag> ds;
+  const LaneNumbers index(at);
+  const CornerWeights weights = WeightsAt(place);
+  // Neighbours along x side by side, for each of the four numbers.
+  HWY_ALIGN static constexpr std::uint8_t kPairs[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
+  const auto pairs = hn::BitCast(ds, hn::LoadDup128(hn::Repartition<std::uint8_t, IntTag>(), kPairs));
+  Ints sums[4];
+  // Lanes `group`, 4 + group and so on: one to a block.
+  const auto sum_of = [&](auto number) SLABSTREAM_INLINED {
+    constexpr int kGroup = decltype(number)::value;
+    Ints sum = hn::Zero(di), rest = hn::Zero(di);
+    for (int z = 0; z < 2; ++z) {
+      for (int y = 0; y < 2; ++y) {
+        const GradientCorner* const row = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
+        const auto voxels = FromBlocks(
+            ds, [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<std::int16_t, 8>(), &row[index[lane + kGroup]].value); });
+        const auto weight = hn::BitCast(ds, hn::Broadcast<kGroup>(weights.pairs[z][y]));
+        sum = hn::ReorderWidenMulAccumulate(di, hn::TableLookupBytes(voxels, pairs), weight, sum, rest);
+      }
+    }
+    return hn::RearrangeToOddPlusEven(sum, rest);
+  };
+  sums[0] = sum_of(std::integral_constant<int, 0>());
+  sums[1] = sum_of(std::integral_constant<int, 1>());
+  sums[2] = sum_of(std::integral_constant<int, 2>());
+  sums[3] = sum_of(std::integral_constant<int, 3>());
+  TurnBlocks(di, sums);
+  const auto scale = Set(1.0F / (1 << 14));
+  const auto of = [&](Ints sum) HWY_ATTR { return hn::Mul(hn::ConvertTo(df, sum), scale); };
+  if constexpr (sizeof(T) == 2) sums[0] = hn::Add(sums[0], SetInt(32768 << 14));
+  return {of(sums[0]), {of(sums[1]), of(sums[2]), of(sums[3])}};
+}
+#endif
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif
