@@ -63,21 +63,21 @@ struct OpenQuestion {
 
 struct Event {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply,
-               DataReply>
+  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, StatusReply,
+               ShutDownReply, KeysReply, DataReply>
       what;
 };
 
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(Event event) {
-  const auto what =
-      Overloaded{[](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
-                 [](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
-                   return QuestionReply(std::move(reply));
-                 },
-                 [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
-                   return Status::Internal("the service answered another question");
-                 }};
+  const auto what = Overloaded{
+      [](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
+      [](AnyOf<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
+        return QuestionReply(std::move(reply));
+      },
+      [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
+        return Status::Internal("the service answered another question");
+      }};
   return {event.request, std::visit(what, event.what)};
 }
 
@@ -207,18 +207,17 @@ bool Client::Impl::Receive() {
 }
 
 void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
-  const auto handle = Overloaded{
-      [&](const FrameProgress& progress) {
-        if (open.contains(progress.request)) events.push_back({progress.request, progress});
-      },
-      [&](FrameReply& reply) { Handle(reply, payload); },
-      [&](const FrameFailed& failed) { End(failed.request, failed.status); },
-      [&](const ClientPong& pong) { Handle(pong); },
-      [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
-      [&](AnyOf<SummaryReply, SampleReply, StatisticsReply, PickReply, StatusReply, ShutDownReply, KeysReply, DataReply> auto& reply) {
-        End(reply.nonce, std::move(reply));
-      },
-      [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
+  const auto handle =
+      Overloaded{[&](const FrameProgress& progress) {
+                   if (open.contains(progress.request)) events.push_back({progress.request, progress});
+                 },
+                 [&](FrameReply& reply) { Handle(reply, payload); },
+                 [&](const FrameFailed& failed) { End(failed.request, failed.status); },
+                 [&](const ClientPong& pong) { Handle(pong); },
+                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+                 [&](AnyOf<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, StatusReply, ShutDownReply,
+                           KeysReply, DataReply> auto& reply) { End(reply.nonce, std::move(reply)); },
+                 [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
 }
 

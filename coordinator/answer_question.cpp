@@ -52,6 +52,21 @@ Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& datase
   return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = *statistics});
 }
 
+Result<QuestionReply> AnswerJointHistogram(const JointHistogramQuery& query, const VolumeSummary& summary, const ReadJointBox& read) {
+  Result<JointHistogram> histogram = CountJointly(summary.description, summary.range, read);
+  if (!histogram.ok()) return histogram.status();
+  return QuestionReply(JointHistogramReply{.nonce = query.nonce, .range = summary.range, .histogram = *std::move(histogram)});
+}
+
+Result<QuestionReply> Answer(const JointHistogramQuery& query, const Dataset& dataset) {
+  const VoxelBricks& voxels = *dataset.volume.voxels.held();
+  return AnswerJointHistogram(query, *dataset.summary, [&](const Box& box) {
+    VoxelBlock block = MakeVoxelBlock(box, voxels.type());
+    voxels.Read(box, 0, block.bytes);
+    return Result<VoxelBlock>(std::move(block));
+  });
+}
+
 Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, dataset.id, dataset.summary);
   if (!resolved.ok()) return resolved.status();
@@ -138,6 +153,10 @@ Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuest
   if (!block.ok()) return block.status();
   const ProbeVolume volume{.voxels = VoxelBricks(*block)};
   return Answer(query, {volume, asked.summary, asked.dataset});
+}
+
+Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
+  return AnswerJointHistogram(query, *asked.summary, [&](const Box& box) { return ReadBox(from, box); });
 }
 
 Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {

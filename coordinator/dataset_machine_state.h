@@ -121,6 +121,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const SummaryQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const SampleQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);

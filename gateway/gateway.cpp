@@ -212,6 +212,7 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/command"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Command)};
     routes["/api/v1/turntable.mp4"] = {.takes_post = true, .handle = bind(movies_, &MovieRequests::Turntable)};
     routes["/api/v1/histogram"] = {.handle = bind(questions_, &QuestionRequests::Histogram)};
+    routes["/api/v1/joint-histogram"] = {.handle = bind(questions_, &QuestionRequests::JointHistogram)};
     routes["/api/v1/labels"] = {.handle = bind(questions_, &QuestionRequests::Labels)};
     routes["/api/v1/value"] = {.handle = bind(questions_, &QuestionRequests::Value)};
     routes["/api/v1/profile"] = {.handle = bind(questions_, &QuestionRequests::Profile)};

@@ -144,6 +144,7 @@ Json OpenApi() {
        true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
+      {"/api/v1/joint-histogram", "How often values occur together with slopes", "application/json", false, dataset},
       {"/api/v1/labels", "The labels of a dataset, with their names and colours", "application/json", false, dataset},
       {"/api/v1/value", "The voxel, value and label of a dataset at a point", "application/json", false,
        With(dataset, {field("at", kPointHelp, "X,Y,Z")})},

@@ -51,6 +51,15 @@ void QuestionRequests::Histogram(PictureFields fields, ReplyFunction reply, cons
   Ask("histogram", SummaryQuery{.dataset = *dataset, .transfer = {}}, make, std::move(reply), gone);
 }
 
+void QuestionRequests::JointHistogram(PictureFields fields, ReplyFunction reply, const Gone& gone) {
+  Result<std::string> dataset = OnlyDataset(std::move(fields));
+  if (!dataset.ok()) return reply(Failure(dataset.status()));
+  const auto make = [name = *dataset](const QuestionReply& answer) {
+    return JsonReply(JointHistogramJson(name, std::get<JointHistogramReply>(answer)));
+  };
+  Ask("joint-histogram", JointHistogramQuery{.dataset = *dataset}, make, std::move(reply), gone);
+}
+
 void QuestionRequests::Labels(PictureFields fields, ReplyFunction reply, const Gone& gone) {
   Result<std::string> dataset = OnlyDataset(std::move(fields));
   if (!dataset.ok()) return reply(Failure(dataset.status()));

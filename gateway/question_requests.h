@@ -14,6 +14,7 @@ class QuestionRequests {
   QuestionRequests(boost::asio::io_context& io, Metrics& metrics, ServiceLink& link);
 
   void Histogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
+  void JointHistogram(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Labels(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Value(PictureFields fields, ReplyFunction reply, const Gone& gone);
   void Profile(PictureFields fields, ReplyFunction reply, const Gone& gone);

@@ -28,6 +28,15 @@ Json HistogramJson(const std::string& dataset, const SummaryReply& summary) {
           {"percentiles", std::move(percentiles)}};
 }
 
+Json JointHistogramJson(const std::string& dataset, const JointHistogramReply& reply) {
+  return {{"dataset", dataset},
+          {"range", {reply.range.min, reply.range.max}},
+          {"steepest", reply.histogram.steepest},
+          {"values", kJointValues},
+          {"slopes", kJointSlopes},
+          {"counts", reply.histogram.counts}};
+}
+
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary) {
   const auto channel = [](float share) { return int(std::lround(share * 255)); };
   Json labels = Json::array();

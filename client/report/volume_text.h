@@ -12,6 +12,9 @@ namespace slabstream {
 // {"dataset", "range", "counts", "non_finite", "percentiles": {"50": value, ...}}
 nlohmann::ordered_json HistogramJson(const std::string& dataset, const SummaryReply& summary);
 
+// {"dataset", "range", "steepest", "values", "slopes", "counts"}
+nlohmann::ordered_json JointHistogramJson(const std::string& dataset, const JointHistogramReply& reply);
+
 // {"dataset", "labels": [{"value", "name", "color": "#rrggbb"}, ...]}
 nlohmann::ordered_json LabelsJson(const std::string& dataset, const SummaryReply& summary);
 

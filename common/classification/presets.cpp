@@ -128,6 +128,54 @@ TransferFunction CtSkin(const VolumeSummary& summary) {
           {{std::midpoint(ct.air, ct.skin), 0}, {ct.skin, 0.4}, {ct.soft_tissue, 0.9}}};
 }
 
+// ---- CT, by value and slope
+
+// The slope halfway between two materials that meet within three voxels, as blurred as scanners make borders.
+double SlopeBetween(double one, double other, const VolumeSummary& summary) {
+  const Vec3& spacing = summary.description.geometry.spacing;
+  return std::abs(other - one) / (3 * std::min({spacing.x, spacing.y, spacing.z}));
+}
+// Beyond every slope that central differences have.
+double SteepestIn(const VolumeSummary& summary) {
+  const double width = double(summary.range.max) - double(summary.range.min);
+  const Vec3& spacing = summary.description.geometry.spacing;
+  return std::clamp(width / std::min({spacing.x, spacing.y, spacing.z}), 1e-300, kMaxScalar);
+}
+// As a preset, whose range may have no width.
+TransferRegion RegionBetween(RegionCorner from, RegionCorner to, const Rgb& color, double opacity, double softness) {
+  to.value = std::max(to.value, std::nextafter(from.value, kMaxScalar));
+  to.slope = std::max(to.slope, std::nextafter(from.slope, kMaxScalar));
+  return {{from, {to.value, from.slope}, to, {from.value, to.slope}}, color, opacity, softness};
+}
+TransferFunction OfRegions(std::vector<TransferRegion> regions) {
+  return WithCurvesOfRegions({.colors = {}, .opacities = {}, .regions = std::move(regions)});
+}
+
+// Dense borders of bones, and their insides as a veil.
+TransferFunction CtBoneBorders(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  const double border = SlopeBetween(ct.soft_tissue, ct.dense_bone, summary), steepest = SteepestIn(summary);
+  const double most = std::max(ct.metal, double(summary.range.max));
+  return OfRegions({RegionBetween({ct.bone, 0}, {most, border}, {0.80F, 0.52F, 0.40F}, 0.05, 0.2),
+                    RegionBetween({std::lerp(ct.bone, ct.dense_bone, 0.3), 0.35 * border}, {most, steepest}, kBone, 0.9, 0.1)});
+}
+
+// The border of air and skin as a veil, and the borders of bones.
+TransferFunction CtSkinVeil(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  const double skin = SlopeBetween(ct.air, ct.soft_tissue, summary), bone = SlopeBetween(ct.soft_tissue, ct.dense_bone, summary);
+  const double most = std::max(ct.metal, double(summary.range.max)), steepest = SteepestIn(summary);
+  return OfRegions({RegionBetween({std::midpoint(ct.air, ct.skin), 0.3 * skin}, {ct.soft_tissue, steepest}, kSkin, 0.12, 0.2),
+                    RegionBetween({std::lerp(ct.bone, ct.dense_bone, 0.3), 0.35 * bone}, {most, steepest}, kBone, 0.9, 0.1)});
+}
+
+// Contrast agent between soft tissue and bone: brighter than tissue, and its borders are flatter than those of bones.
+TransferFunction CtVessels(const VolumeSummary& summary) {
+  const CtScale ct = FindCtScale(summary.range);
+  const double begin = std::lerp(ct.soft_tissue, ct.bone, 0.6), border = SlopeBetween(ct.soft_tissue, ct.dense_bone, summary);
+  return OfRegions({RegionBetween({begin, 0}, {std::lerp(ct.dense_bone, ct.metal, 0.1), border}, {0.85F, 0.16F, 0.12F}, 0.6, 0.3)});
+}
+
 // ---- Fitted to the values above the background
 
 // The bins above the background; if there are none the upper half of all bins, so that each preset shows something of any volume.
@@ -227,6 +275,9 @@ std::vector<TransferPreset> AllPresets() {
       {"ct-bone", "CT: bones", CtBone},
       {"ct-soft-tissue", "CT: bones in a veil of muscle", CtSoftTissue},
       {"ct-skin", "CT: the skin, solid", CtSkin},
+      {"ct-bone-2d", "CT, by value and gradient: borders of bones, their insides as a veil", CtBoneBorders},
+      {"ct-skin-2d", "CT, by value and gradient: the skin as a veil round the bones", CtSkinVeil},
+      {"ct-vessels-2d", "CT angiography, by value and gradient: vessels without the borders of bones", CtVessels},
       {"mri-brain", "MRI: the surface of a brain whose skull was removed", MriBrain},
       {"mri-head", "MRI: a whole head, the skin as a veil", MriHead},
       {"angiography", "CT or MR angiography: the vessels", Angiography},

@@ -16,8 +16,8 @@ Status WrongField(std::string_view curve, std::size_t point, std::string_view fi
       fmt::format("transfer function: {} of {} point {} is {:g}, must be {}", field, curve, point, value, limit));
 }
 
-Status CheckCount(std::string_view curve, std::size_t count) {
-  if (count >= 1 && count <= std::size_t{kMaxTransferPoints}) return Status::Ok();
+Status CheckCount(std::string_view curve, std::size_t count, bool may_be_none) {
+  if ((count >= 1 || may_be_none) && count <= std::size_t{kMaxTransferPoints}) return Status::Ok();
   return Status::InvalidArgument(
       fmt::format("transfer function: number of {} points is {}, must be in [1, {}]", curve, count, kMaxTransferPoints));
 }
@@ -75,6 +75,7 @@ Rgb Brightened(Rgb color, double factor) {
 
 Rgb TransferFunction::Color(double value) const {
   const std::size_t end = SegmentEnd(colors, value);
+  if (colors.empty()) return {};
   if (end == 0) return colors.front().color;
   if (end == colors.size()) return colors.back().color;
   const ColorPoint& a = colors[end - 1];
@@ -85,6 +86,7 @@ Rgb TransferFunction::Color(double value) const {
 
 double TransferFunction::Opacity(double value) const {
   const std::size_t end = SegmentEnd(opacities, value);
+  if (opacities.empty()) return 0;
   if (end == 0) return opacities.front().opacity;
   if (end == opacities.size()) return opacities.back().opacity;
   const OpacityPoint& a = opacities[end - 1];
@@ -92,11 +94,52 @@ double TransferFunction::Opacity(double value) const {
   return Interpolate(a, b, Fraction(value, a.value, b.value));
 }
 
+TransferFunction WithCurvesOfRegions(TransferFunction transfer) {
+  if (transfer.regions.empty()) return transfer;
+  transfer.colors.clear();
+  transfer.opacities.clear();
+  // Between these values all trapezoids of MostOpacityAt are linear.
+  std::vector<double> values;
+  for (const TransferRegion& region : transfer.regions) {
+    const auto [least, greatest] = BoundsOf(region);
+    for (const double share : {0.0, region.softness / 2, 1 - region.softness / 2, 1.0}) {
+      values.push_back(std::lerp(least.value, greatest.value, share));
+    }
+  }
+  std::ranges::sort(values);
+  values.erase(std::ranges::unique(values).begin(), values.end());
+  // On either side of a value: a hard border makes a step there.
+  const auto add = [&](double value, double beside) {
+    double most = 0, total = 0, r = 0, g = 0, b = 0;
+    for (const TransferRegion& region : transfer.regions) {
+      const auto [least, greatest] = BoundsOf(region);
+      if (!(least.value <= beside && beside <= greatest.value)) continue;
+      const double opacity = MostOpacityAt(region, beside), weight = opacity + 1e-6;
+      most = std::max(most, opacity);
+      total += weight;
+      r += weight * double(region.color.r);
+      g += weight * double(region.color.g);
+      b += weight * double(region.color.b);
+    }
+    transfer.opacities.push_back({value, most});
+    if (total > 0) transfer.colors.push_back({value, {float(r / total), float(g / total), float(b / total)}});
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double value : values) {
+    add(value, std::nextafter(value, -kInfinity));
+    add(value, std::nextafter(value, kInfinity));
+  }
+  return transfer;
+}
+
 TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range) {
   double least = std::numeric_limits<double>::infinity(), greatest = -least;
   const auto each = [&](auto&& visit) {
     for (ColorPoint& point : transfer.colors) visit(point.value);
     for (OpacityPoint& point : transfer.opacities) visit(point.value);
+    for (TransferRegion& region : transfer.regions) {
+      for (RegionCorner& corner : region.corners) visit(corner.value);
+    }
   };
   each([&](double value) {
     least = std::min(least, value);
@@ -113,8 +156,9 @@ TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range) 
 Status Validate(const TransferFunction& transfer) {
   // Negated comparisons, so that NaN is never within a limit.
   const auto outside = [](double value, double low, double high) { return !(value >= low && value <= high); };
-  if (Status status = CheckCount("colour", transfer.colors.size()); !status.ok()) return status;
-  if (Status status = CheckCount("opacity", transfer.opacities.size()); !status.ok()) return status;
+  const bool two_dimensional = !transfer.regions.empty();
+  if (Status status = CheckCount("colour", transfer.colors.size(), two_dimensional); !status.ok()) return status;
+  if (Status status = CheckCount("opacity", transfer.opacities.size(), two_dimensional); !status.ok()) return status;
   if (Status status = CheckValues("colour", transfer.colors); !status.ok()) return status;
   if (Status status = CheckValues("opacity", transfer.opacities); !status.ok()) return status;
   for (std::size_t i = 0; i < transfer.colors.size(); ++i) {
@@ -135,6 +179,7 @@ Status Validate(const TransferFunction& transfer) {
   }
   if (Status status = Validate(transfer.isosurfaces); !status.ok()) return status;
   if (Status status = Validate(transfer.gradient_opacities); !status.ok()) return status;
+  if (Status status = Validate(transfer.regions); !status.ok()) return status;
   return Validate(transfer.material.value_or(Material()));
 }
 

@@ -5,6 +5,9 @@
 // Beside the curves, isosurfaces may stand at single values, a second opacity curve may lie over the gradient's magnitude, and one material
 // may say how all that the function shows answers light.
 //
+// A two-dimensional transfer function has regions of values and slopes in place of the curves. CurvesOf makes curves that go with them:
+// where these are 0, no region shows anything. So all that depends on values alone (what is skipped, planned, counted) works by the curves.
+//
 // Opacity is that of `opacity_distance` voxel lengths of material (the smallest spacing), so a value's extinction per voxel length is
 // -ln(1 - opacity) / opacity_distance; renderers correct it for the distance between their samples.
 // Colours are straight (not premultiplied) and taken as linear: an opaque, unshaded voxel shows exactly these values.
@@ -17,6 +20,8 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/classification/rgb.h"
+#include "common/classification/transfer_region.h"
 #include "common/view/material.h"
 #include "common/volume/summary.h"
 
@@ -27,10 +32,6 @@ inline constexpr double kMaxOpacityDistance = 1e6;  // voxel lengths
 inline constexpr int kMaxIsosurfaces = 8;
 inline constexpr double kMaxScalar = 1e300;  // of isovalues, slopes and the ends of scalar ranges; either sign
 
-struct Rgb {
-  float r = 0, g = 0, b = 0;
-  friend bool operator==(const Rgb&, const Rgb&) = default;
-};
 // Each channel times the factor, at most 1 (FrameRequest::brightness).
 Rgb Brightened(Rgb color, double factor);
 
@@ -66,17 +67,23 @@ struct GradientOpacityPoint {
 double GradientOpacity(const std::vector<GradientOpacityPoint>& points, double slope);
 
 struct TransferFunction {
-  std::vector<ColorPoint> colors;                             // 1 ... kMaxTransferPoints
-  std::vector<OpacityPoint> opacities;                        // 1 ... kMaxTransferPoints
+  std::vector<ColorPoint> colors;                             // 1 ... kMaxTransferPoints; with regions perhaps none
+  std::vector<OpacityPoint> opacities;                        // 1 ... kMaxTransferPoints; with regions perhaps none
   double opacity_distance = 1;                                // voxel lengths, (0, kMaxOpacityDistance]
   std::vector<Isosurface> isosurfaces = {};                   // at most kMaxIsosurfaces, their values ascend
   std::vector<GradientOpacityPoint> gradient_opacities = {};  // at most kMaxTransferPoints; empty: the factor is 1
   std::optional<Material> material = {};                      // none: that of the request (OnMaterial)
+  std::vector<TransferRegion> regions = {};                   // at most kMaxTransferRegions
 
-  Rgb Color(double value) const;       // value finite
-  double Opacity(double value) const;  // value finite; in [0, 1]
+  // By the curves; value finite.
+  Rgb Color(double value) const;
+  double Opacity(double value) const;  // [0, 1]
   friend bool operator==(const TransferFunction&, const TransferFunction&) = default;
 };
+
+// The same function with the curves that go with its regions: at each value the opacity of the most opaque region, and the mean of the
+// regions' colours. `transfer` valid; without regions it stays as it is.
+TransferFunction WithCurvesOfRegions(TransferFunction transfer);
 
 struct ScalarRange {
   double min = 0, max = 1;   // data values, or
@@ -85,8 +92,8 @@ struct ScalarRange {
 };
 // The range in data values.
 ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary);
-// The same curves, moved and stretched so that their points lie between range.min (the least one) and range.max (the greatest): data
-// values, finite, min <= max. A function whose points all have one value puts them at range.min.
+// The same curves and regions, moved and stretched so that their points lie between range.min (the least one) and range.max (the greatest):
+// data values, finite, min <= max. A function whose points all have one value puts them at range.min.
 TransferFunction Stretched(TransferFunction transfer, const ScalarRange& range);
 
 // InvalidArgument naming the point, the value and the limit, unless everything stated above holds.
@@ -102,11 +109,14 @@ double MaxOpacity(const TransferFunction& transfer, double low, double high);
 
 // Parses ParaView's colour-map JSON: an array of presets (the first counts) or one preset object, with "RGBPoints" (x, r, g, b, ...) and
 // optional "Points" (x, opacity, midpoint, sharpness, ...); without "Points" the opacity rises linearly over the colour range. Beyond what
-// ParaView writes, "Material" may have "ambient", "diffuse", "specular" and "shininess"; those that are left out are the standard ones.
+// ParaView writes, "Material" may have "ambient", "diffuse", "specular" and "shininess"; those that are left out are the standard ones. In
+// place of the curves, "Regions" may be an array of objects with "Corners" (value, slope, ...) or with "Values" and "Slopes" (from, to: a
+// box), and "Color" (r, g, b), "Opacity" and "Softness"; the result has their curves (WithCurvesOfRegions).
 // Colours are interpolated in RGB; the map's ColorSpace is ignored. Errors: InvalidArgument, beginning with `name`.
 Result<TransferFunction> ParseParaViewColorMap(std::string_view json, std::string_view name);
 
-// The inverse, as a preset called `name`. `transfer` valid; only its curves over data values and its material have a place there.
+// The inverse, as a preset called `name`. `transfer` valid; only its curves over data values, or its regions, and its material have a place
+// there.
 std::string FormatParaViewColorMap(const TransferFunction& transfer, std::string_view name);
 
 struct ColorMap;

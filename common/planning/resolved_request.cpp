@@ -79,6 +79,8 @@ Result<LayerLooks> ResolveLayers(const FrameRequest& request, const VolumeSummar
     Result<TransferFunction> transfer =
         ResolveTransfer({.choice = request.overlay->choice, .scalar_range = request.overlay->scalar_range}, *summary.overlay);
     if (!transfer.ok()) return transfer.status();
+    if (!transfer->regions.empty())
+      return Status::InvalidArgument("overlay-transfer is a two-dimensional transfer function, which overlays do not have");
     if (request.overlay->weight > 0) {
       looks.overlay = OverlayLook{.transfer = *std::move(transfer), .range = summary.overlay->range, .weight = request.overlay->weight};
     }
@@ -99,6 +101,14 @@ namespace {
 void Brighten(double factor, TransferFunction& transfer) {
   for (ColorPoint& point : transfer.colors) point.color = Brightened(point.color, factor);
   for (Isosurface& surface : transfer.isosurfaces) surface.color = Brightened(surface.color, factor);
+  for (TransferRegion& region : transfer.regions) region.color = Brightened(region.color, factor);
+}
+
+// `asked`: the renderer's name in the request.
+Status CheckShowsRegions(const RendererKind& renderer, std::string_view asked, const TransferFunction& transfer) {
+  if (transfer.regions.empty() || renderer.Can(Ability::kRegions)) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but a two-dimensional transfer function needs one of: {}", asked,
+                                             NamesOfAble(NameOf(Ability::kRegions))));
 }
 
 }  // namespace
@@ -107,12 +117,13 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   const VolumeGeometry& geometry = summary->description.geometry;
   const RendererKind* const renderer =
       request.renderer == kAutomatic ? &DefaultRenderer(!summary->cells.empty()) : FindRenderer(request.renderer);
-  request.renderer = renderer->name();
+  const std::string asked = std::exchange(request.renderer, std::string(renderer->name()));
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
   if (const auto parameters = ParseParameters(*renderer, request.parameters); !parameters.ok()) return parameters.status();
   if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
+  if (Status status = CheckShowsRegions(*renderer, asked, *transfer); !status.ok()) return status;
   const auto* const name = std::get_if<std::string>(&request.transfer.choice);
   if (request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
     transfer->opacities = {{double(summary->range.min), 1}};
@@ -139,8 +150,8 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   transfer->opacity_distance = choice.opacity_distance;
   transfer->isosurfaces = choice.isosurfaces;
   transfer->gradient_opacities = choice.gradient_opacities;
-  if (choice.scalar_range) return Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
-  return transfer;
+  if (choice.scalar_range) transfer = Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
+  return WithCurvesOfRegions(*std::move(transfer));
 }
 
 }  // namespace slabstream

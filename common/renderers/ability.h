@@ -20,12 +20,13 @@ enum class Ability : std::uint8_t {
   kTransfer = 8,         // shows values by the transfer function
   kLevels = 9,           // draws boxes of one picture from several levels of the dataset
   kShadows = 10,         // shows shadows and ambient occlusion (Shading)
+  kRegions = 11,         // shows TransferFunction::regions
 };
 
 // By value; as the service tells them to clients.
-inline constexpr std::array<std::string_view, 11> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
+inline constexpr std::array<std::string_view, 12> kAbilityNames = {"perspective", "isosurfaces", "gradient-opacity", "labels",
                                                                    "overlay",     "cells",       "lights",           "depth-shading",
-                                                                   "transfer",    "levels",      "shadows"};
+                                                                   "transfer",    "levels",      "shadows",          "regions"};
 constexpr std::string_view NameOf(Ability ability) { return kAbilityNames.at(std::size_t(ability)); }
 
 }  // namespace slabstream

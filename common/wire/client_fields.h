@@ -373,6 +373,24 @@ void Fields(auto& io, Is<StatisticsReply> auto& m) {
   io.Finite("largest", largest, &P::largest, &P::set_largest);
 }
 
+v1::JointHistogramQuery ProtoOf(const JointHistogramQuery&);
+void Fields(auto& io, Is<JointHistogramQuery> auto& m) {
+  using P = v1::JointHistogramQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
+}
+
+v1::JointHistogramReply ProtoOf(const JointHistogramReply&);
+void Fields(auto& io, Is<JointHistogramReply> auto& m) {
+  using P = v1::JointHistogramReply;
+  constexpr std::size_t kCounts = std::size_t{kJointValues} * kJointSlopes;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("range", m.range, &P::range, &P::mutable_range);
+  io.Between("steepest", m.histogram.steepest, &P::steepest, &P::set_steepest, 0, std::numeric_limits<double>::max());
+  io.Numbers("counts", m.histogram.counts, &P::counts, &P::mutable_counts, kCounts);
+  io.Check([&](Checker& check) { check.That(m.histogram.counts.size() == kCounts, "counts", "not as many bins as expected"); });
+}
+
 v1::PickQuery ProtoOf(const PickQuery&);
 void Fields(auto& io, Is<PickQuery> auto& m) {
   using P = v1::PickQuery;

@@ -16,6 +16,7 @@
 //   SummaryQuery ------------------------>  SummaryReply
 //   SampleQuery ------------------------->  SampleReply
 //   StatisticsQuery --------------------->  StatisticsReply
+//   JointHistogramQuery ----------------->  JointHistogramReply
 //   PickQuery --------------------------->  PickReply
 //   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
 //   OrderRefused.
@@ -36,6 +37,7 @@
 #include "common/wire/ids.h"
 #include "common/wire/volume_messages.h"
 #include "coordinator/probe/box_statistics.h"
+#include "coordinator/probe/joint_histogram.h"
 #include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
@@ -304,6 +306,20 @@ struct StatisticsReply {
   friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
 };
 
+// Values and slopes together (coordinator/probe/joint_histogram.h).
+struct JointHistogramQuery {
+  std::uint64_t nonce = 0;
+  std::string dataset;  // 1 ... kMaxNameBytes
+  friend bool operator==(const JointHistogramQuery&, const JointHistogramQuery&) = default;
+};
+
+struct JointHistogramReply {
+  std::uint64_t nonce = 0;
+  ValueRange range;  // as VolumeSummary
+  JointHistogram histogram;
+  friend bool operator==(const JointHistogramReply&, const JointHistogramReply&) = default;
+};
+
 // The point that a pixel shows (coordinator/probe/pick.h).
 struct PickQuery {
   std::uint64_t nonce = 0;
@@ -320,16 +336,19 @@ struct PickReply {
 };
 
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
-using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
+using ClientToDatasets =
+    std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, AddVolume, VolumePart, DropVolume>;
 using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
-using CoordinatorToClient = std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply,
-                                         DataReply, OrderRefused, SummaryReply, SampleReply, StatisticsReply, PickReply, VolumeCredit>;
+using CoordinatorToClient =
+    std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply, DataReply, OrderRefused,
+                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, VolumeCredit>;
 
-using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, PickQuery>;
-using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, PickReply>;
+using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply>;
 inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
+inline const std::string& DatasetOf(const JointHistogramQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);

@@ -240,7 +240,8 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
   if (check.ok() && out.looks.overlay) check.That(out.renderer->Can(Ability::kOverlay), "renderer", "one that shows no overlays");
   if (check.ok() && out.looks.overlay) {
     const TransferFunction& transfer = out.looks.overlay->transfer;
-    check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty(), "overlay.transfer", "not of curves over values alone");
+    check.That(transfer.isosurfaces.empty() && transfer.gradient_opacities.empty() && transfer.regions.empty(), "overlay.transfer",
+               "not of curves over values alone");
     check.Adopt(Validate(transfer));
   }
   if (check.ok()) check.Adopt(Validate(out.transfer));

@@ -116,6 +116,22 @@ void Fields(auto& io, Is<Material> auto& m) {
   io.Finite("shininess", m.shininess, &P::shininess, &P::set_shininess);
 }
 
+void Fields(auto& io, Is<RegionCorner> auto& m) {
+  using P = v1::RegionCorner;
+  io.Finite("value", m.value, &P::value, &P::set_value);
+  io.Finite("slope", m.slope, &P::slope, &P::set_slope);
+}
+
+void Fields(auto& io, Is<TransferRegion> auto& m) {
+  using P = v1::TransferRegion;
+  io.Messages("corners", m.corners, &P::corners, &P::mutable_corners, kMaxRegionCorners);
+  io.Finite("r", m.color.r, &P::r, &P::set_r);
+  io.Finite("g", m.color.g, &P::g, &P::set_g);
+  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
+  io.Finite("softness", m.softness, &P::softness, &P::set_softness);
+}
+
 void Fields(auto& io, Is<TransferFunction> auto& m) {
   using P = v1::TransferFunction;
   io.Messages("colors", m.colors, &P::colors, &P::mutable_colors, kMaxTransferPoints);
@@ -124,6 +140,7 @@ void Fields(auto& io, Is<TransferFunction> auto& m) {
   io.Messages("isosurfaces", m.isosurfaces, &P::isosurfaces, &P::mutable_isosurfaces, kMaxIsosurfaces);
   io.Messages("gradient_opacities", m.gradient_opacities, &P::gradient_opacities, &P::mutable_gradient_opacities, kMaxTransferPoints);
   io.Optional("material", m.material, &P::has_material, &P::material, &P::mutable_material);
+  io.Messages("regions", m.regions, &P::regions, &P::mutable_regions, kMaxTransferRegions);
 }
 
 void Fields(auto& io, Is<ScalarRange> auto& m) {

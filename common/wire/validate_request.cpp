@@ -208,11 +208,11 @@ Status CheckRules(const LabelChoice& labels) {
   return Status::Ok();
 }
 
-// Overlays have no isosurfaces and no opacity by gradient.
+// Overlays have no isosurfaces and nothing that depends on gradients.
 Status CheckRules(const OverlayChoice& overlay) {
   const auto* function = std::get_if<TransferFunction>(&overlay.choice);
-  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty())) {
-    return Status::InvalidArgument("overlay.function has isosurfaces or gradient_opacities, which are of the volume alone");
+  if (function != nullptr && !(function->isosurfaces.empty() && function->gradient_opacities.empty() && function->regions.empty())) {
+    return Status::InvalidArgument("overlay.function has isosurfaces, gradient_opacities or regions, which are of the volume alone");
   }
   return CheckRules(overlay.scalar_range, "overlay.scalar_range");
 }

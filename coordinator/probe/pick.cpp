@@ -144,6 +144,9 @@ class Matter {
     }
     if (!std::isfinite(stored)) return 0;
     double opacity = factor * double(table_.opacity[std::size_t(table_.BinOf(stored))]);
+    if (opacity > 0 && !setup_.transfer.regions.empty()) {
+      opacity = factor * LookAt(setup_.transfer.regions, setup_.description.mapping.FromStored(stored), Slope(p)).opacity;
+    }
     if (opacity > 0 && !setup_.transfer.gradient_opacities.empty() && setup_.renderer->Can(Ability::kGradientOpacity)) {
       opacity *= GradientOpacity(setup_.transfer.gradient_opacities, Slope(p));
     }

@@ -28,11 +28,11 @@ from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render, show
 from .local import shutdown
 from .presets import presets
-from .probe import Histogram, Label, Sample
+from .probe import Histogram, JointHistogram, Label, Sample
 from .service import Service, connect
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Status, Worker
-from .transfer import TransferFunction
+from .transfer import Region, TransferFunction
 from .viewer import Viewer
 
 __version__ = "0.2.0"
@@ -49,10 +49,12 @@ __all__ = [
     "Image",
     "Internal",
     "InvalidArgument",
+    "JointHistogram",
     "Label",
     "Level",
     "NotFound",
     "Progress",
+    "Region",
     "ResourceExhausted",
     "Sample",
     "Service",

@@ -8,6 +8,7 @@ import numpy
 import numpy.typing
 
 Vector = tuple[float, float, float]
+_JOINT_VALUES, _JOINT_SLOPES = 128, 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -19,6 +20,16 @@ class Histogram:
     edges: numpy.typing.NDArray[numpy.float64]  # one more than bins, as numpy.histogram gives them
     percentiles: dict[float, float]             # values that so many percent of the voxels do not exceed, to within a bin
     non_finite: int                             # voxels that count nowhere
+
+
+@dataclasses.dataclass(frozen=True)
+class JointHistogram:
+    """How many voxels of a dataset have which value together with which slope: the gradient's magnitude, in data values per unit of the
+    world."""
+
+    counts: numpy.typing.NDArray[numpy.int64]          # [value, slope]; at most some 2 million voxels, evenly spread
+    value_edges: numpy.typing.NDArray[numpy.float64]   # one more than counts has rows
+    slope_edges: numpy.typing.NDArray[numpy.float64]   # one more than counts has columns; their square roots lie at equal distances
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,6 +63,15 @@ def histogram_of(message: Any) -> Histogram:
         edges=numpy.linspace(low, high, counts.size + 1),
         percentiles={each.percent: each.value for each in message.percentiles},
         non_finite=message.non_finite,
+    )
+
+
+def joint_histogram_of(message: Any) -> JointHistogram:
+    counts = numpy.array(message.counts, dtype=numpy.int64).reshape(_JOINT_VALUES, _JOINT_SLOPES)
+    return JointHistogram(
+        counts=counts,
+        value_edges=numpy.linspace(message.range.min, message.range.max, _JOINT_VALUES + 1),
+        slope_edges=message.steepest * numpy.linspace(0, 1, _JOINT_SLOPES + 1) ** 2,
     )
 
 

@@ -18,7 +18,7 @@ from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
 from .options import takes_options_of
-from .probe import Histogram, Label, Sample, histogram_of, labels_of, sample_of
+from .probe import Histogram, JointHistogram, Label, Sample, histogram_of, joint_histogram_of, labels_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
 from .uploads import upload_of
 from .values import integer, number, point
@@ -115,6 +115,10 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
         """How often which value occurs in a dataset."""
         return histogram_of(self._summary(dataset, timeout))
+
+    def joint_histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> JointHistogram:
+        """How often which value occurs together with which slope, for two-dimensional transfer functions."""
+        return joint_histogram_of(self._connection.ask("joint_histogram_query", schema.JointHistogramQuery(dataset=dataset), timeout))
 
     def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
         """The labels that occur in a dataset, by value; empty: it has no labels."""

@@ -14,7 +14,27 @@ _NUMBERS_PER_POINT = 4
 _MOST_POINTS = 4096
 _MOST_FILE_BYTES = 16 << 20
 _MATERIAL = ("ambient", "diffuse", "specular", "shininess")
+_MOST_REGIONS, _MOST_CORNERS = 16, 32
+_REGION = ("Corners", "Values", "Slopes", "Color", "Opacity", "Softness")
 _EDGE = 1e-5  # VTK takes midpoints of 0 and 1 too, as this close to the end
+
+
+@dataclasses.dataclass(frozen=True)
+class Region:
+    """What a two-dimensional transfer function shows: a polygon of data values and slopes, which are magnitudes of gradients in data values
+    per unit of the world."""
+
+    corners: Sequence[tuple[float, float]]  #: 3 to 32 of (data value, slope), in order
+    color: tuple[float, float, float]       #: straight (r, g, b) from 0 to 1
+    opacity: float = 1                      #: from 0 to 1
+    softness: float = 0.25                  #: width of the soft border: 0 is hard, 1 reaches the middle of a square
+
+    @staticmethod
+    def box(values: tuple[float, float], slopes: tuple[float, float], color: tuple[float, float, float], opacity: float = 1,
+            softness: float = 0.25) -> Region:
+        """All between two values and two slopes."""
+        (low, high), (least, most) = values, slopes
+        return Region([(low, least), (high, least), (high, most), (low, most)], color, opacity, softness)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,11 +43,16 @@ class TransferFunction:
     sharpness [0, 1] of its own.
 
         TransferFunction(colors=[(40, (0, 0, 0)), (120, (1, 0.9, 0.8))], opacities=[(40, 0), (120, 0.6)])
+
+    A two-dimensional one has regions in place of the curves; renderers that cast rays show it:
+
+        TransferFunction(regions=[Region.box(values=(150, 600), slopes=(0, 120), color=(0.8, 0.1, 0.1), opacity=0.5)])
     """
 
-    colors: Sequence[tuple[float, tuple[float, float, float]]]     #: data value, and straight (r, g, b) from 0 to 1
-    opacities: Sequence[tuple[float, ...]]                        #: data value, opacity from 0 to 1[, midpoint, sharpness]
-    material: Mapping[str, float] | None = None                   #: some of ambient, diffuse, specular and shininess
+    colors: Sequence[tuple[float, tuple[float, float, float]]] = ()  #: data value, and straight (r, g, b) from 0 to 1
+    opacities: Sequence[tuple[float, ...]] = ()                     #: data value, opacity from 0 to 1[, midpoint, sharpness]
+    material: Mapping[str, float] | None = None                     #: some of ambient, diffuse, specular and shininess
+    regions: Sequence[Region] = ()                                  #: at most 16, in place of colours and opacities
 
     def message(self) -> Any:
         """TransferFunction of the wire. Its ranges are checked by the service."""
@@ -37,6 +62,11 @@ class TransferFunction:
         for value, opacity, *shape in self.opacities:
             midpoint, sharpness = [*shape, 0.5, 0.0][:2] if len(shape) != 1 else (shape[0], 0.0)
             found.opacities.add(value=value, opacity=opacity, midpoint=midpoint, sharpness=sharpness)
+        for region in self.regions:
+            red, green, blue = region.color
+            added = found.regions.add(r=red, g=green, b=blue, opacity=region.opacity, softness=region.softness)
+            for value, slope in region.corners:
+                added.corners.add(value=value, slope=slope)
         if self.material is not None:
             found.material.SetInParent()
             for name, number in _checked_material(self.material, "transfer").items():
@@ -70,9 +100,44 @@ def _checked_material(material: Any, name: str) -> dict[str, float]:
     return dict(material)
 
 
+def _numbers(region: Mapping[str, Any], field: str, name: str, counts: range) -> list[float]:
+    found = region[field]
+    if not isinstance(found, list) or len(found) not in counts or any(isinstance(n, bool) or not isinstance(n, (int, float)) for n in found):
+        many = str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+        raise InvalidArgument(f"{name}.{field} must be an array of {many} numbers" + (", 2 a corner" if field == "Corners" else ""))
+    return found
+
+
+def _region(region: Any, name: str) -> Region:
+    if not isinstance(region, Mapping):
+        raise InvalidArgument(f"{name} is not an object")
+    for field in region:
+        if field not in _REGION:
+            raise InvalidArgument(f"{name} has the field {field!r}, must be one of: {', '.join(_REGION)}")
+    if ("Values" in region) != ("Slopes" in region) or ("Corners" in region) == ("Values" in region):
+        raise InvalidArgument(f"{name} must have either Corners or Values and Slopes")
+    if "Color" not in region:
+        raise InvalidArgument(f"{name} has no Color")
+    red, green, blue = _numbers(region, "Color", name, range(3, 4))
+    shares = {}
+    for field in ("Opacity", "Softness"):
+        if isinstance(region.get(field, 0), bool) or not isinstance(region.get(field, 0), (int, float)):
+            raise InvalidArgument(f"{name}.{field} is not a number")
+        if field in region:
+            shares[field.lower()] = region[field]
+    if "Values" in region:
+        low, high = _numbers(region, "Values", name, range(2, 3))
+        least, most = _numbers(region, "Slopes", name, range(2, 3))
+        return Region.box((low, high), (least, most), (red, green, blue), **shares)
+    corners = _numbers(region, "Corners", name, range(6, 2 * _MOST_CORNERS + 1, 2))
+    return Region(list(zip(corners[::2], corners[1::2])), (red, green, blue), **shares)
+
+
 def from_paraview(document: Any, name: str = "transfer") -> TransferFunction:
     """A colour map as ParaView exports it: the contents of its JSON file. `name` begins messages."""
     preset = document[0] if isinstance(document, list) and document else document
+    if isinstance(preset, dict) and "Regions" in preset:
+        return _from_regions(preset, name)
     if not isinstance(preset, dict) or "RGBPoints" not in preset:
         raise InvalidArgument(f"{name}: not a colour map: RGBPoints is missing")
     colors = [(value, (red, green, blue)) for value, red, green, blue in _curve(preset, "RGBPoints", name)]
@@ -83,6 +148,16 @@ def from_paraview(document: Any, name: str = "transfer") -> TransferFunction:
     for value, opacity, midpoint, sharpness in _curve(preset, "Points", name):
         opacities.append((value, opacity, min(max(midpoint, _EDGE), 1 - _EDGE) if midpoint in (0, 1) else midpoint, sharpness))
     return TransferFunction(colors, opacities, material)
+
+
+def _from_regions(preset: Mapping[str, Any], name: str) -> TransferFunction:
+    if "RGBPoints" in preset or "Points" in preset:
+        raise InvalidArgument(f"{name}: Regions stand in the place of RGBPoints and Points: one of both must go")
+    found = preset["Regions"]
+    if not isinstance(found, list) or not 1 <= len(found) <= _MOST_REGIONS:
+        raise InvalidArgument(f"{name}: Regions must be an array of 1 to {_MOST_REGIONS} regions")
+    return TransferFunction(regions=[_region(region, f"{name}: Regions[{i}]") for i, region in enumerate(found)],
+                            material=_checked_material(preset["Material"], name) if "Material" in preset else None)
 
 
 def read_paraview(path: str | os.PathLike[str], name: str) -> TransferFunction:

@@ -279,6 +279,11 @@ class HttpTest(WithService):
         between = [self.ask("value", dataset="b", at=f"{x},9,9") for x in (3, 3.5, 4)]
         self.assertAlmostEqual(between[1]["interpolated"], (between[0]["value"] + between[2]["value"]) / 2, 9)
 
+        joint = self.ask("joint-histogram", dataset="b")
+        self.assertEqual((len(joint["counts"]), joint["range"]), (joint["values"] * joint["slopes"], self.ask("histogram", dataset="b")["range"]))
+        self.assertEqual(sum(joint["counts"]), 18 ** 3, "of 20 voxels along each axis the outermost ones have no slope")
+        self.assertGreater(joint["steepest"], 0)
+
         values = [self.ask("value", dataset="b", at=f"{x},9,{z}")["value"] for x in range(3, 7) for z in (9, 10)]
         box = self.ask("statistics", dataset="b", box="2.5:6,8.5:9.4,9:10")
         mean = sum(values) / len(values)
@@ -330,6 +335,7 @@ class HttpTest(WithService):
             ("value", {"dataset": "x" * 300, "at": "1,2,3"}, 400, "300 bytes"),
             ("profile", {"dataset": "a", "from": "0,0,0"}, 400, "to is missing"),
             ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
+            ("joint-histogram", {"dataset": "nonesuch"}, 404, "nonesuch"),
             ("statistics", {"dataset": "a"}, 400, "box is missing"),
             ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),
             ("statistics", {"dataset": "nonesuch", "box": "0:1,0:1,0:1"}, 404, "nonesuch"),

@@ -38,6 +38,10 @@ update = load_update()
 # A colour map as ParaView writes it, and the same as Python's own.
 COLOR_MAP = [{"Name": "mine", "RGBPoints": [0, 0, 0, 0.5, 100, 1, 0.5, 0, 255, 1, 1, 1], "Points": [30, 0, 0.5, 0, 200, 0.4, 0.3, 0.5]}]
 FUNCTION = ss.TransferFunction(colors=[(0, (0, 0, 0.5)), (100, (1, 0.5, 0)), (255, (1, 1, 1))], opacities=[(30, 0), (200, 0.4, 0.3, 0.5)])
+REGIONS = [{"Regions": [{"Values": [90, 300], "Slopes": [0, 200], "Color": [1, 0.5, 0], "Opacity": 0.3, "Softness": 0.5},
+                        {"Corners": [10, 5, 200, 5, 100, 90], "Color": [0, 0.5, 1]}]}]
+OF_REGIONS = ss.TransferFunction(regions=[ss.Region.box((90, 300), (0, 200), (1, 0.5, 0), opacity=0.3, softness=0.5),
+                                          ss.Region([(10, 5), (200, 5), (100, 90)], (0, 0.5, 1))])
 CAMERA = {"projection": "perspective", "azimuth": 20.0, "elevation": 10.0, "roll": 5.0, "zoom": 1.2, "fov": 25.0}
 
 # Python's options, and the command line's. Every option of options.json, every view and every renderer is here; several of them share a
@@ -86,6 +90,9 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      ["--renderer", "mip", "--interpolation", "nearest", "--projection-mode", "mean", "--sampling-rate", "2"]),
     ({"transfer": COLOR_MAP, "opacity_distance": 3.5}, ["--transfer", "map.json", "--opacity-distance", "3.5"]),
     ({"transfer": FUNCTION}, ["--transfer", "map.json"]),
+    ({"renderer": "raycast", "sampling_rate": 0.5, "jitter": 0.8}, [*RAYCAST, "--sampling-rate", "0.5", "--jitter", "0.8"]),
+    ({"renderer": "raycast", "transfer": OF_REGIONS}, [*RAYCAST, "--transfer", "regions.json"]),
+    ({"renderer": "raycast", "transfer": REGIONS, "opacity_distance": 2}, [*RAYCAST, "--transfer", "regions.json", "--opacity-distance", "2"]),
     ({"transfer": "gray-ramp", "scalar_range": (20, 150)}, ["--transfer", "gray-ramp", "--scalar-range", "20:150"]),
     ({"transfer": "gray-ramp", "scalar_range": "2%:98%"}, ["--transfer", "gray-ramp", "--scalar-range", "2%:98%"]),
     ({"renderer": "raycast", "isovalue": [40, (150, "olive", 0.5)]}, [*RAYCAST, "--isovalue", "40,150:olive:0.5"]),
@@ -180,6 +187,7 @@ class Pixels(WithAService):
             done = cls.running.run(*map(str, arguments))
             assert done.returncode == 0, done.stderr
         (cls.folder / "map.json").write_text(json.dumps(COLOR_MAP))
+        (cls.folder / "regions.json").write_text(json.dumps(REGIONS))
         (cls.folder / "camera.json").write_text(json.dumps(CAMERA))
         cls.service = ss.connect(endpoint=cls.running.endpoint)
         cls.addClassCleanup(cls.service.close)
@@ -336,6 +344,10 @@ class Requests(unittest.TestCase):
             ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
             ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
             ({"transfer": {"Points": []}}, "transfer: not a colour map: RGBPoints is missing"),
+            ({"transfer": {"Regions": [{"Values": [0, 1], "Color": [1, 1, 1]}]}}, "transfer: Regions[0] must have either Corners or Values and Slopes"),
+            ({"transfer": {"Regions": [{"Corners": [0, 1], "Color": [1, 1, 1]}]}},
+             "transfer: Regions[0].Corners must be an array of 6 to 64 numbers, 2 a corner"),
+            ({"transfer": {"Regions": [{"Shape": 1}]}}, "transfer: Regions[0] has the field 'Shape', must be one of: Corners, Values"),
             ({"camera": {"lens": 1}}, "camera has the field 'lens', which cameras do not have"),
             ({"view": "left", "azimuth": 3}, "view excludes azimuth"),
             ({"up": (0, 0, 1)}, "up requires eye"),

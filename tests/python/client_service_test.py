@@ -51,6 +51,10 @@ class AtAService(WithAService):
 
     def test_what_a_dataset_holds(self) -> None:
         values, labels, overlay = volume_arrays()
+        joint = self.service.joint_histogram("head")
+        self.assertEqual(joint.counts.sum(), np.prod(np.array(values.shape) - 2), "the outermost voxels have no slope")
+        inner = values[1:-1, 1:-1, 1:-1]
+        np.testing.assert_array_equal(joint.counts.sum(axis=1), np.histogram(inner, bins=joint.value_edges)[0])
         histogram = self.service.histogram("head")
         low, high = histogram.value_range
         self.assertEqual((low, high), (values.min(), values.max()))

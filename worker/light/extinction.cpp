@@ -5,14 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
-#include "common/classification/classification_table.h"
+#include "common/classification/region_table.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 namespace {
 
 constexpr double kMostOpacity = 0.999;  // of a voxel length, or of a surface: more is not seen in a shadow
+
+double ExtinctionOfOpacity(double opacity, double opacity_distance) {
+  const double of_length = -std::log1p(-std::min(opacity, 1 - 1e-12)) / opacity_distance;
+  return std::min(of_length, -std::log1p(-kMostOpacity));
+}
 
 // The extinction of stored samples, and its mean over ranges of them. Between two bins of the classification table it is linear; it is
 // looked up at several places from bin to bin.
@@ -26,8 +32,7 @@ class ValueExtinction {
     offset_ = float(0.5 - table.stored_origin * table.bin_from_stored_scale * fine);
     std::vector<double> bins;
     for (const float opacity : table.opacity) {
-      const double of_length = -std::log1p(-std::min(double(opacity), 1 - 1e-12)) / table.opacity_distance;
-      bins.push_back(std::min(of_length, -std::log1p(-kMostOpacity)) * per_voxel_length);
+      bins.push_back(ExtinctionOfOpacity(double(opacity), table.opacity_distance) * per_voxel_length);
     }
     const auto last = (bins.size() - 1) * std::size_t(fine);
     last_ = float(last);
@@ -51,6 +56,29 @@ class ValueExtinction {
  private:
   float scale_ = 1, offset_ = 0, last_ = 0;
   std::vector<double> each_, before_;  // by place: extinction, and its integral from the first place to this one
+};
+
+// The extinction by the regions of a transfer function, of values between two others at one slope.
+class RegionExtinction {
+ public:
+  RegionExtinction(const FrameSetup& setup, const ClassificationTable& classification, double per_voxel_length)
+      : table_(MakeRegionTable(setup.transfer, classification, setup.description.mapping)) {
+    for (std::size_t i = 3; i < table_.entries.size(); i += 4) {
+      if (table_.entries[i] > 0) {
+        table_.entries[i] = float(ExtinctionOfOpacity(double(table_.entries[i]), classification.opacity_distance) * per_voxel_length);
+      }
+    }
+  }
+
+  // Simpson's rule from low over value to high.
+  double Mean(float low, float value, float high, float slope) const {
+    return (double(At(low, slope)) + 4 * double(At(value, slope)) + double(At(high, slope))) / 6;
+  }
+
+ private:
+  float At(float stored, float slope) const { return table_.At(stored, slope)[3]; }
+
+  RegionTable table_;
 };
 
 struct SurfaceExtinction {
@@ -89,12 +117,17 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
   const Index3& size = light.size;
   const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
   const ValueExtinction of_values(table, 1 / Least(frame.spacing));
+  std::optional<RegionExtinction> of_regions;
+  if (!setup.transfer.regions.empty()) of_regions.emplace(setup, table, 1 / Least(frame.spacing));
   std::vector<SurfaceExtinction> surfaces;
   const double voxel = std::cbrt(light.spacing.x * light.spacing.y * light.spacing.z);
   for (const Isosurface& surface : setup.transfer.isosurfaces) {
     const float value = StoredIsovalue(surface.value, setup.description.mapping);
     if (std::isfinite(value)) surfaces.push_back({value, -std::log1p(-std::min(surface.opacity, kMostOpacity)) / voxel});
   }
+  // The square of a slope: squares of differences of two voxels' values, times these.
+  const auto squared = [](double spacing) { return 0.25 / (spacing * spacing); };
+  const double per_x = squared(light.spacing.x), per_y = squared(light.spacing.y), per_z = squared(light.spacing.z);
   const KeptShare kept(setup, MapBetween(light, frame));
 
   Extinction extinction{.size = size, .spacing = light.spacing, .each = std::vector<float>(CountIn(size))};
@@ -113,21 +146,27 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
             const float near = there ? float(v[step]) : value;
             if (near < least) least = near;
             if (near > greatest) greatest = near;
+            return near;
           };
-          meet(x > 0, -1), meet(x + 1 < size.x, 1);
-          meet(y > 0, -row), meet(y + 1 < size.y, row);
-          meet(z > 0, -slice), meet(z + 1 < size.z, slice);
+          const float along_x = -meet(x > 0, -1) + meet(x + 1 < size.x, 1);
+          const float along_y = -meet(y > 0, -row) + meet(y + 1 < size.y, row);
+          const float along_z = -meet(z > 0, -slice) + meet(z + 1 < size.z, slice);
           const std::size_t place = of_values.PlaceOf(value);
-          if (least == greatest) {
-            *out = float(of_values.At(place));
+          const float low = (value + least) / 2, high = (value + greatest) / 2;
+          double sum = 0;
+          if (of_regions) {
+            const auto square = [](float difference) { return double(difference) * double(difference); };
+            const auto slope = float(std::sqrt(square(along_x) * per_x + square(along_y) * per_y + square(along_z) * per_z));
+            if (std::isfinite(slope)) sum = of_regions->Mean(low, value, high, slope);
+          } else if (least == greatest) {
+            sum = of_values.At(place);
           } else {
-            const float low = (value + least) / 2, high = (value + greatest) / 2;
-            double sum = (of_values.MeanBetween(of_values.PlaceOf(low), place) + of_values.MeanBetween(place, of_values.PlaceOf(high))) / 2;
-            for (const SurfaceExtinction& surface : surfaces) {
-              if (low < surface.value && surface.value <= high) sum += surface.each;
-            }
-            *out = float(sum);
+            sum = (of_values.MeanBetween(of_values.PlaceOf(low), place) + of_values.MeanBetween(place, of_values.PlaceOf(high))) / 2;
           }
+          for (const SurfaceExtinction& surface : surfaces) {
+            if (low < surface.value && surface.value <= high) sum += surface.each;
+          }
+          *out = float(sum);
           if (*out > 0 && !setup.clip.empty()) *out *= float(kept.Of({x, y, z}));
         }
       }

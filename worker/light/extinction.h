@@ -6,8 +6,9 @@
 // narrow peak of a transfer function is missed between two voxels. Structures thinner than a voxel of the light volume count by their
 // mean value.
 //
-// Isosurfaces take their opacity once where the value passes theirs. Matter that is clipped away takes nothing. Layers and gradient
-// opacity do not count.
+// Isosurfaces take their opacity once where the value passes theirs. Matter that is clipped away takes nothing. Regions of a
+// two-dimensional transfer function count with the slope in the light volume, which is coarser. Layers do not count, nor does gradient
+// opacity without regions.
 #pragma once
 
 #include <vector>

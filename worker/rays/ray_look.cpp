@@ -15,7 +15,7 @@ Float3 Divided(const Vec3& direction, const Vec3& spacing) {
 
 void AddGradientOpacity(const TransferFunction& transfer, const VolumeDescription& description, RayLook& look) {
   const std::vector<GradientOpacityPoint>& points = transfer.gradient_opacities;
-  if (points.empty()) return;
+  if (points.empty() || !transfer.regions.empty()) return;  // a RegionTable has them, too
   const double steepest = points.back().slope;
   look.gradient_last = steepest > 0 ? kMaxBins - 1 : 0;
   const double per_slope = steepest > 0 ? double(look.gradient_last) / steepest : 0;  // entries

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
-#include "common/classification/classification_table.h"
+#include "common/classification/region_table.h"
 #include "common/view/camera.h"
 #include "common/view/shading.h"
 #include "worker/rays/view_rays.h"
@@ -27,6 +27,12 @@ struct RayLook {
   AlignedVector<float> gradient_factors;
   float gradient_scale = 0, gradient_last = 0, step_exponent = 1;
 
+  // Two-dimensional: where `entries` have an opacity above 0, this table replaces them. Its opacities are those of one step. Null: there is
+  // none.
+  const RegionTable* regions = nullptr;
+
+  bool by_gradient() const { return !gradient_factors.empty() || regions != nullptr; }
+
   bool volume_shows = false;  // an entry's opacity is above 0
 
   // Phong's model for the gradient g of samples in data space. With n = g / spacing: N.L = Dot(g, light) / |g * inverse_spacing|.
@@ -47,7 +53,7 @@ struct RayLook {
 // If each stored integer has a bin of its own, colour and opacity between two bins are interpolated linearly, at as many places as fit into
 // kMaxBins entries. A table with several values in a bin is used as it is. Either way a value between two samples is visible only if a bin
 // between theirs is visible, so a brick that is empty by the ClassificationTable is empty here.
-// `table`: of `transfer`. `spacing`: of the voxels that are sampled.
+// `table`: of `transfer`. `spacing`: of the voxels that are sampled. Regions of the transfer function are left out: see `regions`.
 RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,
                     const Camera& camera, const Shading& shading, double steps_per_voxel, const Vec3& spacing);
 inline RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& transfer, const VolumeDescription& description,

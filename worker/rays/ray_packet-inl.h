@@ -39,6 +39,15 @@ HWY_INLINE Floats Set(float value) { return hn::Set(FloatTag(), value); }
 HWY_INLINE Ints SetInt(std::int32_t value) { return hn::Set(IntTag(), value); }
 HWY_INLINE Floats Lerp(Floats t, Floats a, Floats b) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
+// By what share of a step the samples of pixels lie farther away.
+HWY_INLINE Floats JitterAt(const ViewRays& view, Ints x, Ints y) {
+  const hn::RebindToUnsigned<IntTag> du;
+  // The fractions 1 / g and 1 / g^2 with g^3 = g + 1, in 2^-32.
+  const auto sum = hn::Add(hn::Mul(hn::BitCast(du, x), hn::Set(du, 0xC13FA9A9U)), hn::Mul(hn::BitCast(du, y), hn::Set(du, 0x91E10DA5U)));
+  const auto fraction = hn::Mul(hn::ConvertTo(FloatTag(), hn::BitCast(IntTag(), hn::ShiftRight<8>(sum))), Set(0x1p-24F));
+  return hn::Mul(fraction, Set(view.jitter));
+}
+
 struct RayPacket {
   Floats first[3], move[3];
   Mask valid;  // pixels of the tile
@@ -54,7 +63,8 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
   const auto lane_x = hn::And(lane, SetInt(kPacketWidth - 1)), lane_y = hn::ShiftRight < kPacketWidth == 4 ? 2
                                                                         : kPacketWidth == 2                ? 1
                                                                                                            : 0 > (lane);
-  const auto px = hn::ConvertTo(df, hn::Add(SetInt(x), lane_x)), py = hn::ConvertTo(df, hn::Add(SetInt(y), lane_y));
+  const auto pixel_x = hn::Add(SetInt(x), lane_x), pixel_y = hn::Add(SetInt(y), lane_y);
+  const auto px = hn::ConvertTo(df, pixel_x), py = hn::ConvertTo(df, pixel_y);
   const auto from_x = hn::Sub(px, Set(view.centre_x)), from_y = hn::Sub(py, Set(view.centre_y));
   RayPacket packet;
   packet.valid = hn::And(hn::Lt(px, Set(float(x_end))), hn::Lt(py, Set(float(y_end))));
@@ -73,6 +83,10 @@ HWY_INLINE RayPacket PacketAt(const ViewRays& view, std::int32_t x, std::int32_t
       packet.first[i] = hn::Add(start, offset);
       packet.move[i] = hn::Mul(Set(view.step), forward);
     }
+  }
+  if (view.jitter > 0) {
+    const auto shift_k = JitterAt(view, pixel_x, pixel_y);
+    for (std::size_t i = 0; i < 3; ++i) packet.first[i] = hn::Add(packet.first[i], hn::Mul(shift_k, packet.move[i]));
   }
   return packet;
 }

@@ -58,19 +58,36 @@ HWY_INLINE Gradient Choose(Mask mask, const Gradient& a, const Gradient& b) {
   return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y), hn::IfThenElse(mask, a.z, b.z)};
 }
 
-// The opacity of a step, of samples with this gradient. `opacity`: as in RayLook::entries if there are gradient factors.
-HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g) {
-  const FloatTag df;
+// The gradient's magnitude per unit of the world, times two; 0 where it is not finite.
+HWY_INLINE Floats SlopeOf(const RayLook& look, const Gradient& g) {
   const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
     const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
     return hn::Mul(physical, physical);
   };
   const auto magnitude = hn::Sqrt(hn::Add(hn::Add(square(g.x, 0), square(g.y, 1)), square(g.z, 2)));
-  const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
-  const auto number =
-      hn::Min(hn::MulAdd(hn::IfThenElseZero(finite, magnitude), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
+  return hn::IfThenElseZero(hn::Le(magnitude, Set(std::numeric_limits<float>::max())), magnitude);
+}
+
+// The opacity of a step, of samples with this gradient. `opacity`: as in RayLook::entries if there are gradient factors.
+HWY_INLINE Floats OpacityByGradient(const RayLook& look, Floats opacity, const Gradient& g) {
+  const FloatTag df;
+  const auto number = hn::Min(hn::MulAdd(SlopeOf(look, g), Set(look.gradient_scale), Set(0.5F)), Set(look.gradient_last));
   const auto factor = hn::GatherIndex(df, look.gradient_factors.data(), hn::ConvertTo(IntTag(), number));
   return hn::Sub(Set(1), PowerOfFraction(hn::Sub(Set(1), hn::Mul(opacity, factor)), Set(look.step_exponent)));
+}
+
+// The entry of a RegionTable, times four, by which samples look; values are finite.
+HWY_INLINE Ints RegionOf(const RayLook& look, Floats value, const Gradient& g) {
+  const FloatTag df;
+  const IntTag di;
+  const RegionTable& table = *look.regions;
+  const auto place = [&](Floats number, int count) HWY_ATTR {
+    return hn::ConvertTo(di, hn::Min(hn::Max(hn::Add(number, Set(0.5F)), hn::Zero(df)), Set(float(count - 1))));
+  };
+  const auto row = place(hn::Mul(hn::Sub(value, Set(table.origin)), Set(table.scale)), RegionTable::kValues);
+  const auto steep = place(hn::Sqrt(hn::Mul(SlopeOf(look, g), Set(0.5F * table.slope_scale))), RegionTable::kSlopes);
+  static_assert(RegionTable::kSlopes == 256);
+  return hn::ShiftLeft<2>(hn::Add(hn::ShiftLeft<8>(row), steep));
 }
 
 struct Light {

@@ -62,6 +62,11 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   return rays;
 }
 
+ViewRays Jittered(ViewRays rays, const Camera& camera, const ClipRegion& clip, double jitter) {
+  if (!MiddleOfSlab(camera, clip)) rays.jitter = float(jitter);
+  return rays;
+}
+
 RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low, const Vec3& high) {
   constexpr double kPixelSlack = 0.01;
   constexpr std::int32_t kSampleSlack = 2;

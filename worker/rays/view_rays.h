@@ -52,11 +52,16 @@ struct ViewRays {
   float step = 0;                 // physical
   std::int32_t sample_count = 0;  // k < sample_count holds for every sample within the volume
   Float3 volume_end{};            // the volume fills the positions p with -0.5 <= p < volume_end on every axis
+  // Samples lie by up to this share of a step farther from the eye, by pixel: R2 of Roberts (2018), whose neighbours differ widely. So
+  // rings of equal samples become a fine pattern. [0, 1]
+  float jitter = 0;
   RayClip clip;
 };
 
 // `samples_per_voxel`: samples along a ray per least voxel spacing of the volume, > 0.
 ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, double samples_per_voxel, const ClipRegion& clip = {});
+// The same rays, jittered; not where a clipped slab faces the view, whose samples lie in its middle. `jitter`: [0, 1].
+ViewRays Jittered(ViewRays rays, const Camera& camera, const ClipRegion& clip, double jitter);
 
 // The same rays with samples on planes of equal depth, `step` apart.
 inline ViewRays OnPlanes(ViewRays rays) {

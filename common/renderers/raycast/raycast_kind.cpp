@@ -74,14 +74,21 @@ class RaycastCost : public AnalyticCost {
 class RaycastKind : public RendererKind {
  public:
   RaycastKind()
-      : RendererKind({.name = "raycast",
-                      .title = "ray casting",
-                      .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
-                      .reach = kRayReach,
-                      .derived_from_stored = kRayDerived,
-                      .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels,
-                                    Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows},
-                      .parameters = {SamplingRate(kSamplesAVoxel)}}) {}
+      : RendererKind(
+            {.name = "raycast",
+             .title = "ray casting",
+             .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
+             .reach = kRayReach,
+             .derived_from_stored = kRayDerived,
+             .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kRegions, Ability::kLabels,
+                           Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows},
+             .parameters = {SamplingRate(kSamplesAVoxel),
+                            {.name = "jitter",
+                             .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "
+                                        "fixed pattern: rings become a fine grain",
+                             .standard = 0,
+                             .least = 0,
+                             .most = 1}}}) {}
 
   ClassificationTable DrawnTable(const TransferFunction& transfer, const VolumeSummary& summary) const override {
     return InterpolatedTable(transfer, summary);

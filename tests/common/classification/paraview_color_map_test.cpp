@@ -69,6 +69,22 @@ TEST(ParaViewColorMap, MayHaveAMaterial) {
   EXPECT_EQ(ParseParaViewColorMap(kExported, "bone.json")->material, std::nullopt);
 }
 
+TEST(ParaViewColorMap, MayHaveRegions) {
+  const Result<TransferFunction> read = ParseParaViewColorMap(
+      R"({"Regions": [{"Values": [10, 20], "Slopes": [0, 5], "Color": [1, 0.5, 0], "Opacity": 0.25, "Softness": 0.5},
+                      {"Corners": [0, 0, 9, 0, 4, 3], "Color": [0, 0, 1]}], "Material": {"specular": 1}})",
+      "map.json");
+  ASSERT_TRUE(read.ok()) << read.status().message();
+  ASSERT_EQ(read->regions.size(), 2);
+  EXPECT_EQ(read->regions[0], (TransferRegion{{{10, 0}, {20, 0}, {20, 5}, {10, 5}}, {1, 0.5F, 0}, 0.25, 0.5}));
+  EXPECT_EQ(read->regions[1], (TransferRegion{{{0, 0}, {9, 0}, {4, 3}}, {0, 0, 1}, 1, 0.25}));
+  EXPECT_EQ(read->material, Material{.specular = 1});
+  EXPECT_GT(read->Opacity(15), 0) << "it has curves, too";
+  const Result<TransferFunction> again = ParseParaViewColorMap(FormatParaViewColorMap(*read, "again"), "again.json");
+  ASSERT_TRUE(again.ok()) << again.status().message();
+  EXPECT_EQ(*again, *read);
+}
+
 TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
   const struct {
     std::string json, named;
@@ -103,6 +119,22 @@ TEST(ParaViewColorMap, SaysInOneLineWhatIsWrong) {
            }() +
            "]}",
        "has 16388 numbers"},
+      {R"({"Regions": 1})", "Regions must be an array of 1 to 16 regions"},
+      {R"({"Regions": []})", "Regions must be an array of 1 to 16 regions"},
+      {R"({"Regions": [1]})", "Regions[0] is not an object"},
+      {R"({"Regions": [{"Color": [1, 1, 1]}]})", "Regions[0] must have either Corners or Values and Slopes"},
+      {R"({"Regions": [{"Values": [0, 1], "Color": [1, 1, 1]}]})", "Regions[0] must have either Corners or Values and Slopes"},
+      {R"({"Regions": [{"Values": [0, 1], "Slopes": [0, 1], "Corners": [0, 0, 1, 0, 1, 1], "Color": [1, 1, 1]}]})", "must have either"},
+      {R"({"Regions": [{"Values": [0, 1], "Slopes": [0, 1]}]})", "Regions[0] has no Color"},
+      {R"({"Regions": [{"Values": [0], "Slopes": [0, 1], "Color": [1, 1, 1]}]})", "Regions[0] Values has 1 numbers, must have 2"},
+      {R"({"Regions": [{"Corners": [0, 1, 2, 3], "Color": [1, 1, 1]}]})", "Corners has 4 numbers, must have 6 to 64, 2 a corner"},
+      {R"({"Regions": [{"Corners": [0, 1, 2, 3, 4, 5, 6], "Color": [1, 1, 1]}]})", "Corners has 7 numbers"},
+      {R"({"Regions": [{"Corners": [0, 1, 2, "3", 4, 5], "Color": [1, 1, 1]}]})", "Corners has something at 3 that is not a number"},
+      {R"({"Regions": [{"Values": [0, 1], "Slopes": [0, 1], "Color": [1, 1, 1], "Opacity": "1"}]})", "Regions[0] Opacity is not a number"},
+      {R"({"Regions": [{"Values": [0, 1], "Slopes": [0, 1], "Color": [1, 1, 1], "Softness": 2}]})", "softness of region 0 is 2"},
+      {R"({"Regions": [{"Values": [1, 1], "Slopes": [0, 1], "Color": [1, 1, 1]}]})", "all corners of region 0 have the value 1"},
+      {R"({"Regions": [{"Shape": 1}]})", "Regions[0] has the field \"Shape\", must be one of: Corners, Values"},
+      {R"({"Regions": [], "RGBPoints": [0, 0, 0, 0]})", "one of both must go"},
       {std::string(100000, '['), "not JSON"},
   };
   for (const auto& [json, named] : wrong) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 
 #include "common/classification/classification_table.h"
 #include "common/classification/color_maps.h"
@@ -206,6 +207,25 @@ TEST(CtPresets, FindBoneInHounsfieldUnitsStoredUnitsAndEightBits) {
     const TransferFunction skin = MakePreset("ct-skin", summary).value();
     EXPECT_EQ(OpacityAt(skin, scan.air), 0);
     EXPECT_GT(OpacityAt(skin, scan.tissue), 0.8);
+  }
+}
+
+// Borders are steps that the scanner blurred like a Gaussian. Where the border of a bone has the values of a vessel, it is steeper.
+TEST(CtVessels2d, ShowsVesselsAndHidesBordersOfBones) {
+  VolumeSummary summary;
+  summary.description.geometry = {{64, 64, 64}, {0.5, 0.5, 0.5}};
+  summary.range = {-1000, 2000};
+  summary.histogram.fill(1);
+  const TransferFunction transfer = MakePreset("ct-vessels-2d", summary).value();
+  constexpr double kTissue = 40, kBone = 1200, kVessel = 300;
+  EXPECT_GT(LookAt(transfer.regions, kVessel, 0).opacity, 0.5);
+  for (const double blur : {0.6, 0.8, 1.0}) {  // voxels
+    const double sigma = blur * 0.5;
+    for (double x = -4 * sigma; x < 4 * sigma; x += 0.01 * sigma) {
+      const double value = kTissue + (kBone - kTissue) * 0.5 * std::erfc(-x / sigma / std::sqrt(2));
+      const double slope = (kBone - kTissue) * std::exp(-x * x / (2 * sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi));
+      EXPECT_LT(LookAt(transfer.regions, value, slope).opacity, 0.01) << blur << " " << value << " " << slope;
+    }
   }
 }
 

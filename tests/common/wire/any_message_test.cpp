@@ -26,7 +26,7 @@ TEST(AnyMessage, EverySampleSurvivesTheWire) {
   for (const AnyMessage& message : AllSamples()) {
     members.insert(message.index());
     const std::vector<std::byte> header = Encode(message);
-    EXPECT_LT(header.size(), 8192U) << NameOf(message);
+    EXPECT_LT(header.size(), 16384U) << NameOf(message);
     const Result<AnyMessage> decoded = Decode(header);
     ASSERT_TRUE(decoded.ok()) << decoded.status().message();
     EXPECT_TRUE(*decoded == message) << NameOf(message);

@@ -145,6 +145,7 @@ GroupAssignment WithSurfaces() {
   GroupAssignment message = Assignment(2, {}, FindRenderer("raycast"));
   message.setup.transfer.isosurfaces = ManySurfaces();
   message.setup.transfer.gradient_opacities = {{0, 0}, {0, 1}, {kMaxScalar, 0.5}};
+  message.setup.transfer.regions = {{{{-kMaxScalar, 0}, {1, kMaxScalar}, {0, 2}}, {1, 0, 0.5F}, 0.25, 1}};
   return message;
 }
 
@@ -494,6 +495,22 @@ std::vector<StatisticsQuery> SamplesOf() {
 template <>
 std::vector<StatisticsReply> SamplesOf() {
   return {{}, {kMax64, {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300}}};
+}
+
+std::vector<std::uint64_t> LargeCounts() {
+  std::vector<std::uint64_t> counts(std::size_t{kJointValues} * kJointSlopes);
+  counts.front() = counts.back() = kMax64;
+  return counts;
+}
+
+template <>
+std::vector<JointHistogramQuery> SamplesOf() {
+  return {{.dataset = "a"}, {kMax64, kLongName}};
+}
+
+template <>
+std::vector<JointHistogramReply> SamplesOf() {
+  return {{}, {kMax64, {-1e30F, 1e30F}, {1e300, LargeCounts()}}};
 }
 
 template <>

@@ -91,6 +91,19 @@ TEST(Pick, HalfOfTheLightIsLostAfterTheKnownDepth) {
   }
 }
 
+// The ball's slope is 1 everywhere.
+TEST(Pick, HitsWhatRegionsShow) {
+  const Volume ball = MakeBall({{30, 30, 30}, {1, 1, 1}});
+  SetupOptions options{.renderer = FindRenderer("raycast")};
+  const auto hit = [&](double least, double most) {
+    options.transfer = WithCurvesOfRegions(
+        {.colors = {}, .opacities = {}, .regions = {{{{0, least}, {20, least}, {20, most}, {0, most}}, {1, 1, 1}, 0.99, 0}}});
+    return PickIn(ball, MakeSetup(ball, options), 32, 32).has_value();
+  };
+  EXPECT_TRUE(hit(0.8, 1.2));
+  EXPECT_FALSE(hit(1.5, 3));
+}
+
 TEST(Pick, IsTheDepthOfTheZBuffer) {
   std::mt19937 random(3);
   for (const Projection projection : kProjections) {

@@ -99,6 +99,22 @@ TEST(Extinction, OfAnIsosurfaceIsItsOpacityOnce) {
   EXPECT_NEAR(sum, -std::log1p(-0.4), 1e-3);
 }
 
+// The same as by a curve where the slope lies in the region, and nothing elsewhere.
+TEST(Extinction, OfRegionsDependsOnTheSlope) {
+  constexpr double kOpacity = 0.1;
+  const Volume volume =
+      MakeVolume({{8, 8, 60}, {1, 1, 2}}, ScalarType::kUint8, [](const Index3& v) { return v.z < 30 ? 3 * v.z : 90 + 2 * (v.z - 30); });
+  FrameSetup setup = SetupOf(volume, kOpacity);
+  setup.transfer = WithCurvesOfRegions(
+      {.colors = {}, .opacities = {}, .regions = {{{{-50, 1.25}, {300, 1.25}, {300, 5}, {-50, 5}}, {1, 1, 1}, kOpacity, 0}}});
+  const Extinction extinction = ExtinctionIn(volume, setup);
+  for (int z = 1; z < 59; ++z) {
+    if (z == 30) continue;  // a mean of both slopes
+    const double expected = z < 30 ? -std::log1p(-kOpacity) : 0;
+    EXPECT_NEAR(extinction.each[NumberIn(extinction.size, {4, 4, z})], expected, 1e-4) << z;
+  }
+}
+
 TEST(Extinction, OfWhatIsClippedAwayIsNothing) {
   const Volume volume = MakeBlock({{16, 16, 16}});
   FrameSetup setup = SetupOf(volume, 0.5);

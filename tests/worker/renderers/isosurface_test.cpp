@@ -33,7 +33,7 @@ SetupOptions RaycastOptions(Projection projection, std::mt19937& random) {
 
 LocalImage Raycast(const Volume& volume, const SetupOptions& options, double rate = 1) {
   FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {rate};
+  setup.parameters = {rate, 0};
   return RenderPicture(volume, setup);
 }
 
@@ -401,6 +401,46 @@ TEST(GradientOpacity, IsTheFactorOfTheSlope) {
         }
         EXPECT_GT(seen, 300);
       }
+    }
+  }
+}
+
+// A region of one slope has its opacity in a ramp of that slope, and none in a ramp of another one. Slopes are per unit of the world.
+TEST(Regions, ShowTheirSlopesAlone) {
+  std::mt19937 random(kSeed);
+  constexpr double kOpacity = 0.05;
+  const auto ramp = [](int rise) {
+    Volume volume = MakeVolume({{30, 26, 28}, {0.5, 0.5, 0.75}}, ScalarType::kUint8, [&](const Index3& v) { return 20 + rise * v.x; });
+    volume.description.mapping = {0.5, -3};
+    return volume;
+  };
+  const Volume gentle = ramp(2), steep = ramp(6);
+  constexpr double kGentle = 2 * 0.5 / 0.5, kSteep = 6 * 0.5 / 0.5;
+  for (const Projection projection : kProjections) {
+    for (const double rate : {1.0, 3.0}) {
+      SetupOptions options = RaycastOptions(projection, random);
+      options.view.zoom = 1.5;
+      options.shading.model = rate == 3 ? ShadingModel::kPhong : ShadingModel::kNone;
+      // At the border of the volume voxels repeat, so that slopes are less.
+      options.clipping.box = ClipBox{{10, 10, 10}, {90, 90, 90}, ClipUnit::kPercent};
+      options.transfer = {{{0, {1, 1, 1}}}, {{0, kOpacity}}};
+      const auto alpha = [&](const Volume& volume) { return Raycast(volume, options, rate); };
+      const LocalImage plain = alpha(steep);
+      options.transfer.regions = {
+          {{{-100, 0.4 * kSteep}, {200, 0.4 * kSteep}, {200, 1.2 * kSteep}, {-100, 1.2 * kSteep}}, {1, 1, 1}, kOpacity, 0}};
+      options.transfer = WithCurvesOfRegions(options.transfer);
+      const LocalImage of_steep = alpha(steep), of_gentle = alpha(gentle);
+      int seen = 0;
+      for (int y = 0; y < 64; ++y) {
+        for (int x = 0; x < 64; ++x) {
+          if (PixelOf(plain, x, y)[3] < 0.1F) continue;
+          ++seen;
+          ASSERT_NEAR(double(PixelOf(of_steep, x, y)[3]), double(PixelOf(plain, x, y)[3]), 2e-4) << "seed " << kSeed << " rate " << rate;
+          ASSERT_EQ(PixelOf(of_gentle, x, y)[3], 0) << "seed " << kSeed << " rate " << rate;
+        }
+      }
+      EXPECT_GT(seen, 300);
+      static_assert(kGentle < 0.4 * kSteep);
     }
   }
 }

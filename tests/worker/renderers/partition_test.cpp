@@ -180,6 +180,52 @@ TEST_P(Partitions, GradientOpacityMakesOnePicture) {
   }
 }
 
+TEST_P(Partitions, JitteredRaysMakeOnePicture) {
+  if (GetParam()->name() != "raycast") return;  // it alone has --jitter
+  const unsigned seed = 29;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : GetParam()->projections()) {
+    for (int view = 0; view < 4; ++view) {
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      if (view >= 2) options.clipping = RandomClipping(volume.description.geometry, random);
+      const FrameSetup setup = RaycastSetup(volume, options, 0.7, view % 2 == 0 ? 1 : 0.4);
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+      const LocalImage one = RenderWhole(volume, setup);
+      ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      const LocalImage without = RenderWhole(volume, RaycastSetup(volume, options, 0.7));
+      EXPECT_TRUE(view >= 2 || LargestDifference(one, without) > 0) << "clipping may leave nothing, otherwise jitter shows";
+    }
+  }
+}
+
+TEST_P(Partitions, RegionsMakeOnePicture) {
+  if (!GetParam()->Can(Ability::kRegions)) return;  // has none
+  const unsigned seed = 23;
+  std::mt19937 random(seed);
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kFloat32}) {
+    const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, type, seed));
+    for (Projection projection : GetParam()->projections()) {
+      for (int view = 0; view < 4; ++view) {
+        SetupOptions options;
+        options.renderer = GetParam();
+        options.view = RandomView(projection, random);
+        options.transfer =
+            WithCurvesOfRegions({.colors = {},
+                                 .opacities = {},
+                                 .regions = {{{{40, 0}, {255, 0}, {255, 12}, {40, 12}}, {1, 0.3F, 0.1F}, 0.1, 0.3},
+                                             {{{20, 6}, {160, 6}, {90, 80}}, {0.2F, 0.5F, 1}, 0.7, view % 2 == 0 ? 0.5 : 0}}});
+        const FrameSetup setup = MakeSetup(volume, options);
+        SCOPED_TRACE(::testing::Message() << "seed " << seed << " view " << view);
+        const LocalImage one = RenderWhole(volume, setup);
+        EXPECT_GT(std::ranges::max(one.rgba), 0);
+        ExpectSamePicture(one, RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+      }
+    }
+  }
+}
+
 // Axis-parallel views put rays, faces and planes on top of each other.
 TEST_P(Partitions, AxisParallelViewsHaveNoSeams) {
   const Volume volume = VolumeFor(*GetParam(), MakeBlobs({{32, 32, 32}, {1, 1, 1}}, ScalarType::kUint8, 5));

@@ -90,10 +90,10 @@ std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup
   return MakeFrameLight([&] { return MakeLightVolume(volume.block, volume.description).block; }, setup);
 }
 
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel) {
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel, double jitter) {
   options.renderer = FindRenderer("raycast");
   FrameSetup setup = MakeSetup(volume, options);
-  setup.parameters = {samples_per_voxel};
+  setup.parameters = {samples_per_voxel, jitter};
   return setup;
 }
 

@@ -42,7 +42,7 @@ struct SetupOptions {
 FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
 // Null: the setup needs none.
 std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup);
-FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1);
+FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1, double jitter = 0);
 
 // Physical length of the ray of a pixel inside the volume.
 double LengthInside(const FrameSetup& setup, int x, int y);

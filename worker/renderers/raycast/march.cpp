@@ -165,9 +165,14 @@ HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const Sam
   of.opacity = of.entries.part[3];
   of.visible = hn::And(hn::And(sampled, finite), hn::Gt(of.opacity, zero));
   of.gradient = {zero, zero, zero};
-  if (kSamples != Samples::kPlain && !look.gradient_factors.empty() && !hn::AllFalse(df, of.visible)) {
+  if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
     of.gradient = voxels.GradientOf(place);
-    of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
+    if (look.regions != nullptr) {
+      of.entries = EntriesAt(look.regions->entries.data(), RegionOf(look, hn::IfThenElseZero(finite, voxels.value), of.gradient));
+      of.opacity = of.entries.part[3];
+    } else {
+      of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
+    }
     of.visible = hn::And(of.visible, hn::Gt(of.opacity, zero));
   }
   if constexpr (kSamples == Samples::kLayered) {
@@ -196,7 +201,7 @@ HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floa
   Light light = {Set(1), hn::Zero(FloatTag())};
   [[maybe_unused]] LayeredLight lights = {light, light};
   if (IsLit(work)) {
-    const bool has_gradient = kSamples != Samples::kPlain && !look.gradient_factors.empty();
+    const bool has_gradient = kSamples != Samples::kPlain && look.by_gradient();
     Gradient gradient = has_gradient ? samples.gradient : voxels.GradientOf(place);
     [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
     if constexpr (kSamples != Samples::kPlain) {
@@ -312,7 +317,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
-  const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || !work.look->gradient_factors.empty();
+  const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || work.look->by_gradient();
   if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
     shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
   } else if (work.layers == nullptr) {
@@ -340,7 +345,7 @@ template <class T>
 std::uint64_t March(const MarchWork& work, const PixelBounds& tile, GradientBricks& bricks, float* HWY_RESTRICT rgba,
                     std::size_t floats_a_row) {
   if constexpr (!std::is_same_v<T, float>) {
-    if (work.look->phong || !work.look->gradient_factors.empty()) {
+    if (work.look->phong || work.look->by_gradient()) {
       bricks.Enter(*work.box);
       return MarchPackets<T, LitSamples<T>>(work, tile, &bricks, rgba, floats_a_row);
     }

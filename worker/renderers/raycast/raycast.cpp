@@ -9,6 +9,7 @@
 #include <cmath>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <utility>
 
 #include "common/frame/matter_labels.h"
@@ -134,6 +135,33 @@ class VisibilityCache : public BoxCache {
   std::vector<Visibility> pieces_;
 };
 
+// The table of the transfer function's regions, kept until another one is asked for.
+class RegionCache : public BoxCache {
+ public:
+  // Null: it has none.
+  const RegionTable* Of(const FrameSetup& setup, const ClassificationTable& classification, const RayLook& look) {
+    const TransferFunction& transfer = setup.transfer;
+    if (transfer.regions.empty()) return nullptr;
+    Key key = {transfer.regions, transfer.gradient_opacities, setup.range, setup.description.mapping, look.step_exponent};
+    if (key != key_) {
+      table_ = MakeRegionTable(transfer, classification, setup.description.mapping);
+      for (std::size_t i = 3; i < table_.entries.size(); i += 4) {
+        if (table_.entries[i] > 0)
+          table_.entries[i] = float(-std::expm1(double(look.step_exponent) * std::log1p(-double(table_.entries[i]))));
+      }
+      key_ = std::move(key);
+    }
+    return &table_;
+  }
+
+  std::size_t bytes() const override { return table_.entries.capacity() * sizeof(float); }
+
+ private:
+  using Key = std::tuple<std::vector<TransferRegion>, std::vector<GradientOpacityPoint>, ValueRange, ValueMapping, float>;
+  std::optional<Key> key_;
+  RegionTable table_;
+};
+
 class RaycastRenderer : public Renderer {
  public:
   Result<LocalImage> Render(BoxData& data, const LevelBox& at, const FrameSetup& setup, const OcclusionMask& hidden,
@@ -141,13 +169,16 @@ class RaycastRenderer : public Renderer {
     StageClock clock(report);
     const double samples_per_voxel = setup.parameters.at(0);
     const std::vector<RayPiece>& pieces = data.CacheOf<RayVolume>().PiecesOf(data);
-    const RayLook look = MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading,
-                                     samples_per_voxel, GeometryOf(setup, at.level).spacing);
+    const ClassificationTable& classification = data.Classification(setup);
+    RayLook look = MakeRayLook(classification, setup.transfer, setup.description, setup.camera, setup.shading, samples_per_voxel,
+                               GeometryOf(setup, at.level).spacing);
+    look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
     const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
     const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
     clock.Charge(Stage::kPrepare);
 
-    const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip);
+    const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
+                                   setup.clip, setup.parameters.at(1));
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
     std::atomic<std::uint64_t> shaded = 0;

@@ -31,7 +31,7 @@ TEST(Raycast, HomogeneousBlockLooksTheSameFromEverySide) {
           options.view = RandomView(projection, random);
           options.view.zoom = 1.5;
           options.transfer = Uniform(kOpacity, {1, 1, 1});
-          const FrameSetup setup = RaycastSetup(block, options, rate);
+          const FrameSetup setup = RaycastSetup(block, options, rate, i % 3 * 0.5);
           const LocalImage image = RenderPicture(block, setup);
           for (int y = 0; y < setup.camera.height; ++y) {
             for (int x = 0; x < setup.camera.width; ++x) {
