@@ -393,6 +393,92 @@ class PageTest(unittest.TestCase):
         viewer.keys(Keys.CONTROL, "z")
         viewer.final(f"o['gradient-opacity'] === '{drawn['options']['gradient-opacity']}'")
 
+    def test_regions_of_values_and_gradients(self):
+        viewer = self.viewer(renderer="mip")
+        viewer.settled()
+        viewer.until("document.querySelector('.facts dd') !== null")
+        switch, regions = ".by-region input[role=switch]", "o.transfer[0]?.Regions"
+        viewer.find(switch).click()
+        drawn = viewer.final(f"{regions}?.length === 2 && o.renderer === 'raycast'")
+        self.assertEqual(drawn["options"]["transfer"][0]["Regions"][1]["Corners"][2], 220, "the largest value")
+        self.assertNotIn("RGBPoints", drawn["options"]["transfer"][0])
+        before = viewer.pixels()
+        self.assertSamePixels(before, self.command_line(drawn))
+        self.assertTrue(viewer.js("document.querySelector('.plot').parentElement.hidden"), "regions stand in the place of the curve")
+
+        # A corner moves by the keyboard, a region by the pointer.
+        viewer.js("(document.querySelector('.joint .region[data-index=\"1\"]').focus(), document.querySelector('.joint .point[data-index=\"0\"]').focus(), true)")
+        viewer.driver.switch_to.active_element.send_keys(Keys.ARROW_RIGHT * 8, Keys.ARROW_UP * 4)
+        was = drawn["options"]["transfer"][0]["Regions"][1]["Corners"]
+        viewer.until("(c => c && c[0] > arguments[0] && c[1] > arguments[1])(window.drawn[window.drawn.length - 1].options.transfer[0].Regions[1].Corners)", *was[:2])
+        drawn = viewer.final(f"Math.abs({regions}[1].Corners[0] - {was[0]} - 8 * 220 / 256) < 0.1 && {regions}[1].Corners[1] > {was[1]}")
+        self.assertEqual(drawn["options"]["transfer"][0]["Regions"][1]["Corners"][2:], was[2:])
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        box = viewer.js("(document.querySelector('.joint').scrollIntoView({block: 'center'}), (b => [b.left, b.top, b.width, b.height])(document.querySelector('.joint .region[data-index=\"0\"]').getBoundingClientRect()))")
+        x, y = box[0] + box[2] / 2, box[1] + box[3] / 2
+        for kind, dx in (("mousePressed", 0), ("mouseMoved", -10), ("mouseMoved", -20), ("mouseReleased", -20)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x + dx, y=y, button="left", buttons=1, clickCount=1)
+        low, high = (drawn["options"]["transfer"][0]["Regions"][0]["Corners"][i] for i in (0, 2))
+        moved = viewer.final(f"{regions}[0].Corners[0] < {low}")["options"]["transfer"][0]["Regions"][0]["Corners"]
+        self.assertAlmostEqual(moved[2] - moved[0], high - low, places=3)
+        # A double click on an edge inserts a corner, Delete removes it.
+        edge = viewer.js("(b => [b.left + b.width / 3, b.bottom - 1])(document.querySelector('.joint .region[data-index=\"0\"]').getBoundingClientRect())")
+        for clicks in (1, 2):
+            for kind in ("mousePressed", "mouseReleased"):
+                viewer.command("Input.dispatchMouseEvent", type=kind, x=edge[0], y=edge[1], button="left", buttons=1, clickCount=clicks)
+        viewer.final(f"{regions}[0].Corners.length === 10")
+        viewer.js("document.querySelector('.joint .point.selected').focus()")
+        viewer.driver.switch_to.active_element.send_keys(Keys.DELETE)
+        viewer.final(f"{regions}[0].Corners.length === 8")
+        viewer.driver.find_element(By.XPATH, "//button[. = 'Add a region']").click()
+        drawn = viewer.final(f"{regions}.length === 3")
+        viewer.js("(e => { e.value = '#00ff00'; e.dispatchEvent(new Event('input')); return true; })(document.querySelector('[aria-label=\"Colour of the region\"]'))")
+        drawn = viewer.final(f"{regions}[2].Color.join() === '0,1,0'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.save(SHOTS, "regions")
+        for theme in ("dark", "light"):
+            viewer.theme(theme)
+            self.assertEqual(viewer.driver.execute_script((HERE / "accessibility.js").read_text()), [])
+
+        # The link holds them, and so does the file.
+        viewer.until("location.hash.includes('function=')")
+        viewer.find("[aria-label='Copy for --transfer']").click()
+        copied = viewer.until("window.copied[0]")
+        viewer.js("new Promise(done => setTimeout(done, 300))")
+        other = Viewer(self.driver, viewer.js("location.href").replace("#", f"#token={self.gateway.token}&"))
+        self.addCleanup(other.close)
+        self.assertEqual(other.final(f"{regions}?.length === 3")["options"], drawn["options"])
+        viewer.focus()
+        self.assertEqual(json.loads(copied)[0]["Regions"], drawn["options"]["transfer"][0]["Regions"])
+        drop = "(() => { const d = new DataTransfer(); d.items.add(new File([arguments[0]], 'map.json')); document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"
+        viewer.js(drop, '{"Name": "box", "Regions": [{"Values": [70, 200], "Slopes": [0, 90], "Color": [1, 0, 0]}]}')
+        viewer.final(f"{regions}?.length === 1 && o.transfer[0].Name === 'box' && {regions}[0].Corners.join() === '70,0,200,0,200,90,70,90'")
+        viewer.js(drop, '{"Regions": [{"Values": [70, 70], "Slopes": [0, 90], "Color": [1, 0, 0]}]}')
+        viewer.until("document.querySelector('.message.error')?.textContent.includes('Regions[0]')")
+
+        # Others than ray casting show the automatic function. Switching off goes back to the preset.
+        renderer = "[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'mip'))"
+        choose = "(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })"
+        viewer.js(f"{choose}({renderer})", "mip")
+        viewer.final("o.renderer === 'mip' && o.transfer === 'auto'")
+        self.assertIn("Only ray casting", viewer.js("document.querySelector('.by-region .hint').textContent"))
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final(f"o.renderer === 'raycast' && {regions}?.length === 1")
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final(f"{regions}?.length === 3")
+        viewer.find(switch).click()
+        viewer.final("o.transfer === 'auto'")
+        self.assertFalse(viewer.js("document.querySelector('.plot').parentElement.hidden"))
+        preset = "[...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'ct-bone-2d'))"
+        viewer.js(f"{choose}({renderer})", "mip")
+        viewer.js(f"{choose}({preset})", "ct-bone-2d")
+        drawn = viewer.final("o.transfer === 'ct-bone-2d' && o.renderer === 'raycast'")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelectorAll('.joint .region').length === 2 && !document.querySelector('.joint').parentElement.hidden")
+        viewer.until("location.hash.includes('transfer=ct-bone-2d')")
+        viewer.find(switch).click()
+        viewer.final("o.transfer === 'auto'")
+
     def test_labels_surfaces_lights_and_renderers(self):
         viewer = self.viewer()
         viewer.settled()

@@ -14,6 +14,7 @@ export interface Dataset {
   layers?: { labels: number; overlay: boolean }; cells?: number; levels?: Level[]; range?: { min: number; max: number };
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
+export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
 export interface LabelName { value: number; name: string; color?: string }
 export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null }
 
@@ -48,6 +49,7 @@ export class Api {
 
   // Older gateways lack these: null.
   histogram = (dataset: string): Promise<Histogram | null> => this.maybe("histogram", { dataset });
+  jointHistogram = (dataset: string): Promise<JointHistogram | null> => this.maybe("joint-histogram", { dataset });
   transfer = (dataset: string, transfer: string): Promise<unknown> => this.maybe("transfer", { dataset, transfer });
   labels = (dataset: string): Promise<{ labels: LabelName[] } | null> => this.maybe("labels", { dataset });
   value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);

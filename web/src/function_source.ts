@@ -25,6 +25,12 @@ export class FunctionSource {
     return map === null && this.presets.get(this.key(preset)) === null;
   }
 
+  // The user's own function in the place of the present one.
+  edit(map: ColorMap, gesture: string): void {
+    const { store } = this.context;
+    store.update({ map: { ...map, name: store.state.map?.name ?? `${store.state.preset}, edited` }, range: null }, gesture);
+  }
+
   private unstretched(): ColorMap {
     const { map, preset } = this.context.store.state;
     if (map) return map;

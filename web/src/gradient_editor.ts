@@ -2,15 +2,14 @@
 import type { Context } from "./context";
 import { iconButton, numberField, toggle } from "./controls";
 import { h, shown, svg } from "./dom";
-import { can, rendererThatCan } from "./offers";
+import { can, turnTo } from "./offers";
 import { Scale } from "./plot";
-import { editPoints } from "./point_gestures";
+import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
 import { LOOK, type SlopePoint } from "./state";
 import { clamp, rounded } from "./vec";
-import { unitName } from "./volume";
+import { slopeUnit, STEEP, steepestOf } from "./volume";
 
 const HEIGHT = 92;
-const STEEP = 0.25; // share of the range of values that changes within a voxel: there the plot ends, unless points lie beyond
 const KEY_STEPS = 100;
 
 export class GradientEditor {
@@ -35,7 +34,7 @@ export class GradientEditor {
       h("div", { class: "fields" }, h("label", {}, h("span", {}, "Gradient"), this.slope.input), h("label", {}, h("span", {}, "Factor"), this.opacity.input),
         h("div", { class: "tools-row" }, iconButton("Add a point to the gradient", "add", () => this.add(), "Insert"), this.removeButton)));
     this.element = h("div", { class: "editor by-gradient" }, this.on.element, this.hint, this.body);
-    new ResizeObserver(entries => { const wide = Math.round(entries[0]?.contentRect.width ?? 0); if (wide > 0) { this.width = Math.max(120, wide); this.refresh(); } }).observe(this.plot.parentElement as HTMLElement);
+    onWidth(this.plot.parentElement as HTMLElement, width => { this.width = width; this.refresh(); });
     editPoints(this.plot, {
       choose: circle => this.choose(Number(circle.dataset["index"])), insertAt: event => this.insert(...this.at(event)), dragTo: event => this.moveTo(...this.at(event)),
       step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
@@ -50,9 +49,8 @@ export class GradientEditor {
   private get list(): readonly SlopePoint[] { return this.context.store.state.slopes; }
 
   private scale(): Scale {
-    const volume = this.context.volume(), [low, high] = volume?.range ?? [0, 1];
-    const steep = (STEEP * (high - low)) / Math.min(...(volume?.spacing ?? [1]));
-    return new Scale([0, Math.max(rounded(steep, 2), this.list[this.list.length - 1]?.slope ?? 0) || 1], this.width, HEIGHT);
+    const steep = STEEP * steepestOf(this.context.volume());
+    return new Scale([0, Math.max(rounded(steep, 2), this.list[this.list.length - 1]?.slope ?? 0)], this.width, HEIGHT);
   }
 
   private refresh(): void {
@@ -60,8 +58,7 @@ export class GradientEditor {
     this.on.set(on);
     this.body.hidden = !on;
     this.hint.hidden = !on;
-    const volume = this.context.volume(), unit = volume ? unitName(volume.unit).replace(/s$/, "") : "unit";
-    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in data values per ${unit}.` : "Only ray casting shows opacity by the gradient.";
+    this.hint.textContent = able ? `Opacity is multiplied by this factor. Gradients are in ${slopeUnit(this.context.volume())}.` : "Only ray casting shows opacity by the gradient.";
     if (!on) return;
     const scale = this.scale(), first = list[0] as SlopePoint, last = list[list.length - 1] as SlopePoint;
     this.selected = clamp(this.selected, 0, list.length - 1);
@@ -80,16 +77,10 @@ export class GradientEditor {
   }
 
   private drawPoints(scale: Scale): void {
-    const { list } = this;
-    while (this.points.childElementCount > list.length) this.points.lastElementChild?.remove();
-    while (this.points.childElementCount < list.length) this.points.append(svg("circle", { tabindex: 0, role: "slider", onfocus: (event: FocusEvent) => { this.choose(Number((event.target as SVGElement).dataset["index"])); } }));
-    list.forEach(({ slope, opacity }, i) => {
-      const attributes: Record<string, string | number> = {
-        cx: scale.x(slope), cy: scale.y(opacity), r: 5.5, "data-index": i, class: `point opacity plain${i === this.selected ? " selected" : ""}`,
-        "aria-label": `Gradient point ${i + 1}`, "aria-valuenow": slope, "aria-valuemin": 0, "aria-valuemax": scale.domain[1], "aria-valuetext": `factor ${shown(opacity, 2)} at ${shown(slope)}`,
-      };
-      for (const [name, value] of Object.entries(attributes)) this.points.children[i]?.setAttribute(name, String(value));
-    });
+    drawMarks(this.points, "circle", this.list.map(({ slope, opacity }, i) => ({
+      cx: scale.x(slope), cy: scale.y(opacity), r: 5.5, "data-index": i, class: `point opacity plain${i === this.selected ? " selected" : ""}`,
+      "aria-label": `Gradient point ${i + 1}`, "aria-valuenow": slope, "aria-valuemin": 0, "aria-valuemax": scale.domain[1], "aria-valuetext": `factor ${shown(opacity, 2)} at ${shown(slope)}`,
+    })), point => this.choose(Number(point.dataset["index"])));
   }
 
   private choose(index: number): void {
@@ -105,7 +96,7 @@ export class GradientEditor {
     const { store } = this.context, steep = this.scale().domain[1];
     this.selected = 0;
     if (!on) return this.edit([], "by gradient");
-    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...(can("gradient-opacity", store.state.renderer) ? {} : { renderer: rendererThatCan("gradient-opacity") }) }, "by gradient");
+    store.update({ slopes: [{ slope: rounded(steep * 0.05, 3), opacity: 0 }, { slope: rounded(steep * 0.4, 3), opacity: 1 }], ...turnTo("gradient-opacity", store.state.renderer) }, "by gradient");
   }
 
   private moveTo(slope: number | null, opacity: number | null): void {
@@ -133,8 +124,8 @@ export class GradientEditor {
   // ---- pointers and keys
 
   private at(event: PointerEvent): [number, number] {
-    const box = this.plot.getBoundingClientRect(), scale = this.scale();
-    return [scale.value(((event.clientX - box.left) * this.width) / box.width), scale.opacity(event.clientY - box.top)];
+    const [x, y] = placeIn(this.plot, this.width, event), scale = this.scale();
+    return [scale.value(x), scale.opacity(y)];
   }
 
   private step(right: number, up: number): void {

@@ -4,7 +4,7 @@ import type { Context } from "./context";
 import { choice, colorField, optionalField, row, section, segmented, slider, textField, toggle } from "./controls";
 import { h } from "./dom";
 import { isListed, type Labels, labelText, listOf } from "./labels";
-import { can, presetChoices, rendererThatCan, titlesThatCan } from "./offers";
+import { can, hasRegions, presetChoices, titlesThatCan, turnTo } from "./offers";
 import { LOOK, ONE_COLOR } from "./state";
 import { rounded } from "./vec";
 
@@ -48,12 +48,12 @@ function labelList({ store, volume }: Context, labels: Labels): { element: HTMLE
 
 export function layersSection(context: Context, labels: Labels): HTMLElement {
   const { store } = context, list = labelList(context, labels);
-  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" && !can("labels", store.state.renderer) ? { renderer: rendererThatCan("labels") } : {}) }, "labels"));
+  const mode = segmented("Labels", [["off", "Off"], ["tint", "Tint"], ["highlight", "Highlight"], ["surface", "Solid"]], value => store.update({ labels: value as "off", ...(value !== "off" ? turnTo("labels", store.state.renderer) : {}) }, "labels"));
   const tint = slider("Tint", 0, 1, 0.05, v => `${Math.round(v * 100)} %`, value => store.update({ labelTint: value }, "tint"));
   const which = textField("Shown", "all, or 1,5-9,Frontal_*", "[^,]+(,[^,]+)*", value => store.update({ labelsShown: value }, "labels shown"));
   const legend = toggle("Legend", on => store.update({ legend: on }));
-  const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on && !can("overlay", store.state.renderer) ? { renderer: rendererThatCan("overlay") } : {}) }, "overlay"));
-  const overlayPreset = choice("Overlay’s function", [...presetChoices(), [ONE_COLOR, "One colour"]], value => store.update({ overlayPreset: value }, "overlay preset"));
+  const overlay = toggle("Overlay", on => store.update({ overlay: on, ...(on ? turnTo("overlay", store.state.renderer) : {}) }, "overlay"));
+  const overlayPreset = choice("Overlay’s function", [...presetChoices().filter(([preset]) => !hasRegions(preset)), [ONE_COLOR, "One colour"]], value => store.update({ overlayPreset: value }, "overlay preset"));
   const overlayColor = colorField("Colour of the overlay", value => store.update({ overlayColor: value }, "overlay colour"));
   const colorRow = row("Colour", overlayColor.input);
   const ends = [0, 1].map(end => optionalField(`Overlay ${end === 0 ? "from" : "to"}`, value => {

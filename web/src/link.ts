@@ -3,6 +3,7 @@
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import { limitsOf, parametersIn } from "./offers";
 import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
+import { cornersOf, isArea, MOST_REGIONS, type Region } from "./regions";
 import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
 
@@ -13,8 +14,8 @@ const numbers = (text: string, count: number): number[] | undefined => {
   const list = text.split(",").map(number);
   return list.length === count && list.every(n => n !== undefined) ? (list as number[]) : undefined;
 };
-const list = <T>(text: string, separator: string, read: (item: string) => T | undefined): T[] | undefined => {
-  const items = text.split(separator).map(read);
+const list = <T>(text: string | null, separator: string, read: (item: string) => T | undefined): T[] | undefined => {
+  const items = text === null ? [] : text.split(separator).map(read);
   return items.every(item => item !== undefined) ? (items as T[]) : undefined;
 };
 const text = (name: string, allowed: RegExp): Field<string> => ({ name, write: value => value, read: value => (allowed.test(value) ? value : undefined) });
@@ -64,21 +65,33 @@ const clipBox: Field<ClipBox> = {
 const many = <T extends readonly number[]>(name: string, count: number): Field<readonly T[]> => ({
   name, write: value => value.map(v => v.join(",")).join(";"), read: value => list(value, ";", item => numbers(item, count) as unknown as T | undefined),
 });
+const regions: Field<readonly Region[]> = {
+  name: "regions", write: value => value.map(({ corners, r, g, b, opacity, softness }) => [r, g, b, opacity, softness, ...corners.flatMap(({ value, slope }) => [value, slope])].join(",")).join(";"),
+  read: value => {
+    const read = list(value, ";", (item): Region | undefined => {
+      const given = item.split(",").map(number), [r, g, b, opacity, softness, ...numbers] = given as number[], corners = cornersOf(numbers);
+      const shares = given.slice(0, 5).every(n => n !== undefined && n >= 0 && n <= 1), whole = numbers.length % 2 === 0 && given.every(n => n !== undefined);
+      return shares && whole && isArea(corners) ? { corners, r, g, b, opacity, softness } as Region : undefined;
+    });
+    return read && read.length <= MOST_REGIONS ? read : undefined;
+  },
+};
 const map: Field<ColorMap> = {
   name: "function",
   write: value => [encodeURIComponent(value.name), value.colors.map(p => [p.x, p.r, p.g, p.b].join(",")).join(";"),
     value.opacities.map(p => (p.mid === 0.5 && p.sharp === 0 ? [p.x, p.y] : [p.x, p.y, p.mid, p.sharp]).join(",")).join(";"),
-    ...(value.material ? [MATERIAL.map(name => value.material?.[name] ?? "").join(",")] : [])].join("|"),
+    value.material ? MATERIAL.map(name => value.material?.[name] ?? "").join(",") : "", value.regions ? regions.write(value.regions) : ""].join("|").replace(/\|+$/, ""),
   read: value => {
-    const [name, colorText, opacityText, materialText] = value.split("|");
-    const colors = list(colorText ?? "", ";", item => { const n = numbers(item, 4); return n && { x: n[0] as number, r: n[1] as number, g: n[2] as number, b: n[3] as number }; });
-    const opacities = list(opacityText ?? "", ";", item => {
+    const [name, colorText, opacityText, materialText, regionText] = value.split("|");
+    const colors = list(colorText || null, ";", item => { const n = numbers(item, 4); return n && { x: n[0] as number, r: n[1] as number, g: n[2] as number, b: n[3] as number }; });
+    const opacities = list(opacityText || null, ";", item => {
       const n = numbers(item, 4) ?? [...(numbers(item, 2) ?? []), 0.5, 0];
       return n.length === 4 ? { x: n[0] as number, y: n[1] as number, mid: n[2] as number, sharp: n[3] as number } : undefined;
     });
-    if (!colors?.length || !opacities?.length) return undefined;
-    const map = { name: decodeURIComponent(name ?? ""), colors, opacities };
-    if (materialText === undefined) return map;
+    const areas = regionText ? regions.read(regionText) : [];
+    if (!colors || !opacities || !areas || (areas.length === 0 && (colors.length === 0 || opacities.length === 0))) return undefined;
+    const map = { name: decodeURIComponent(name ?? ""), colors, opacities, ...(areas.length > 0 && { regions: areas }) };
+    if (!materialText) return map;
     const texts = materialText.split(",");
     return { ...map, material: Object.fromEntries(MATERIAL.flatMap((each, i) => { const n = texts[i] ? number(texts[i] as string) : undefined; return n === undefined ? [] : [[each, n]]; })) };
   },
@@ -102,7 +115,7 @@ const measures: Field<readonly Measure[]> = {
   },
 };
 
-const NAME = /^[a-z][a-z-]{0,40}$/;
+const NAME = /^[a-z][a-z0-9-]{0,40}$/;
 type Named = Omit<State, "parameters">; // whose own names are those of their fields
 const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   dataset: text("dataset", /^.{0,256}$/),

@@ -3,7 +3,7 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
-import { automaticRenderer, can, limitsOf, type Offer, parametersOf, rendererThatCan, renderers, settled, titleOf, titlesThatCan, words } from "./offers";
+import { automaticRenderer, can, limitsOf, type Offer, parametersOf, renderers, settled, titleOf, titlesThatCan, turnTo, words } from "./offers";
 import { projectionOf } from "./options";
 import { LOOK, type State, type Store, type Surface } from "./state";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
@@ -102,7 +102,7 @@ export function surfacesSection(context: Context): HTMLElement {
     const colors = ["#e0b089", "#f2ede4", "#7fb4d8", "#d98383"];
     store.update({
       surfaces: [...store.state.surfaces, { value: rounded(low + (high - low) * 0.35, 4), color: colors[store.state.surfaces.length % colors.length] as string, opacity: 1 }],
-      ...(can("isosurfaces", store.state.renderer) ? {} : { renderer: rendererThatCan("isosurfaces") }),
+      ...turnTo("isosurfaces", store.state.renderer),
     }, "surface");
   }, "quiet");
   const head = h("div", { class: "list-head", "aria-hidden": "true" }, h("span", {}, "Value"), h("span", {}, "Colour"), h("span", {}, "Opacity"));

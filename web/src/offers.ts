@@ -32,13 +32,16 @@ export const choicesOf = (name: string): readonly string[] => offers.get(name)?.
 
 // What the service calls something, as the page writes it: "dark-bone" is "Dark bone".
 export function words(name: string): string {
-  const text = name === "auto" ? "automatic" : name.replace(/-/g, " ").replace(/\b(ct|mri)\b/g, short => short.toUpperCase());
+  const text = name === "auto" ? "automatic" : name.replace(/-/g, " ").replace(/\b(ct|mri|2d)\b/g, short => short.toUpperCase());
   return text.charAt(0).toUpperCase() + text.slice(1);
 }
 
 // Presets of transfer functions, but for the one that shows nothing.
 export const presetChoices = (): (readonly [string, string])[] =>
   (offers.get("transfer")?.presets ?? ["auto"]).filter(name => name !== "none").map(name => [name, words(name)] as const);
+
+// Whether a preset has regions of values and slopes.
+export const hasRegions = (preset: string): boolean => preset.endsWith("-2d");
 
 // Windows of CT, in Hounsfield units.
 export const namedWindows = (): readonly NamedWindow[] => offers.get("window")?.windows ?? [];
@@ -80,4 +83,6 @@ export function rendererThatCan(what: string): string {
   const able = renderers().filter(each => has(what, each)).sort((a, b) => b.abilities.length - a.abilities.length);
   return able[0]?.name ?? "";
 }
+// A change of the state after which the renderer can do it.
+export const turnTo = (what: string, renderer: string): { renderer?: string } => (can(what, renderer) ? {} : { renderer: rendererThatCan(what) });
 export const titlesThatCan = (what: string): string => renderers().filter(each => has(what, each)).map(titleOf).join(", ");

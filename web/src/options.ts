@@ -1,6 +1,6 @@
 // The state as options of the gateway, which are those of the command line.
 import { boxText, slopeText } from "./link";
-import { can, parametersOf } from "./offers";
+import { can, hasRegions, parametersOf } from "./offers";
 import { ONE_COLOR, type State } from "./state";
 import { rampTo, toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -9,8 +9,14 @@ export type Options = Record<string, unknown>;
 
 const WHOLE_RANGE = "0%:99.9%"; // a few bright voxels darken nothing
 
+// The automatic function stands in for regions that the renderer does not show.
+function functionOf({ map, preset, renderer }: State): unknown {
+  if (!can("regions", renderer) && (map ? map.regions : hasRegions(preset))) return "auto";
+  return map ? toParaView(map) : preset;
+}
+
 function transferOptions(state: State): Options {
-  const options: Options = { transfer: state.map ? toParaView(state.map) : state.preset };
+  const options: Options = { transfer: functionOf(state) };
   if (state.range) options["scalar-range"] = state.range.join(":");
   if (state.opacityDistance !== 1) options["opacity-distance"] = state.opacityDistance;
   if (state.slopes.length > 0 && can("gradient-opacity", state.renderer)) options["gradient-opacity"] = slopeText(state.slopes);

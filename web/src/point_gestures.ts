@@ -1,7 +1,9 @@
-// Pointers and keys of a plot whose points are moved by hand. Its circles have `data-index`; the chosen one has the class `selected`.
+// Pointers and keys of a plot whose points are moved by hand. Its marks have `data-index`; the chosen one has the class `selected`.
+import { put, svg } from "./dom";
+
 export interface PointEditor {
-  choose(circle: SVGElement): void;
-  insertAt(event: PointerEvent): void;
+  choose(mark: SVGElement, event?: PointerEvent): void; // with the event that begins a drag
+  insertAt?(event: PointerEvent): void;
   dragTo(event: PointerEvent): void;
   step(right: number, up: number): void; // in steps of an arrow key
   add(): void;
@@ -15,10 +17,11 @@ export const editPoints = (plot: SVGElement, editor: PointEditor): void => {
   plot.addEventListener("pointerdown", event => {
     const hit = event.target instanceof SVGElement && event.target.dataset["index"] ? event.target : null;
     if (hit) {
-      editor.choose(hit);
+      editor.choose(hit, event);
       hit.focus();
       if (event.button === 2) return editor.remove();
     } else if (event.button === 0) {
+      if (!editor.insertAt) return;
       editor.insertAt(event);
       plot.querySelector<SVGElement>(".selected")?.focus();
     }
@@ -40,3 +43,20 @@ export const editPoints = (plot: SVGElement, editor: PointEditor): void => {
     event.stopPropagation();
   });
 };
+
+// Where a pointer is in a plot that is `width` wide in its own units.
+export function placeIn(plot: SVGElement, width: number, event: MouseEvent): [number, number] {
+  const box = plot.getBoundingClientRect();
+  return [((event.clientX - box.left) * width) / box.width, event.clientY - box.top];
+}
+
+// Tells how wide a plot's frame is, unless it is hidden.
+export const onWidth = (frame: HTMLElement, tell: (width: number) => void): void =>
+  new ResizeObserver(entries => { const wide = Math.round(entries[0]?.contentRect.width ?? 0); if (wide > 0) tell(Math.max(120, wide)); }).observe(frame);
+
+// As many marks as wanted. Those that are there stay, and with them the focus.
+export function drawMarks(group: SVGElement, tag: "circle" | "path", marks: readonly Record<string, string | number>[], focused: (mark: SVGElement) => void): void {
+  while (group.childElementCount > marks.length) group.lastElementChild?.remove();
+  while (group.childElementCount < marks.length) group.append(svg(tag, { tabindex: 0, role: "slider", onfocus: (event: FocusEvent) => focused(event.target as SVGElement) }));
+  marks.forEach((attributes, i) => { for (const [name, value] of Object.entries(attributes)) put(group.children[i] as Element, name, String(value)); });
+}

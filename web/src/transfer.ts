@@ -1,15 +1,18 @@
 // Transfer functions as ParaView's colour maps: reading, writing, looking up. See docs/transfer.md.
+import { boundsOf, type Region, readRegions, writeRegions } from "./regions";
 import { clamp, rounded } from "./vec";
 
 export interface ColorPoint { x: number; r: number; g: number; b: number } // colours from 0 to 1
 export interface OpacityPoint { x: number; y: number; mid: number; sharp: number }
 export const MATERIAL = ["ambient", "diffuse", "specular", "shininess"] as const;
 export type Material = Readonly<Partial<Record<(typeof MATERIAL)[number], number>>>; // the page shows none of it, and keeps it
-export interface ColorMap { name: string; colors: readonly ColorPoint[]; opacities: readonly OpacityPoint[]; material?: Material } // both lists ascend and are not empty
+// Both lists ascend. Regions stand in the place of the curves, which are then kept for later; without regions neither list is empty.
+export interface ColorMap { name: string; colors: readonly ColorPoint[]; opacities: readonly OpacityPoint[]; regions?: readonly Region[]; material?: Material }
 
 const MOST_POINTS = 4096;
 
 export function rangeOf(map: ColorMap): [number, number] {
+  if (map.regions) { const { low, high } = boundsOf(map.regions.flatMap(region => region.corners)); return [low, high]; }
   const xs = [...map.colors, ...map.opacities].map(point => point.x);
   return [Math.min(...xs), Math.max(...xs)];
 }
@@ -18,6 +21,7 @@ export function rangeOf(map: ColorMap): [number, number] {
 export function stretched(map: ColorMap, [low, high]: readonly [number, number]): ColorMap {
   const [from, to] = rangeOf(map);
   const move = (x: number): number => rounded(to > from ? low + ((x - from) / (to - from)) * (high - low) : low);
+  if (map.regions) return { ...map, regions: map.regions.map(region => ({ ...region, corners: region.corners.map(corner => ({ ...corner, value: move(corner.value) })) })) };
   return { ...map, colors: map.colors.map(p => ({ ...p, x: move(p.x) })), opacities: map.opacities.map(p => ({ ...p, x: move(p.x) })) };
 }
 
@@ -31,12 +35,14 @@ function between<P extends { x: number }>(points: readonly P[], x: number): [P, 
 }
 
 export function colorAt(map: ColorMap, x: number): [number, number, number] {
+  if (map.colors.length === 0) return [0, 0, 0];
   const [a, b, t] = between(map.colors, x);
   return [a.r + (b.r - a.r) * t, a.g + (b.g - a.g) * t, a.b + (b.b - a.b) * t];
 }
 
 // Between two points: half way at the midpoint; sharpness 0 is a straight line on either side, 1 a step.
 export function opacityAt(map: ColorMap, x: number): number {
+  if (map.opacities.length === 0) return 0;
   const [a, b, t] = between(map.opacities, x);
   if (a === b) return a.y;
   const mid = clamp(a.mid, 1e-5, 1 - 1e-5);
@@ -63,12 +69,8 @@ export function rampTo(color: string): ColorMap {
 }
 
 export function toParaView(map: ColorMap): object[] {
-  return [{
-    Name: map.name, ColorSpace: "RGB",
-    RGBPoints: map.colors.flatMap(p => [p.x, p.r, p.g, p.b]),
-    Points: map.opacities.flatMap(p => [p.x, p.y, p.mid, p.sharp]),
-    ...(map.material && { Material: map.material }),
-  }];
+  const curves = { ColorSpace: "RGB", RGBPoints: map.colors.flatMap(p => [p.x, p.r, p.g, p.b]), Points: map.opacities.flatMap(p => [p.x, p.y, p.mid, p.sharp]) };
+  return [{ Name: map.name, ...(map.regions ? { Regions: writeRegions(map.regions) } : curves), ...(map.material && { Material: map.material }) }];
 }
 
 function groups(list: unknown, field: string): number[][] {
@@ -94,10 +96,7 @@ function materialOf(json: unknown): Material {
   return json as Material;
 }
 
-// From the JSON of a preset or of a list of presets, of which the first counts. Throws an Error with a sentence.
-export function parseParaView(json: unknown): ColorMap {
-  const preset = (Array.isArray(json) ? json[0] : json) as Record<string, unknown> | null | undefined;
-  if (typeof preset !== "object" || preset === null || !("RGBPoints" in preset)) throw new Error("this is not a colour map of ParaView: it has no RGBPoints");
+function curvesOf(preset: Record<string, unknown>): Pick<ColorMap, "colors" | "opacities"> {
   const share = (x: number | undefined): number => rounded(clamp(x ?? 0, 0, 1), 4);
   const colors = groups(preset["RGBPoints"], "RGBPoints").map(([x = 0, r, g, b]) => ({ x: rounded(x, 8), r: share(r), g: share(g), b: share(b) }));
   const first = colors[0], last = colors[colors.length - 1];
@@ -106,7 +105,15 @@ export function parseParaView(json: unknown): ColorMap {
     ? [{ x: first.x, y: 0, mid: 0.5, sharp: 0 }, { x: last.x, y: 1, mid: 0.5, sharp: 0 }]
     : groups(preset["Points"], "Points").map(([x = 0, y, mid, sharp]) => ({ x: rounded(x, 8), y: share(y), mid: share(mid ?? 0.5), sharp: share(sharp) }));
   if (opacities.length === 0) throw new Error("Points is empty");
-  const map = { name: typeof preset["Name"] === "string" ? preset["Name"].slice(0, 80) : "dropped", colors, opacities };
+  return { colors, opacities };
+}
+
+// From the JSON of a preset or of a list of presets, of which the first counts. Throws an Error with a sentence.
+export function parseParaView(json: unknown): ColorMap {
+  const preset = (Array.isArray(json) ? json[0] : json) as Record<string, unknown> | null | undefined;
+  if (typeof preset !== "object" || preset === null || !("RGBPoints" in preset || "Regions" in preset)) throw new Error("this is not a colour map of ParaView: it has no RGBPoints");
+  const name = typeof preset["Name"] === "string" ? preset["Name"].slice(0, 80) : "dropped";
+  const map = "Regions" in preset ? { name, colors: [], opacities: [], regions: readRegions(preset["Regions"]) } : { name, ...curvesOf(preset) };
   return preset["Material"] === undefined ? map : { ...map, material: materialOf(preset["Material"]) };
 }
 

@@ -1,12 +1,13 @@
-// The editor of the transfer function: points of opacity in the plot, points of colour in the strip below.
+// The editor of the transfer function: points of opacity in the plot, points of colour in the strip below; or regions in their place.
 import type { Histogram } from "./api";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, slider } from "./controls";
 import { copyText, download, h, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
-import { presetChoices } from "./offers";
-import { editPoints } from "./point_gestures";
+import { hasRegions, presetChoices, turnTo } from "./offers";
+import { drawMarks, editPoints, onWidth, placeIn } from "./point_gestures";
+import { RegionEditor } from "./region_editor";
 import { LOOK } from "./state";
 import { type ColorMap, colorAt, hexOf, opacityAt, parseParaView, rangeOf, rgbOf, toParaView } from "./transfer";
 import { clamp, rounded } from "./vec";
@@ -36,7 +37,10 @@ export class TransferEditor {
   private readonly note = h("p", { class: "hint" });
   private readonly undoButton = iconButton("Undo", "undo", () => this.context.store.undo(), "Ctrl+Z");
   private readonly redoButton = iconButton("Redo", "redo", () => this.context.store.redo(), "Ctrl+Y");
+  private readonly addButton = iconButton("Add a point of opacity", "add", () => this.add(), "Insert");
   private readonly removeButton = iconButton("Remove the point", "remove", () => this.remove(), "Delete");
+  private readonly frame = h("div", { class: "plot-frame" }, this.plot);
+  private readonly regions: RegionEditor;
   private readonly pointFields: HTMLElement;
   private selected: Selected = { kind: "opacity", index: 0 };
   private histogram: Histogram | null = null;
@@ -47,12 +51,13 @@ export class TransferEditor {
     const file = h("input", { type: "file", accept: ".json,application/json", class: "offscreen", tabindex: -1, "aria-label": "Colour map", onchange: () => { const chosen = file.files?.[0]; if (chosen) void this.open(chosen); file.value = ""; } });
     this.pointFields = h("div", { class: "fields" },
       h("label", {}, h("span", {}, "Value"), this.value.input), h("label", { class: "of-opacity" }, h("span", {}, "Opacity"), this.opacity.input), h("label", { class: "of-color" }, h("span", {}, "Colour"), this.color.input));
-    this.element = h("div", { class: "editor" }, this.presets.element, h("div", { class: "plot-frame" }, this.plot), this.note, this.pointFields,
-      h("div", { class: "tools-row" }, this.undoButton, this.redoButton, iconButton("Add a point of opacity", "add", () => this.add(), "Insert"), this.removeButton, h("span", { class: "space" }),
+    this.regions = new RegionEditor(context, source);
+    this.element = h("div", { class: "editor" }, this.presets.element, this.frame, this.note, this.pointFields, this.regions.element,
+      h("div", { class: "tools-row" }, this.undoButton, this.redoButton, this.addButton, this.removeButton, h("span", { class: "space" }),
         iconButton("Open a colour map", "open", () => file.click()), iconButton("Save as a file", "save", () => this.save()), iconButton("Copy for --transfer", "copy", () => void this.copy()), file),
       h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet")),
-      this.density.element);
-    new ResizeObserver(entries => { this.width = Math.max(120, Math.round(entries[0]?.contentRect.width ?? 280)); this.refresh(); }).observe(this.plot.parentElement as HTMLElement);
+      this.density.element, this.regions.switch);
+    onWidth(this.frame, width => { this.width = width; this.refresh(); });
     editPoints(this.plot, {
       choose: circle => this.focusOn(circle), insertAt: event => this.insertAt(event), dragTo: event => this.drag(event),
       step: (right, up) => this.step(right, up), add: () => this.add(), remove: () => this.remove(),
@@ -69,7 +74,7 @@ export class TransferEditor {
     try {
       if (file.size > MOST_BYTES) throw new Error("it is larger than 1 MiB");
       const map = parseParaView(JSON.parse(await file.text()));
-      this.context.store.update({ map, range: null }, "open");
+      this.context.store.update({ map, range: null, ...this.rendererFor(map.regions !== undefined) }, "open");
       this.context.say(`Colour map “${map.name}”`);
     } catch (error) {
       this.context.say(`${file.name}: ${error instanceof Error ? error.message : "it cannot be read"}`, "error");
@@ -77,22 +82,12 @@ export class TransferEditor {
   }
 
   refresh(): void {
-    const { state } = this.context.store, map = this.source.current(), scale = this.scale(map), custom = state.map !== null;
+    const { state } = this.context.store, map = this.source.current(), custom = state.map !== null;
     this.presets.fill([...presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
     this.presets.set(custom ? "" : state.preset);
-    const height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
-    this.plot.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
-    this.plot.setAttribute("height", String(height));
-    this.bars.setAttribute("d", this.histogram ? histogramPath(this.histogram, scale) : "");
-    const path = curvePath(map, scale);
-    this.curve.setAttribute("d", path);
-    this.area.setAttribute("d", `${path}L${scale.x(scale.domain[1])} ${scale.y(0)}L${scale.x(scale.domain[0])} ${scale.y(0)}Z`);
-    this.gradient.replaceChildren(...gradientStops(map, scale));
-    const stripY = PLOT.height + PLOT.stripGap;
-    for (const [name, value] of Object.entries({ x: PLOT.side, y: stripY, width: this.width - 2 * PLOT.side, height: PLOT.strip })) this.strip.setAttribute(name, String(value));
-    this.ticks.replaceChildren(...([[scale.domain[0], "start"], [scale.domain[1], "end"]] as const).map(([value, anchor]) =>
-      svg("text", { x: scale.x(value), y: stripY + PLOT.strip + 20, "text-anchor": anchor }, shown(value))));
-    this.drawPoints(map, scale, stripY);
+    for (const part of [this.frame, this.pointFields, this.addButton, this.removeButton]) part.hidden = map.regions !== undefined;
+    if (!map.regions) this.drawCurves(map);
+    this.regions.refresh(map);
     this.note.textContent = this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
@@ -105,6 +100,22 @@ export class TransferEditor {
 
   // ---- drawing
 
+  private drawCurves(map: ColorMap): void {
+    const scale = this.scale(map), height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
+    this.plot.setAttribute("viewBox", `0 0 ${this.width} ${height}`);
+    this.plot.setAttribute("height", String(height));
+    this.bars.setAttribute("d", this.histogram ? histogramPath(this.histogram, scale) : "");
+    const path = curvePath(map, scale);
+    this.curve.setAttribute("d", path);
+    this.area.setAttribute("d", `${path}L${scale.x(scale.domain[1])} ${scale.y(0)}L${scale.x(scale.domain[0])} ${scale.y(0)}Z`);
+    this.gradient.replaceChildren(...gradientStops(map, scale));
+    const stripY = PLOT.height + PLOT.stripGap;
+    for (const [name, value] of Object.entries({ x: PLOT.side, y: stripY, width: this.width - 2 * PLOT.side, height: PLOT.strip })) this.strip.setAttribute(name, String(value));
+    this.ticks.replaceChildren(...([[scale.domain[0], "start"], [scale.domain[1], "end"]] as const).map(([value, anchor]) =>
+      svg("text", { x: scale.x(value), y: stripY + PLOT.strip + 20, "text-anchor": anchor }, shown(value))));
+    this.drawPoints(map, scale, stripY);
+  }
+
   private scale(map: ColorMap): Scale {
     const volume = this.context.volume(), [low, high] = rangeOf(map);
     const range = this.histogram?.range ?? volume?.range ?? [low, high];
@@ -116,21 +127,17 @@ export class TransferEditor {
   private drawPoints(map: ColorMap, scale: Scale, stripY: number): void {
     const list = this.listOf(map, this.selected.kind);
     this.selected.index = clamp(this.selected.index, 0, list.length - 1);
-    const wanted = map.opacities.length + map.colors.length;
-    while (this.points.childElementCount > wanted) this.points.lastElementChild?.remove();
-    while (this.points.childElementCount < wanted) this.points.append(svg("circle", { tabindex: 0, role: "slider", onfocus: (event: FocusEvent) => this.focusOn(event.target as SVGElement) }));
-    [...this.points.children].forEach((circle, i) => {
+    drawMarks(this.points, "circle", [...map.opacities, ...map.colors].map((_, i) => {
       const kind: Kind = i < map.opacities.length ? "opacity" : "color", index = kind === "opacity" ? i : i - map.opacities.length;
       const opacity = map.opacities[index], color = map.colors[index];
       const x = kind === "opacity" ? opacity?.x ?? 0 : color?.x ?? 0, y = kind === "opacity" ? scale.y(opacity?.y ?? 0) : stripY + PLOT.strip / 2;
-      const attributes: Record<string, string | number> = {
+      return {
         cx: scale.x(x), cy: y, r: kind === "opacity" ? 5.5 : 5, "data-kind": kind, "data-index": index, fill: hexOf(colorAt(map, x)),
         class: `point ${kind}${this.selected.kind === kind && this.selected.index === index ? " selected" : ""}`,
         "aria-label": kind === "opacity" ? `Opacity point ${index + 1}` : `Colour point ${index + 1}`, "aria-valuenow": rounded(x, 4), "aria-valuemin": scale.domain[0], "aria-valuemax": scale.domain[1],
         "aria-valuetext": kind === "opacity" ? `opacity ${shown(opacity?.y ?? 0, 2)} at ${shown(x)}` : `${hexOf(colorAt(map, x))} at ${shown(x)}`,
       };
-      for (const [name, value] of Object.entries(attributes)) circle.setAttribute(name, String(value));
-    });
+    }), circle => this.focusOn(circle));
     const { kind, index } = this.selected, opacity = map.opacities[index], color = map.colors[index];
     this.value.set((kind === "opacity" ? opacity?.x : color?.x) ?? 0);
     if (opacity) this.opacity.set(opacity.y);
@@ -148,9 +155,8 @@ export class TransferEditor {
 
   // ---- changing
 
-  private edit(map: ColorMap, gesture: string): void {
-    this.context.store.update({ map: { ...map, name: this.context.store.state.map?.name ?? `${this.context.store.state.preset}, edited` }, range: null }, gesture);
-  }
+  private edit(map: ColorMap, gesture: string): void { this.source.edit(map, gesture); }
+  private rendererFor(regions: boolean): { renderer?: string } { return regions ? turnTo("regions", this.context.store.state.renderer) : {}; }
 
   private moveTo(x: number | null, y: number | null): void {
     const map = this.source.current(), { kind, index } = this.selected, list = this.listOf(map, kind);
@@ -190,7 +196,7 @@ export class TransferEditor {
   }
 
   private choosePreset(preset: string): void {
-    if (preset) this.context.store.update({ preset, map: null, range: null }, "preset");
+    if (preset) this.context.store.update({ preset, map: null, range: null, ...this.rendererFor(hasRegions(preset)) }, "preset");
   }
 
   stretch(low: number, high: number): void {
@@ -211,18 +217,13 @@ export class TransferEditor {
 
   // ---- pointers and keys
 
-  private at(event: PointerEvent): [number, number] {
-    const box = this.plot.getBoundingClientRect();
-    return [((event.clientX - box.left) * this.width) / box.width, event.clientY - box.top];
-  }
-
   private insertAt(event: PointerEvent): void {
-    const [x, y] = this.at(event), scale = this.scale(this.source.current());
+    const [x, y] = placeIn(this.plot, this.width, event), scale = this.scale(this.source.current());
     this.insert(y > PLOT.height + PLOT.stripGap / 2 ? "color" : "opacity", scale.value(x), scale.opacity(y));
   }
 
   private drag(event: PointerEvent): void {
-    const [x, y] = this.at(event), scale = this.scale(this.source.current());
+    const [x, y] = placeIn(this.plot, this.width, event), scale = this.scale(this.source.current());
     this.moveTo(scale.value(x), this.selected.kind === "opacity" ? scale.opacity(y) : null);
   }
 

@@ -1,7 +1,7 @@
 // What the page knows of the dataset that it shows.
 import type { Dataset, Level } from "./api";
 import { Session } from "./session";
-import { add, scale, type Vec3 } from "./vec";
+import { add, rounded, scale, type Vec3 } from "./vec";
 
 export interface Volume {
   name: string; size: Vec3; spacing: Vec3; extent: Vec3; centre: Vec3; low: Vec3; high: Vec3; // extent, low, high: of the world
@@ -31,6 +31,14 @@ export function centreOf(token: string, dataset: string): Promise<{ centre: Vec3
     session.show({ picture: "render", timeline: false, options: { dataset, size: "16x16" } });
   });
 }
+
+// Slopes, the magnitudes of gradients, are data values per unit of the world. A slope of 1 voxel spans the range of values.
+export function steepestOf(volume: Volume | null): number {
+  const [low, high] = volume?.range ?? [0, 1];
+  return rounded((high - low) / Math.min(...(volume?.spacing ?? [1])), 2) || 1;
+}
+export const STEEP = 0.25; // share of it that is steep: there plots of slopes end, unless it is known better
+export const slopeUnit = (volume: Volume | null): string => `data values per ${volume ? unitName(volume.unit).replace(/s$/, "") : "unit"}`;
 
 // As it stands behind a number: "mm", "µm", or if the file states none, "voxels" or "units".
 export const unitName = (unit: string): string => (unit === "voxel" ? "voxels" : unit === "unknown" || unit === "" ? "units" : unit);
