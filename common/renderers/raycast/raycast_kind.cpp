@@ -80,8 +80,8 @@ class RaycastKind : public RendererKind {
              .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
              .reach = kRayReach,
              .derived_from_stored = kRayDerived,
-             .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kRegions, Ability::kLabels,
-                           Ability::kOverlay, Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows},
+             .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels, Ability::kOverlay,
+                           Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions},
              .parameters = {SamplingRate(kSamplesAVoxel),
                             {.name = "jitter",
                              .purpose = "Move the samples of each ray by up to this share of the way to the next one, in a "
