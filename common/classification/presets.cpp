@@ -130,7 +130,7 @@ TransferFunction CtSkin(const VolumeSummary& summary) {
 
 // ---- CT, by value and slope
 
-// The slope halfway between two materials that meet within three voxels, as blurred as scanners make borders.
+// The slope of a border between two materials. Scanners blur borders: here the value changes evenly over three voxels.
 double SlopeBetween(double one, double other, const VolumeSummary& summary) {
   const Vec3& spacing = summary.description.geometry.spacing;
   return std::abs(other - one) / (3 * std::min({spacing.x, spacing.y, spacing.z}));

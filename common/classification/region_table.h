@@ -22,6 +22,14 @@ struct RegionTable {
 
   // The four numbers of a place; both finite, slope at least 0.
   const float* At(float stored, float slope) const;
+
+  // Puts of(opacity) in the place of each opacity above 0.
+  template <class Of>
+  void ReplaceOpacities(Of&& of) {
+    for (std::size_t i = 3; i < entries.size(); i += 4) {
+      if (entries[i] > 0) entries[i] = float(of(double(entries[i])));
+    }
+  }
 };
 
 // `transfer` has regions; `table`: of `transfer` and `mapping`, which says the range. Parallel.

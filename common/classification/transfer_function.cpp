@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/base/range_status.h"
+#include "common/classification/mean_color.h"
 
 namespace slabstream {
 namespace {
@@ -110,19 +111,17 @@ TransferFunction WithCurvesOfRegions(TransferFunction transfer) {
   values.erase(std::ranges::unique(values).begin(), values.end());
   // On either side of a value: a hard border makes a step there.
   const auto add = [&](double value, double beside) {
-    double most = 0, total = 0, r = 0, g = 0, b = 0;
+    double most = 0;
+    MeanColor mean;
     for (const TransferRegion& region : transfer.regions) {
       const auto [least, greatest] = BoundsOf(region);
       if (!(least.value <= beside && beside <= greatest.value)) continue;
-      const double opacity = MostOpacityAt(region, beside), weight = opacity + 1e-6;
+      const double opacity = MostOpacityAt(region, beside);
       most = std::max(most, opacity);
-      total += weight;
-      r += weight * double(region.color.r);
-      g += weight * double(region.color.g);
-      b += weight * double(region.color.b);
+      mean.Add(region.color, opacity + 1e-6);
     }
     transfer.opacities.push_back({value, most});
-    if (total > 0) transfer.colors.push_back({value, {float(r / total), float(g / total), float(b / total)}});
+    if (mean.any()) transfer.colors.push_back({value, mean.Get()});
   };
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double value : values) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/range_status.h"
+#include "common/classification/mean_color.h"
 #include "common/classification/transfer_function.h"
 
 namespace slabstream {
@@ -99,18 +100,16 @@ double RegionShapes::Shape::OpacityAt(double value, double slope) const {
 }
 
 RegionLook RegionShapes::At(double value, double slope) const {
-  double transmitted = 1, total = 0, r = 0, g = 0, b = 0;
+  double transmitted = 1;
+  MeanColor mean;
   for (const Shape& shape : shapes_) {
     const double opacity = shape.OpacityAt(value, slope);
     if (!(opacity > 0)) continue;
     transmitted *= 1 - opacity;
-    total += opacity;
-    r += opacity * double(shape.region->color.r);
-    g += opacity * double(shape.region->color.g);
-    b += opacity * double(shape.region->color.b);
+    mean.Add(shape.region->color, opacity);
   }
-  if (total == 0) return {};
-  return {{float(r / total), float(g / total), float(b / total)}, 1 - transmitted};
+  if (!mean.any()) return {};
+  return {mean.Get(), 1 - transmitted};
 }
 
 double MostOpacityAt(const TransferRegion& region, double value) {

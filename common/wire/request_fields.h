@@ -77,12 +77,18 @@ void Fields(auto& io, Is<Clipping> auto& m) {
   io.Optional("slab", m.slab, &P::has_slab, &P::slab, &P::mutable_slab);
 }
 
+// P: the message that has the colour in fields of its own.
+template <class P>
+void ColorFields(auto& io, auto& color) {
+  io.Finite("r", color.r, &P::r, &P::set_r);
+  io.Finite("g", color.g, &P::g, &P::set_g);
+  io.Finite("b", color.b, &P::b, &P::set_b);
+}
+
 void Fields(auto& io, Is<ColorPoint> auto& m) {
   using P = v1::ColorPoint;
   io.Finite("value", m.value, &P::value, &P::set_value);
-  io.Finite("r", m.color.r, &P::r, &P::set_r);
-  io.Finite("g", m.color.g, &P::g, &P::set_g);
-  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  ColorFields<P>(io, m.color);
 }
 
 void Fields(auto& io, Is<OpacityPoint> auto& m) {
@@ -96,9 +102,7 @@ void Fields(auto& io, Is<OpacityPoint> auto& m) {
 void Fields(auto& io, Is<Isosurface> auto& m) {
   using P = v1::Isosurface;
   io.Finite("value", m.value, &P::value, &P::set_value);
-  io.Finite("r", m.color.r, &P::r, &P::set_r);
-  io.Finite("g", m.color.g, &P::g, &P::set_g);
-  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  ColorFields<P>(io, m.color);
   io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
 }
 
@@ -125,9 +129,7 @@ void Fields(auto& io, Is<RegionCorner> auto& m) {
 void Fields(auto& io, Is<TransferRegion> auto& m) {
   using P = v1::TransferRegion;
   io.Messages("corners", m.corners, &P::corners, &P::mutable_corners, kMaxRegionCorners);
-  io.Finite("r", m.color.r, &P::r, &P::set_r);
-  io.Finite("g", m.color.g, &P::g, &P::set_g);
-  io.Finite("b", m.color.b, &P::b, &P::set_b);
+  ColorFields<P>(io, m.color);
   io.Finite("opacity", m.opacity, &P::opacity, &P::set_opacity);
   io.Finite("softness", m.softness, &P::softness, &P::set_softness);
 }

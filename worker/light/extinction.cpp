@@ -63,11 +63,8 @@ class RegionExtinction {
  public:
   RegionExtinction(const FrameSetup& setup, const ClassificationTable& classification, double per_voxel_length)
       : table_(MakeRegionTable(setup.transfer, classification, setup.description.mapping)) {
-    for (std::size_t i = 3; i < table_.entries.size(); i += 4) {
-      if (table_.entries[i] > 0) {
-        table_.entries[i] = float(ExtinctionOfOpacity(double(table_.entries[i]), classification.opacity_distance) * per_voxel_length);
-      }
-    }
+    table_.ReplaceOpacities(
+        [&](double opacity) { return ExtinctionOfOpacity(opacity, classification.opacity_distance) * per_voxel_length; });
   }
 
   // Simpson's rule from low over value to high.

@@ -210,7 +210,8 @@ TEST(CtPresets, FindBoneInHounsfieldUnitsStoredUnitsAndEightBits) {
   }
 }
 
-// Borders are steps that the scanner blurred like a Gaussian. Where the border of a bone has the values of a vessel, it is steeper.
+// A scanner blurs borders: here a step is blurred by a Gaussian. Somewhere in it the border of a bone has the value of a vessel, but a
+// steeper slope.
 TEST(CtVessels2d, ShowsVesselsAndHidesBordersOfBones) {
   VolumeSummary summary;
   summary.description.geometry = {{64, 64, 64}, {0.5, 0.5, 0.5}};

@@ -145,10 +145,7 @@ class RegionCache : public BoxCache {
     Key key = {transfer.regions, transfer.gradient_opacities, setup.range, setup.description.mapping, look.step_exponent};
     if (key != key_) {
       table_ = MakeRegionTable(transfer, classification, setup.description.mapping);
-      for (std::size_t i = 3; i < table_.entries.size(); i += 4) {
-        if (table_.entries[i] > 0)
-          table_.entries[i] = float(-std::expm1(double(look.step_exponent) * std::log1p(-double(table_.entries[i]))));
-      }
+      table_.ReplaceOpacities([&](double opacity) { return -std::expm1(double(look.step_exponent) * std::log1p(-opacity)); });
       key_ = std::move(key);
     }
     return &table_;
