@@ -37,6 +37,22 @@ constexpr std::int32_t kPacketWidth = kLanes < 4 ? std::int32_t(kLanes) : 4, kPa
 
 HWY_INLINE Floats Set(float value) { return hn::Set(FloatTag(), value); }
 HWY_INLINE Ints SetInt(std::int32_t value) { return hn::Set(IntTag(), value); }
+
+// Whole numbers of floats that fit them: hn::ConvertTo and hn::NearestInt take care of others, which costs four operations more.
+#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
+HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm512_cvttps_epi32(v.raw)}; }
+HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm512_cvtps_epi32(v.raw)}; }
+#elif HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
+HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm256_cvttps_epi32(v.raw)}; }
+HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm256_cvtps_epi32(v.raw)}; }
+#elif HWY_TARGET != HWY_SCALAR && HWY_ARCH_X86
+HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm_cvttps_epi32(v.raw)}; }
+HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm_cvtps_epi32(v.raw)}; }
+#else
+HWY_INLINE Ints Truncated(Floats v) { return hn::ConvertTo(IntTag(), v); }
+HWY_INLINE Ints Nearest(Floats v) { return hn::NearestInt(v); }
+#endif
+
 HWY_INLINE Floats Lerp(Floats t, Floats a, Floats b) { return hn::Add(a, hn::Mul(t, hn::Sub(b, a))); }
 
 // By what share of a step the samples of pixels lie farther away.
@@ -239,13 +255,12 @@ struct SamplePlace {
   Ints voxel[3];       // floor - box.origin
 };
 HWY_INLINE SamplePlace PlaceSample(const RayPacket& packet, const RayBox& box, Floats k) {
-  const IntTag di;
   SamplePlace place;
   for (std::size_t i = 0; i < 3; ++i) {
     place.position[i] = PositionOf(packet, i, k);
     const auto floor = hn::Floor(place.position[i]);
     place.fraction[i] = hn::Sub(place.position[i], floor);
-    place.voxel[i] = hn::Sub(hn::ConvertTo(di, floor), SetInt(box.origin[int(i)]));
+    place.voxel[i] = hn::Sub(Truncated(floor), SetInt(box.origin[int(i)]));
   }
   return place;
 }

@@ -17,12 +17,14 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
-// The entry of RayLook::entries, times four, by which samples of these values look; 0 where a value is not finite.
+// The entry of RayLook::entries, times four, by which samples of these values look. Values are finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value) {
+  const auto number = hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding));
+  return hn::ShiftLeft<2>(Truncated(hn::Min(hn::Max(number, hn::Zero(FloatTag())), Set(look.last))));
+}
+// 0 where a value is not finite.
 HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
-  const FloatTag df;
-  const auto number = hn::Min(
-      hn::Max(hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding)), hn::Zero(df)), Set(look.last));
-  return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), hn::IfThenElseZero(finite, number)));
+  return hn::IfThenElseZero(hn::RebindMask(IntTag(), finite), EntryOf(look, hn::IfThenElseZero(finite, value)));
 }
 
 // Central differences, times two, of stored samples around a position, interpolated.

@@ -107,8 +107,7 @@ HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t s
 template <class T>
 HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBricks& bricks, std::int32_t first) {
   constexpr std::int32_t kRead = 18;  // samples along x, from the one before the first corner: whole registers
-  const Index3 counts = bricks.CountsOf(box);
-  const Index3 begin = GradientBricks::kSide * Index3{number % counts.x, number / counts.x % counts.y, number / counts.x / counts.y};
+  const Index3 begin = GradientBricks::kSide * bricks.BrickAt(number);
   // Samples of the padded voxels that the brick's corners need, from `begin` on.
   const Index3 left = box.padded - begin;
   const std::int32_t rows = std::min(GradientBricks::kRow, left.y - 2), slices = std::min(GradientBricks::kRow, left.z - 2);
@@ -134,67 +133,69 @@ HWY_NOINLINE void MakeBrick(const RayBox& box, std::int32_t number, GradientBric
 
 // --- Reading them.
 
-// Lanes as numbers in memory. From a store that it sees the compiler would take them lane by lane, which takes registers longer.
+// Lanes as numbers in memory.
 struct LaneNumbers {
   HWY_ALIGN std::int32_t number[kLanes];
 
-  HWY_INLINE explicit LaneNumbers(Ints lanes) {
+  // From a store that it sees the compiler would take them lane by lane, which takes registers longer.
+  HWY_INLINE void Set(Ints lanes) {
     hn::Store(lanes, IntTag(), number);
     asm("" : "+m"(number));
   }
   HWY_INLINE std::int32_t operator[](std::size_t lane) const { return number[lane]; }
 };
 
-// The brick in which each ray is.
-struct RayBricks {
-  Ints number, first;  // kNone: of a ray that has not been in a brick
+// Samples among the corners of bricks.
+struct BrickPlace {
+  Ints number;         // of the brick
+  Ints within;         // from the brick's first corner to the sample's
+  LaneNumbers corner;  // the sample's first one
 
-  HWY_INLINE RayBricks() : number(SetInt(GradientBricks::kNone)), first(hn::Zero(IntTag())) {}
+  // Returns which bricks are not there.
+  HWY_INLINE hn::Mask<IntTag> Find(const GradientBricks& bricks) {
+    const auto first = hn::GatherIndex(IntTag(), bricks.firsts(), number);
+    corner.Set(hn::Add(first, within));
+    return hn::Lt(first, hn::Zero(IntTag()));
+  }
 };
 
-// Finds the bricks `numbers` of the lanes `needed`.
+// Makes the bricks of `place` that are not there, and those of `before`, which has been found and not been read yet.
 template <class T>
-HWY_NOINLINE void FindBricks(const RayBox& box, Ints numbers, Mask alive, Mask needed, GradientBricks& bricks, RayBricks& rays) {
-  using IntMask = hn::Mask<IntTag>;
-  const IntTag di;
-  const LaneNumbers number(numbers);
-  const auto alive_i = hn::RebindMask(di, alive);
-  IntMask missing = hn::RebindMask(di, needed);
-  for (std::intptr_t lane = hn::FindFirstTrue(di, missing); lane >= 0; lane = hn::FindFirstTrue(di, missing)) {
-    const std::int32_t brick = number[std::size_t(lane)];
-    std::int32_t first = bricks.Find(brick);
-    if (first == GradientBricks::kNone) {
-      if (bricks.full()) {  // all rays lose their bricks
-        bricks.Clear();
-        rays.number = SetInt(GradientBricks::kNone);
-        missing = alive_i;
-        continue;
-      }
-      first = bricks.Add(brick);
-      MakeBrick<T>(box, brick, bricks, first);
+HWY_NOINLINE void MakeBricks(const RayBox& box, GradientBricks& bricks, BrickPlace& place, BrickPlace& before) {
+  // Returns whether all were there. To make one may take others away.
+  const auto make = [&](Ints numbers) HWY_ATTR {
+    LaneNumbers number;
+    number.Set(numbers);
+    bool all = true;
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      if (bricks.firsts()[number[lane]] != GradientBricks::kNone) continue;
+      all = false;
+      MakeBrick<T>(box, number[lane], bricks, bricks.Add(number[lane]));
     }
-    const IntMask found = hn::And(missing, hn::Eq(numbers, SetInt(brick)));
-    rays.number = hn::IfThenElse(found, numbers, rays.number);
-    rays.first = hn::IfThenElse(found, SetInt(first), rays.first);
-    missing = hn::AndNot(found, missing);
-  }
+    return all;
+  };
+  while (!make(place.number) || !make(before.number)) continue;
+  place.Find(bricks);
+  before.Find(bricks);
 }
 
-// The first corner of each sample; of rays that are not `alive` any corner. What is read thus never waits for what became of a ray.
+// Finds samples in bricks, and those of rays that are not `inside` in the first brick: what is read never waits for what became of a ray.
+// `before`: as in MakeBricks.
 template <class T>
-HWY_INLINE Ints CornersOf(const RayBox& box, const SamplePlace& place, Mask alive, GradientBricks& bricks, RayBricks& rays) {
+HWY_INLINE void FindInBricks(const RayBox& box, const SamplePlace& place, Mask inside, GradientBricks& bricks, BrickPlace& found,
+                             BrickPlace& before) {
   constexpr int kShift = GradientBricks::kShift;
   const IntTag di;
-  const Index3 counts = bricks.CountsOf(box);
+  const Index3& counts = bricks.counts();
   const auto row = hn::Add(hn::Mul(hn::ShiftRight<kShift>(place.voxel[2]), SetInt(counts.y)), hn::ShiftRight<kShift>(place.voxel[1]));
   const auto number = hn::Add(hn::Mul(row, SetInt(counts.x)), hn::ShiftRight<kShift>(place.voxel[0]));
-  const auto needed = hn::And(hn::RebindMask(di, alive), hn::Ne(number, rays.number));
-  if (!hn::AllFalse(di, needed)) FindBricks<T>(box, number, alive, hn::RebindMask(FloatTag(), needed), bricks, rays);
+  found.number = hn::IfThenElseZero(hn::RebindMask(di, inside), hn::Add(number, SetInt(1)));
   const auto within = SetInt(GradientBricks::kSide - 1);
   const auto z = hn::And(place.voxel[2], within), y = hn::And(place.voxel[1], within), x = hn::And(place.voxel[0], within);
   const auto nine = [&](Ints i) HWY_ATTR { return hn::Add(hn::ShiftLeft<3>(i), i); };
   static_assert(GradientBricks::kRow == 9);
-  return hn::Add(rays.first, hn::Add(nine(hn::Add(nine(z), y)), x));
+  found.within = hn::Add(nine(hn::Add(nine(z), y)), x);
+  if (!hn::AllFalse(di, found.Find(bricks))) MakeBricks<T>(box, bricks, found, before);
 }
 
 // The weights of the two corners along x, in 2^-14: the first in the lower half of a lane, the second in the upper one.
@@ -202,17 +203,18 @@ struct CornerWeights {
   Ints pairs[2][2];  // [z][y]
 };
 HWY_INLINE CornerWeights WeightsAt(const SamplePlace& place) {
-  const IntTag di;
+  const FloatTag df;
   const auto one = Set(1 << 14);
+  const auto rounded = [&](Floats v) HWY_ATTR { return hn::ConvertTo(df, Nearest(v)); };
   CornerWeights weights;
-  const auto z1 = hn::Round(hn::Mul(place.fraction[2], one)), z0 = hn::Sub(one, z1);
+  const auto z1 = rounded(hn::Mul(place.fraction[2], one)), z0 = hn::Sub(one, z1);
   for (int z = 0; z < 2; ++z) {
     const auto both = z == 0 ? z0 : z1;
-    const auto y1 = hn::Round(hn::Mul(place.fraction[1], both)), y0 = hn::Sub(both, y1);
+    const auto y1 = rounded(hn::Mul(place.fraction[1], both)), y0 = hn::Sub(both, y1);
     for (int y = 0; y < 2; ++y) {
       const auto pair = y == 0 ? y0 : y1;
-      const auto x1 = hn::NearestInt(hn::Mul(place.fraction[0], pair));
-      weights.pairs[z][y] = hn::Add(hn::Sub(hn::ConvertTo(di, pair), x1), hn::ShiftLeft<16>(x1));
+      const auto x1 = Nearest(hn::Mul(place.fraction[0], pair));
+      weights.pairs[z][y] = hn::Add(hn::Sub(Nearest(pair), x1), hn::ShiftLeft<16>(x1));
     }
   }
   return weights;
@@ -228,14 +230,16 @@ struct Entries {
 };
 
 #if HWY_TARGET == HWY_SCALAR
-HWY_INLINE Entries EntriesAt(const float* table, Ints at) {
+HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
   const FloatTag df;
+  const auto at = SetInt(index[0]);
   return {{hn::GatherIndex(df, table, at), hn::GatherIndex(df, table + 1, at), hn::GatherIndex(df, table + 2, at),
            hn::GatherIndex(df, table + 3, at)}};
 }
 
 template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, Ints at, const SamplePlace& place) {
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const SamplePlace& place) {
+  const Ints at = SetInt(index[0]);
   const CornerWeights weights = WeightsAt(place);
   std::int32_t value = 0, x = 0, y = 0, z = 0;
   const auto add = [&](const GradientCorner& corner, std::int32_t weight) {
@@ -271,39 +275,46 @@ HWY_INLINE void TurnBlocks(D d, hn::Vec<D> (&v)[4]) {
   v[3] = hn::BitCast(d, hn::InterleaveUpper(dw, e, f));
 }
 
-// A register whose block b is load(4 b).
-template <class Tag, class Load>
-HWY_INLINE auto FromBlocks(Tag d, Load&& load) {
-  constexpr std::size_t kBlocks = hn::MaxLanes(FloatTag()) / 4;
-  if constexpr (kBlocks == 1) {
+// A register whose block b is what the 16 bytes at at(4 b) hold. `d`: its numbers.
+template <class Tag, class At>
+HWY_INLINE auto FromBlocks(Tag d, At&& at) {
+#if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
+  // A load that leaves the other blocks takes no shuffle, of which there are many already.
+  const auto load = [&](std::size_t lane) HWY_ATTR { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(at(lane))); };
+  auto blocks = _mm512_castsi128_si512(load(0));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x00F0, load(4));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0x0F00, load(8));
+  blocks = _mm512_mask_broadcast_i32x4(blocks, 0xF000, load(12));
+  return hn::BitCast(d, Ints{blocks});
+#else
+  using Number = hn::TFromD<Tag>;
+  const auto load = [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<Number, 16 / sizeof(Number)>(), at(lane)); };
+  if constexpr (kLanes == 4) {
     return load(0);
-  } else if constexpr (kBlocks == 2) {
-    return hn::Combine(d, load(4), load(0));
   } else {
-    const hn::Half<Tag> half;
-    return hn::Combine(d, hn::Combine(half, load(12), load(8)), hn::Combine(half, load(4), load(0)));
+    static_assert(kLanes == 8);
+    return hn::Combine(d, load(4), load(0));
   }
+#endif
 }
 
-HWY_INLINE Entries EntriesAt(const float* table, Ints at) {
+HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
   const FloatTag df;
-  const LaneNumbers index(at);
   Entries entries;
   for (std::size_t group = 0; group < 4; ++group) {
     entries.part[group] =
-        FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<float, 4>(), table + index[lane + group]); });
+        FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return table + index[lane + group]; });
   }
   TurnBlocks(df, entries.part);
   return entries;
 }
 
-// `at`: CornersOf.
+// `index`: BrickPlace::at.
 template <class T>
-HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, Ints at, const SamplePlace& place) {
+HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const SamplePlace& place) {
   const FloatTag df;
   const IntTag di;
   const hn::RepartitionToNarrow<IntTag> ds;
-  const LaneNumbers index(at);
   const CornerWeights weights = WeightsAt(place);
   // Neighbours along x side by side, for each of the four numbers.
   HWY_ALIGN static constexpr std::uint8_t kPairs[16] = {0, 1, 8, 9, 2, 3, 10, 11, 4, 5, 12, 13, 6, 7, 14, 15};
@@ -317,7 +328,7 @@ HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, Ints at, 
       for (int y = 0; y < 2; ++y) {
         const GradientCorner* const row = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
         const auto voxels = FromBlocks(
-            ds, [&](std::size_t lane) HWY_ATTR { return hn::LoadU(hn::FixedTag<std::int16_t, 8>(), &row[index[lane + kGroup]].value); });
+            ds, [&](std::size_t lane) HWY_ATTR { return &row[index[lane + kGroup]].value; });
         const auto weight = hn::BitCast(ds, hn::Broadcast<kGroup>(weights.pairs[z][y]));
         sum = hn::ReorderWidenMulAccumulate(di, hn::TableLookupBytes(voxels, pairs), weight, sum, rest);
       }

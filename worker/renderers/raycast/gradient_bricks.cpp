@@ -5,20 +5,20 @@ namespace slabstream {
 void GradientBricks::Enter(const RayBox& box) {
   if (samples_ == box.samples) return;
   samples_ = box.samples;
-  if (corners_.empty()) corners_.resize(std::size_t(kMost) * kCorners);
-  Clear();
-}
-
-void GradientBricks::Clear() {
-  count_ = 0;
-  slots_.fill({});
+  counts_ = (box.cells + Uniform(1)) / 2;  // a cell has half a brick's side
+  corners_.resize(kMost * kCorners);
+  made_.assign(kMost, 0);
+  next_ = 0;
+  firsts_.assign(1 + std::size_t(CountIn(counts_)), kNone);
+  firsts_[0] = 0;
 }
 
 std::int32_t GradientBricks::Add(std::int32_t number) {
-  std::uint32_t slot = SlotOf(number);
-  while (slots_[slot].number != kNone) slot = (slot + 1) % kSlots;
-  slots_[slot] = {number, count_++ * kCorners};
-  return slots_[slot].first;
+  const std::size_t place = next_;
+  next_ = (next_ + 1) % kMost;
+  if (made_[place] != 0) firsts_[std::size_t(made_[place])] = kNone;
+  made_[place] = number;
+  return firsts_[std::size_t(number)] = std::int32_t(place) * kCorners;
 }
 
 }  // namespace slabstream

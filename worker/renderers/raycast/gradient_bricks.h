@@ -3,10 +3,11 @@
 // memory for a thread, and nothing where no ray comes.
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/base/pooled_vector.h"
 #include "worker/rays/ray_box.h"
 
 namespace slabstream {
@@ -26,37 +27,28 @@ class GradientBricks {
 
   // Forgets the bricks of other voxels. Voxels are told apart by where they are: those of all boxes must live as long as this.
   void Enter(const RayBox& box);
-  Index3 CountsOf(const RayBox& box) const { return (box.cells + Uniform(1)) / 2; }  // of bricks along each axis
+  const Index3& counts() const { return counts_; }  // bricks along each axis
 
-  // The brick's first corner, or kNone.
-  std::int32_t Find(std::int32_t number) const {
-    for (std::uint32_t slot = SlotOf(number);; slot = (slot + 1) % kSlots) {
-      if (slots_[slot].number == number) return slots_[slot].first;
-      if (slots_[slot].number == kNone) return kNone;
-    }
+  // By brick: its first corner, or kNone. Bricks are numbered from 1; the first corner of number 0 may be read and means nothing.
+  const std::int32_t* firsts() const { return firsts_.data(); }
+  Index3 BrickAt(std::int32_t number) const {
+    const std::int32_t at = number - 1;
+    return {at % counts_.x, at / counts_.x % counts_.y, at / counts_.x / counts_.y};
   }
-  bool full() const { return count_ == kMost; }
-  void Clear();
-  // Room for a brick that is not there; not if full. Returns its first corner.
+  // Room for a brick that is not there: its first corner. Where there is none left, it takes that of the brick that was made first.
   std::int32_t Add(std::int32_t number);
 
   GradientCorner* corners() { return corners_.data(); }
 
  private:
-  static constexpr std::int32_t kMost = 256;  // bricks: 1.5 MB. A ray through 256 voxels and its neighbours pass about 300
-  static constexpr std::uint32_t kSlots = 4 * kMost;
-  struct Slot {
-    std::int32_t number = kNone, first = 0;
-  };
-
-  // Multiplicative hashing by the golden ratio (Knuth).
-  static std::uint32_t SlotOf(std::int32_t number) { return (std::uint32_t(number) * 0x9E3779B9U) >> 22; }
-  static_assert(kSlots == 1U << 10);
+  static constexpr std::size_t kMost = 256;  // bricks: 1.5 MB. More of them do not fit the second cache, and take as long
 
   const std::byte* samples_ = nullptr;
-  std::int32_t count_ = 0;
-  std::array<Slot, kSlots> slots_;
-  AlignedVector<GradientCorner> corners_;
+  Index3 counts_;
+  std::vector<std::int32_t> firsts_;
+  std::vector<std::int32_t> made_;  // the numbers of bricks, by where they are among the corners; 0: none
+  std::size_t next_ = 0;            // where the next one comes
+  PooledVector<GradientCorner> corners_;
 };
 
 }  // namespace slabstream

@@ -7,6 +7,7 @@
 
 #include <limits>
 #include <type_traits>
+#include <utility>
 #include <variant>
 
 #include "worker/rays/ray_sums-inl.h"
@@ -107,41 +108,74 @@ struct Stride {
   Mask sampled;
   Floats steps;
 };
-// Rays in empty space leap ahead; the others go on to their next sample. `inside`: rays in the box, some of which may have ended.
-HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask inside, Mask alive) {
+// Rays in empty space leap ahead; the others go on to their next sample. `inside`: rays in the box.
+HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask inside) {
   const FloatTag df;
   const IntTag di;
   const auto cell = CellOf<kCellShift>(place, work.box->cells, inside);
   const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
   const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-  return {hn::AndNot(empty, alive),
+  return {hn::AndNot(empty, inside),
           hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
 }
 
 // Samples, from the stored voxels alone. A gradient is computed where it is asked for.
 template <class T>
 struct StoredSamples {
+  struct Found {
+    Ints at;
+  };
   Neighbours<T> neighbours;
   Floats value;
 
-  HWY_INLINE StoredSamples(const MarchWork& work, const SamplePlace& place, Mask sampled, GradientBricks* /*bricks*/, RayBricks& /*rays*/)
-      : neighbours(LoadNeighbours<T>(*work.box, place, sampled)), value(Interpolate(neighbours, place)) {}
+  static HWY_INLINE Found Nowhere() { return {hn::Zero(IntTag())}; }
+  static HWY_INLINE void Find(const MarchWork& work, const SamplePlace& place, Mask inside, GradientBricks* /*bricks*/, Found& found,
+                              Found& /*before*/) {
+    found.at = IndexBefore(*work.box, place, inside);
+  }
+  HWY_INLINE void Read(const MarchWork& work, const SamplePlace& place, const Found& found, GradientBricks* /*bricks*/) {
+    neighbours = NeighboursAt<T>(*work.box, reinterpret_cast<const T*>(work.box->samples), found.at);
+    value = Interpolate(neighbours, place);
+  }
   HWY_INLINE Gradient GradientOf(const SamplePlace& place) const { return GradientAt(neighbours, place); }
 };
 // Samples, from bricks that have the gradients, too.
 template <class T>
 struct LitSamples {
+  using Found = BrickPlace;
   Floats value;
   Gradient gradient;
 
-  HWY_INLINE LitSamples(const MarchWork& work, const SamplePlace& place, Mask sampled, GradientBricks* bricks, RayBricks& rays) {
-    const Ints at = CornersOf<T>(*work.box, place, sampled, *bricks, rays);
-    const LitSample sample = InterpolateCorners<T>(bricks->corners(), at, place);
+  static HWY_INLINE Found Nowhere() { return {hn::Zero(IntTag()), hn::Zero(IntTag()), {}}; }
+  static HWY_INLINE void Find(const MarchWork& work, const SamplePlace& place, Mask inside, GradientBricks* bricks, Found& found,
+                              Found& before) {
+    FindInBricks<T>(*work.box, place, inside, *bricks, found, before);
+  }
+  HWY_INLINE void Read(const MarchWork& /*work*/, const SamplePlace& place, const Found& found, GradientBricks* bricks) {
+    const LitSample sample = InterpolateCorners<T>(bricks->corners(), found.corner, place);
     value = sample.value;
     gradient = sample.gradient;
   }
   HWY_INLINE const Gradient& GradientOf(const SamplePlace& /*place*/) const { return gradient; }
 };
+
+// The samples at which the rays of a packet are.
+template <class Voxels>
+struct Step {
+  bool any;  // there are some
+  Mask sampled;
+  Floats k;
+  SamplePlace place;
+  typename Voxels::Found found;  // where the voxels are
+  Voxels voxels;
+  LaneNumbers entry;  // EntryOf
+};
+
+template <class T>
+HWY_INLINE Mask FiniteOf(Floats value) {
+  if constexpr (!std::is_same_v<T, float>) return hn::Le(hn::Zero(FloatTag()), Set(1));
+  return hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
+}
 
 // Samples after classification. Lanes that are not visible mean nothing.
 template <Samples kSamples>
@@ -153,22 +187,25 @@ struct Classified {
   std::conditional_t<kSamples == Samples::kLayered, LayeredSample, std::monostate> layered;
 };
 // `at`: as in Neighbours, of kLayered.
-template <Samples kSamples, class Voxels>
-HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const SamplePlace& place, const Voxels& voxels, Mask sampled,
-                                                Ints at) {
+template <class T, Samples kSamples, class Voxels>
+HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const Step<Voxels>& step, Ints at) {
   const FloatTag df;
   const RayLook& look = *work.look;
+  const SamplePlace& place = step.place;
+  const Voxels& voxels = step.voxels;
   const auto zero = hn::Zero(df);
   Classified<kSamples> of;
-  const auto finite = hn::Le(hn::Abs(voxels.value), Set(std::numeric_limits<float>::max()));
-  of.entries = EntriesAt(look.entries.data(), EntryOf(look, voxels.value, finite));
+  const auto finite = FiniteOf<T>(voxels.value);
+  of.entries = EntriesAt(look.entries.data(), step.entry);
   of.opacity = of.entries.part[3];
-  of.visible = hn::And(hn::And(sampled, finite), hn::Gt(of.opacity, zero));
+  of.visible = hn::And(hn::And(step.sampled, finite), hn::Gt(of.opacity, zero));
   of.gradient = {zero, zero, zero};
   if (kSamples != Samples::kPlain && look.by_gradient() && !hn::AllFalse(df, of.visible)) {
     of.gradient = voxels.GradientOf(place);
     if (look.regions != nullptr) {
-      of.entries = EntriesAt(look.regions->entries.data(), RegionOf(look, hn::IfThenElseZero(finite, voxels.value), of.gradient));
+      LaneNumbers region;
+      region.Set(RegionOf(look, hn::IfThenElseZero(finite, voxels.value), of.gradient));
+      of.entries = EntriesAt(look.regions->entries.data(), region);
       of.opacity = of.entries.part[3];
     } else {
       of.opacity = OpacityByGradient(look, of.opacity, of.gradient);
@@ -178,7 +215,7 @@ HWY_INLINE Classified<kSamples> ClassifySamples(const MarchWork& work, const Sam
   if constexpr (kSamples == Samples::kLayered) {
     of.layered = WithLayers(*work.layers, *work.box, place, at, hn::IfThenElseZero(finite, of.opacity));
     of.opacity = of.layered.opacity;
-    of.visible = hn::And(sampled, hn::Gt(of.opacity, zero));
+    of.visible = hn::And(step.sampled, hn::Gt(of.opacity, zero));
   }
   return of;
 }
@@ -193,19 +230,20 @@ HWY_INLINE Floats OpacityAtEnds(const EndSamples& ends, Floats k, Mask visible, 
   return hn::Sub(one, PowerOfFraction(hn::Sub(one, opacity), power));
 }
 
-// Lights samples k and adds those that are visible.
+// Lights samples and adds those that are visible.
 template <Samples kSamples, class Voxels>
-HWY_INLINE void AddSamples(const MarchWork& work, const SamplePlace& place, Floats k, const PacketPart* part, const Voxels& voxels, Ints at,
+HWY_INLINE void AddSamples(const MarchWork& work, const Step<Voxels>& step, const PacketPart* part, Ints at,
                            const Classified<kSamples>& samples, Floats opacity, Sums& sums) {
   const RayLook& look = *work.look;
+  const SamplePlace& place = step.place;
   Light light = {Set(1), hn::Zero(FloatTag())};
   [[maybe_unused]] LayeredLight lights = {light, light};
   if (IsLit(work)) {
     const bool has_gradient = kSamples != Samples::kPlain && look.by_gradient();
-    Gradient gradient = has_gradient ? samples.gradient : voxels.GradientOf(place);
+    Gradient gradient = has_gradient ? samples.gradient : step.voxels.GradientOf(place);
     [[maybe_unused]] auto on_face = hn::Lt(Set(1), hn::Zero(FloatTag()));
     if constexpr (kSamples != Samples::kPlain) {
-      on_face = hn::Lt(k, part->face_end);
+      on_face = hn::Lt(step.k, part->face_end);
       gradient = Choose(on_face, {part->face[0], part->face[1], part->face[2]}, gradient);
     }
     if constexpr (kSamples == Samples::kLayered) {
@@ -259,33 +297,65 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   if (has_ends) ends = EndSamplesOf(*work.rays, packet.of_frame, LeapScalesOf(packet.of_frame), part);
 
   Sums sums = gathered;
-  RayBricks bricks;
   bool in_matter = false;  // most of the last samples were visible
-  while (!hn::AllFalse(df, alive)) {
-    const SamplePlace place = PlaceSample(packet.among, *work.box, k);
-    Stride stride = {alive, one};
-    if (!in_matter) stride = LeapFrom(work, packet.leaps, place, inside, alive);
-    const auto this_k = k;
-    k = hn::Add(k, stride.steps);
-    inside = hn::Lt(k, owned.end);
-    alive = hn::And(alive, inside);
-    if (hn::AllFalse(df, stride.sampled)) continue;
-
-    const Voxels voxels(work, place, stride.sampled, packet.bricks, bricks);
+  // The next samples: where they are. Rays leap until some ray has one.
+  const auto place = [&](Step<Voxels>& step, Step<Voxels>& before) SLABSTREAM_INLINED {
+    step.any = false;
+    while (!hn::AllFalse(df, alive)) {
+      step.place = PlaceSample(packet.among, *work.box, k);
+      Stride stride = {inside, one};
+      if (!in_matter) stride = LeapFrom(work, packet.leaps, step.place, inside);
+      step.k = k;
+      step.sampled = hn::And(alive, stride.sampled);
+      k = hn::Add(k, stride.steps);
+      inside = hn::Lt(k, owned.end);
+      alive = hn::And(alive, inside);
+      if (hn::AllFalse(df, step.sampled)) continue;
+      step.any = true;
+      Voxels::Find(work, step.place, stride.sampled, packet.bricks, step.found, before.found);
+      return;
+    }
+  };
+  // Their values.
+  const auto read = [&](Step<Voxels>& step) SLABSTREAM_INLINED {
+    step.voxels.Read(work, step.place, step.found, packet.bricks);
+    if constexpr (std::is_same_v<T, float>) {
+      step.entry.Set(EntryOf(look, step.voxels.value, FiniteOf<T>(step.voxels.value)));
+    } else {
+      step.entry.Set(EntryOf(look, step.voxels.value));
+    }
+  };
+  // Their looks.
+  const auto add = [&](const Step<Voxels>& step) SLABSTREAM_INLINED {
     Ints at = hn::Zero(IntTag());
-    if constexpr (kSamples == Samples::kLayered) at = IndexBefore(*work.box, place, stride.sampled);
-    const Classified<kSamples> samples = ClassifySamples<kSamples>(work, place, voxels, stride.sampled, at);
+    if constexpr (kSamples == Samples::kLayered) at = IndexBefore(*work.box, step.place, step.sampled);
+    Classified<kSamples> samples = ClassifySamples<T, kSamples>(work, step, at);
+    samples.visible = hn::And(samples.visible, hn::Lt(sums.alpha, opaque));
     const std::size_t count = hn::CountTrue(df, samples.visible);
     in_matter = count > kLanes / 2;
-    if (count == 0) continue;
+    if (count == 0) return;
     shaded += count;
     if constexpr (kAll) {
-      if (has_surfaces) shaded += AddSurfaces<T>(work, samples.visible, this_k, surfaces, sums);
+      if (has_surfaces) shaded += AddSurfaces<T>(work, samples.visible, step.k, surfaces, sums);
     }
-    const auto opacity = has_ends ? OpacityAtEnds(ends, this_k, samples.visible, samples.opacity) : samples.opacity;
-    AddSamples<kSamples>(work, place, this_k, part, voxels, at, samples, opacity, sums);
+    const auto opacity = has_ends ? OpacityAtEnds(ends, step.k, samples.visible, samples.opacity) : samples.opacity;
+    AddSamples<kSamples>(work, step, part, at, samples, opacity, sums);
     alive = hn::And(alive, hn::Lt(sums.alpha, opaque));
+  };
+  // Three steps are under way at a time: while one waits for its voxels, the next one is placed and the one before is lit.
+  Step<Voxels> steps[3];
+  for (Step<Voxels>& step : steps) {
+    step.any = false;
+    step.found = Voxels::Nowhere();
   }
+  Step<Voxels>*next = &steps[0], *found = &steps[1], *known = &steps[2];
+  do {
+    place(*next, *found);
+    if (found->any) read(*found);
+    if (known->any) add(*known);
+    std::swap(known, found);
+    std::swap(found, next);
+  } while (known->any || found->any);
   if constexpr (kAll) {
     if (has_surfaces) shaded += AddSurfaces<T>(work, packet.of_frame.valid, Set(kRayEnd), surfaces, sums);
   }
