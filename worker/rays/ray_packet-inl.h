@@ -135,14 +135,18 @@ struct SampleInterval {
 };
 
 // Samples k of [begin, end) at positions p with low <= p < high on every axis. Rounding is monotonic, so each coordinate of a ray is
-// monotonic in k as computed, and the samples inside are one interval: bisection finds its ends exactly.
+// monotonic in k as computed, and the samples inside are one interval. Its ends are where the ray crosses the box, give or take rounding:
+// the positions as computed decide.
 HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& low, const Float3& high, std::int32_t begin,
                                         std::int32_t end) {
   const FloatTag df;
-  const auto backward = [&](std::size_t i) HWY_ATTR { return hn::Lt(packet.move[i], hn::Zero(df)); };
+  const auto zero = hn::Zero(df), one = Set(1);
+  const auto first = Set(float(begin)), count = Set(float(std::max(end - begin, 0)));
+  const auto never = hn::Lt(one, zero), always = hn::Lt(zero, one);
+  const auto backward = [&](std::size_t i) HWY_ATTR { return hn::Lt(packet.move[i], zero); };
   // The sample lies before the box, or past it, along an axis.
   const auto before = [&](Floats k) HWY_ATTR {
-    Mask any = hn::Lt(k, hn::Zero(df));  // never
+    Mask any = never;
     for (std::size_t i = 0; i < 3; ++i) {
       const auto p = PositionOf(packet, i, k);
       const auto below = hn::Lt(p, Set(low[i])), above = hn::Ge(p, Set(high[i]));
@@ -151,7 +155,7 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
     return any;
   };
   const auto within_or_before = [&](Floats k) HWY_ATTR {
-    Mask all = hn::Ge(k, hn::Zero(df));  // always
+    Mask all = always;
     for (std::size_t i = 0; i < 3; ++i) {
       const auto p = PositionOf(packet, i, k);
       const auto not_below = hn::Ge(p, Set(low[i])), not_above = hn::Lt(p, Set(high[i]));
@@ -159,21 +163,28 @@ HWY_INLINE SampleInterval SamplesInside(const RayPacket& packet, const Float3& l
     }
     return all;
   };
-  const auto first = Set(float(begin));
-  const auto count = std::uint32_t(end - begin);
-  // Number of leading elements of [first, first + count) that fulfil the condition. After the first that does not, none does.
-  Floats lead = hn::Zero(df), held = hn::Zero(df);
-  for (std::uint32_t bit = std::bit_floor(count); bit != 0; bit /= 2) {
-    const auto extend = [&](Floats& length, auto&& condition) HWY_ATTR {
-      const auto longer = hn::Add(length, Set(float(bit)));
-      const auto fits = hn::Le(longer, Set(float(count)));
-      const auto holds = condition(hn::Sub(hn::Add(first, longer), Set(1)));
-      length = hn::IfThenElse(hn::And(fits, holds), longer, length);
-    };
-    extend(lead, before);
-    extend(held, within_or_before);
+  // The number of leading samples of [begin, end) that fulfil the condition, nearly `guess`. After the first that does not, none does.
+  const auto leading = [&](Floats guess, auto&& condition) HWY_ATTR {
+    auto length = hn::Min(hn::Max(hn::Sub(hn::Ceil(guess), first), zero), count);
+    for (;;) {
+      const auto next = hn::Add(first, length);
+      const auto short_of = hn::And(hn::Lt(length, count), condition(next));
+      const auto beyond = hn::AndNot(condition(hn::Sub(next, one)), hn::Gt(length, zero));
+      if (hn::AllFalse(df, hn::Or(short_of, beyond))) return length;
+      length = hn::Sub(hn::Add(length, hn::IfThenElseZero(short_of, one)), hn::IfThenElseZero(beyond, one));
+    }
+  };
+  auto enter = Set(-kRayEnd), leave = Set(kRayEnd);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto least = Set(1e-30F);  // not zero, which has no quotient
+    const auto move = hn::IfThenElse(hn::Lt(hn::Abs(packet.move[i]), least), least, packet.move[i]);
+    const auto to_low = hn::Div(hn::Sub(Set(low[i]), packet.first[i]), move);
+    const auto to_high = hn::Div(hn::Sub(Set(high[i]), packet.first[i]), move);
+    enter = hn::Max(enter, hn::Min(to_low, to_high));
+    leave = hn::Min(leave, hn::Max(to_low, to_high));
   }
-  return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), hn::Zero(df))};
+  const auto lead = leading(enter, before), held = leading(leave, within_or_before);
+  return {hn::Add(first, lead), hn::IfThenElse(packet.valid, hn::Add(first, held), zero)};
 }
 
 // A part of each ray that clipping leaves, in numbers of samples.

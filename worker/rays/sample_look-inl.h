@@ -1,5 +1,6 @@
 // How samples look by a RayLook: their entry, gradient, opacity and light. Included once for each instruction set, hence the unusual
 // include guard.
+#include <bit>
 #include <limits>
 
 #include "worker/kernels/power-inl.h"
@@ -96,15 +97,15 @@ struct Light {
   Floats diffuse, specular;
 };
 
-// fraction^shininess. Whole numbers take a few multiplications.
+// fraction^shininess. Whole numbers take a few multiplications (Knuth, The Art of Computer Programming, 4.6.3).
 HWY_INLINE Floats Shine(const RayLook& look, Floats fraction) {
   if (look.whole_shininess == 0) return PowerOfFraction(fraction, Set(look.shininess));
-  auto power = Set(1);
-  for (int rest = look.whole_shininess;; fraction = hn::Mul(fraction, fraction)) {
-    if (rest % 2 != 0) power = hn::Mul(power, fraction);
-    rest /= 2;
-    if (rest == 0) return power;
+  auto power = fraction;
+  for (unsigned bit = std::bit_floor(unsigned(look.whole_shininess)) / 2; bit != 0; bit /= 2) {
+    power = hn::Mul(power, power);
+    if ((unsigned(look.whole_shininess) & bit) != 0) power = hn::Mul(power, fraction);
   }
+  return power;
 }
 
 // `open`: share of what surfaces scatter. reached(number of a light): the share of its light.
