@@ -80,10 +80,13 @@ VisibleSamples::VisibleSamples(const RayLook& look)
     visible_before_.push_back(visible_before_.back() + (look.entries[i] > 0 ? 1 : 0));
 }
 
-bool VisibleSamples::AnyBetween(float low, float high) const {
+bool VisibleSamples::AnyMatterBetween(float low, float high) const {
   if (!(low <= high)) return false;
   const auto entry = [&](float stored) { return std::size_t(std::clamp((stored - origin_) * scale_ + rounding_, 0.0F, last_)); };
-  if (visible_before_[entry(high) + 1] > visible_before_[entry(low)]) return true;
+  return visible_before_[entry(high) + 1] > visible_before_[entry(low)];
+}
+
+bool VisibleSamples::AnySurfaceBetween(float low, float high) const {
   return std::ranges::any_of(isovalues_, [&](float value) { return low < value && value <= high; });
 }
 

@@ -61,11 +61,13 @@ inline RayLook MakeRayLook(const ClassificationTable& table, const TransferFunct
   return MakeRayLook(table, transfer, description, camera, shading, steps_per_voxel, camera.spacing);
 }
 
-// True if a sample between two stored ones may have an opacity above 0 or lie on an isosurface.
+// Whether samples between two stored ones, low <= high, may show.
 class VisibleSamples {
  public:
   explicit VisibleSamples(const RayLook& look);
-  bool AnyBetween(float low, float high) const;  // false if low > high
+  bool AnyMatterBetween(float low, float high) const;   // a sample may have an opacity above 0; false if low > high
+  bool AnySurfaceBetween(float low, float high) const;  // one may lie on an isosurface; false if low > high
+  bool AnyBetween(float low, float high) const { return AnyMatterBetween(low, high) || AnySurfaceBetween(low, high); }
   friend bool operator==(const VisibleSamples&, const VisibleSamples&) = default;
 
  private:

@@ -1,35 +1,52 @@
 #include "worker/renderers/raycast/empty_distance.h"
 
 #include <algorithm>
+#include <bit>
+#include <cmath>
+#include <utility>
 
 namespace slabstream {
 namespace {
 
-// A distance transform in two sweeps over all cells, forwards and backwards, with the 26 neighbours at distance 1: exact for this distance
-// (Borgefors 1986).
+constexpr std::size_t kPadding = 3;  // bytes after the last distance: kernels read four at a time
+
+// A distance transform in one sweep over all cells, from those that rays of the octant reach last: exact for this distance (Borgefors
+// 1986).
 class Sweep {
  public:
-  Sweep(const Index3& counts, std::uint8_t* distance) : counts_(counts), distance_(distance), nearest_(std::size_t(counts.x) + 2) {}
+  Sweep(const Index3& counts, unsigned octant, std::uint8_t* distance)
+      : counts_(counts), octant_(octant), distance_(distance), nearest_(std::size_t(counts.x) + 2) {}
 
-  // Updates the row's cells from the rows that the sweep has already visited: `towards` is -1 or 1 along y and z.
-  void Visit(std::int32_t y, std::int32_t z, std::int32_t towards) {
-    const auto width = std::size_t(counts_.x);
-    std::fill(nearest_.begin(), nearest_.end(), std::uint8_t{255});
-    Include(y + towards, z);
-    for (std::int32_t dy = -1; dy <= 1; ++dy) Include(y + dy, z + towards);
-    std::uint8_t* const row = Row(y, z);
-    for (std::size_t x = 0; x < width; ++x) {
-      const std::uint8_t around = std::min({nearest_[x], nearest_[x + 1], nearest_[x + 2]});
-      row[x] = std::min(row[x], Next(around));
+  void Run() {
+    for (std::int32_t i = 0; i < counts_.z; ++i) {
+      for (std::int32_t j = 0; j < counts_.y; ++j) Visit(FromLast(j, 1), FromLast(i, 2));
     }
-    for (std::size_t x = 1; x < width; ++x) row[x] = std::min(row[x], Next(row[x - 1]));
-    for (std::size_t x = width - 1; x-- > 0;) row[x] = std::min(row[x], Next(row[x + 1]));
   }
 
  private:
   static std::uint8_t Next(std::uint8_t distance) { return std::uint8_t(distance + (distance < 255 ? 1 : 0)); }
+  std::int32_t Towards(int axis) const { return (octant_ >> axis & 1) != 0 ? -1 : 1; }
+  std::int32_t FromLast(std::int32_t i, int axis) const { return Towards(axis) < 0 ? i : counts_[axis] - 1 - i; }
   std::uint8_t* Row(std::int32_t y, std::int32_t z) {
     return distance_ + (std::size_t(z) * std::size_t(counts_.y) + std::size_t(y)) * std::size_t(counts_.x);
+  }
+
+  // Updates the row's cells from the rows that the sweep has already visited.
+  void Visit(std::int32_t y, std::int32_t z) {
+    std::fill(nearest_.begin(), nearest_.end(), std::uint8_t{255});
+    const std::int32_t next_y = y + Towards(1), next_z = z + Towards(2);
+    Include(next_y, z);
+    Include(y, next_z);
+    Include(next_y, next_z);
+    std::uint8_t* const row = Row(y, z);
+    const auto width = std::size_t(counts_.x);
+    const std::size_t ahead = Towards(0) < 0 ? 0 : 2;  // from nearest_[x]
+    for (std::size_t x = 0; x < width; ++x) row[x] = std::min(row[x], Next(std::min(nearest_[x + 1], nearest_[x + ahead])));
+    if (Towards(0) < 0) {
+      for (std::size_t x = 1; x < width; ++x) row[x] = std::min(row[x], Next(row[x - 1]));
+    } else {
+      for (std::size_t x = width - 1; x-- > 0;) row[x] = std::min(row[x], Next(row[x + 1]));
+    }
   }
   void Include(std::int32_t y, std::int32_t z) {
     if (y < 0 || z < 0 || y >= counts_.y || z >= counts_.z) return;
@@ -38,35 +55,48 @@ class Sweep {
   }
 
   const Index3 counts_;
+  const unsigned octant_;
   std::uint8_t* const distance_;
   std::vector<std::uint8_t> nearest_;  // by column from -1 on
 };
 
 }  // namespace
 
-std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, const VisibleSamples& visible) {
-  std::vector<std::uint8_t> distance(cells.ranges.size() + kEmptyDistancePadding, 255);
-  for (std::size_t i = 0; i < cells.ranges.size(); ++i) {
-    if (visible.AnyBetween(cells.ranges[i].min, cells.ranges[i].max)) distance[i] = 0;
+OctantSet OctantsOf(const ViewRays& rays) {
+  bool up[3], down[3];
+  for (std::size_t i = 0; i < 3; ++i) {
+    // Pixels lie at most `centre_x` and `centre_y` from the middle. The slack covers rounding.
+    const float spread = rays.perspective ? std::abs(rays.right[i]) * rays.centre_x + std::abs(rays.down[i]) * rays.centre_y : 0;
+    const float slack = 1e-5F * (std::abs(rays.forward[i]) + spread);
+    up[i] = rays.forward[i] + spread + slack >= 0;
+    down[i] = rays.forward[i] - spread - slack < 0;
   }
-  return distance;
+  OctantSet octants = 0;
+  for (unsigned octant = 0; octant < kOctants; ++octant) {
+    bool occurs = true;
+    for (unsigned i = 0; i < 3; ++i) occurs = occurs && ((octant >> i & 1) != 0 ? down[i] : up[i]);
+    if (occurs) octants |= 1U << octant;
+  }
+  return octants;
 }
 
-std::vector<std::uint8_t> EmptyDistances(const MacrocellRanges& cells, const VisibleSamples& visible) {
-  return EmptyDistances(cells.counts, VisibleCells(cells, visible));
-}
+EmptyDistances::EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible) : counts_(counts), visible_(std::move(visible)) {}
 
-std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance) {
-  const auto visible = std::size_t(std::ranges::count(distance, 0));
-  if (visible == 0 || visible == CountIn(counts)) return distance;  // as in most boxes of a large volume
-  Sweep sweep(counts, distance.data());
-  for (std::int32_t z = 0; z < counts.z; ++z) {
-    for (std::int32_t y = 0; y < counts.y; ++y) sweep.Visit(y, z, -1);
+void EmptyDistances::Find(OctantSet octants) {
+  if ((octants & ~found_) == 0) return;
+  found_ = octants;
+  const std::size_t cells = visible_.size();
+  distances_.resize(std::size_t(std::popcount(octants)) * cells + kPadding);
+  const auto shown = std::size_t(std::ranges::count(visible_, 0));
+  const bool mixed = shown != 0 && shown != cells;  // unlike in most boxes of a large volume
+  std::uint8_t* distance = distances_.data();
+  for (unsigned octant = 0; octant < kOctants; ++octant) {
+    if ((octants >> octant & 1) == 0) continue;
+    starts_[octant] = std::int32_t(distance - distances_.data());
+    std::ranges::copy(visible_, distance);
+    if (mixed) Sweep(counts_, octant, distance).Run();
+    distance += cells;
   }
-  for (std::int32_t z = counts.z; z-- > 0;) {
-    for (std::int32_t y = counts.y; y-- > 0;) sweep.Visit(y, z, 1);
-  }
-  return distance;
 }
 
 }  // namespace slabstream

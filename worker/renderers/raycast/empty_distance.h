@@ -1,22 +1,54 @@
-// EmptyDistance: for each cell the Chebyshev distance, in cells, to the nearest visible cell; 0 in a visible cell. A ray in a cell of
-// distance d may leap over all cells less than d away (Zuiderveld et al. 1992 call such a map proximity clouds).
+// EmptyDistances: how far rays may leap. For each cell, and each octant of directions, the Chebyshev distance in cells to the nearest
+// visible cell in that octant; 0 in a visible cell. A ray of the octant that is in a cell of distance d may leap over all cells less than d
+// away: proximity clouds (Zuiderveld et al. 1992), by direction (Deakin and Knoll 2019). A ray that leaves an object leaps to its end.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "worker/rays/macrocell_ranges.h"
-#include "worker/rays/ray_look.h"
+#include "worker/rays/view_rays.h"
 
 namespace slabstream {
 
-inline constexpr std::size_t kEmptyDistancePadding = 3;  // bytes after the last distance: kernels read four at a time
+// Octant o: bit i of o is set if rays move towards lower coordinates along axis i. A set of octants has bit o for octant o.
+inline constexpr unsigned kOctants = 8;
+using OctantSet = unsigned;
+using OctantStarts = std::array<std::int32_t, kOctants>;
+// Those of all rays of a frame, and perhaps some more.
+OctantSet OctantsOf(const ViewRays& rays);
 
-// [z][y][x] and the padding; at most 255.
-std::vector<std::uint8_t> EmptyDistances(const MacrocellRanges& cells, const VisibleSamples& visible);
-// The same where more is visible: `distance` has the padding, 0 in visible cells and 255 elsewhere.
-std::vector<std::uint8_t> EmptyDistances(const Index3& counts, std::vector<std::uint8_t> distance);
-// What it begins with.
-std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, const VisibleSamples& visible);
+// By cell, [z][y][x]: 0 if any_between(least, greatest value) is true of it, else 255.
+template <class AnyBetween>
+std::vector<std::uint8_t> VisibleCells(const MacrocellRanges& cells, AnyBetween&& any_between) {
+  std::vector<std::uint8_t> shown(cells.ranges.size(), 255);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    if (any_between(cells.ranges[i].min, cells.ranges[i].max)) shown[i] = 0;
+  }
+  return shown;
+}
+
+class EmptyDistances {
+ public:
+  EmptyDistances() = default;
+  // `visible`: VisibleCells, of a grid of cells with these counts.
+  EmptyDistances(const Index3& counts, std::vector<std::uint8_t> visible);
+
+  // Finds the distances of these octants, and forgets others if some are new.
+  void Find(OctantSet octants);
+
+  // By octant, where its distances [z][y][x] begin in data(), at most 255 each. Kernels may read three bytes more.
+  const OctantStarts& starts() const { return starts_; }
+  const std::uint8_t* data() const { return distances_.data(); }
+  std::size_t bytes() const { return visible_.capacity() + distances_.capacity(); }
+
+ private:
+  Index3 counts_;
+  std::vector<std::uint8_t> visible_, distances_;
+  OctantStarts starts_{};
+  OctantSet found_ = 0;
+};
 
 }  // namespace slabstream

@@ -292,7 +292,6 @@ HWY_INLINE auto FromBlocks(Tag d, At&& at) {
   if constexpr (kLanes == 4) {
     return load(0);
   } else {
-    static_assert(kLanes == 8);
     return hn::Combine(d, load(4), load(0));
   }
 #endif
@@ -302,8 +301,7 @@ HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
   const FloatTag df;
   Entries entries;
   for (std::size_t group = 0; group < 4; ++group) {
-    entries.part[group] =
-        FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return table + index[lane + group]; });
+    entries.part[group] = FromBlocks(df, [&](std::size_t lane) HWY_ATTR { return table + index[lane + group]; });
   }
   TurnBlocks(df, entries.part);
   return entries;
@@ -327,8 +325,7 @@ HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const Lan
     for (int z = 0; z < 2; ++z) {
       for (int y = 0; y < 2; ++y) {
         const GradientCorner* const row = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
-        const auto voxels = FromBlocks(
-            ds, [&](std::size_t lane) HWY_ATTR { return &row[index[lane + kGroup]].value; });
+        const auto voxels = FromBlocks(ds, [&](std::size_t lane) HWY_ATTR { return &row[index[lane + kGroup]].value; });
         const auto weight = hn::BitCast(ds, hn::Broadcast<kGroup>(weights.pairs[z][y]));
         sum = hn::ReorderWidenMulAccumulate(di, hn::TableLookupBytes(voxels, pairs), weight, sum, rest);
       }

@@ -108,12 +108,11 @@ struct Stride {
   Mask sampled;
   Floats steps;
 };
-// Rays in empty space leap ahead; the others go on to their next sample. `inside`: rays in the box.
-HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, const SamplePlace& place, Mask inside) {
+// Rays in empty space leap ahead; the others go on to their next sample. `octant_start`: OctantStart; `inside`: rays in the box.
+HWY_INLINE Stride LeapFrom(const MarchWork& work, const LeapScales& leaps, Ints octant_start, const SamplePlace& place, Mask inside) {
   const FloatTag df;
   const IntTag di;
-  const auto cell = CellOf<kCellShift>(place, work.box->cells, inside);
-  const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work.empty_distance), cell), SetInt(0xFF));
+  const auto distance = DistanceAt(*work.to_samples, octant_start, CellOf<kCellShift>(place, work.box->cells, inside));
   const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
   return {hn::AndNot(empty, inside),
           hn::IfThenElse(empty, StepsWithin<kCellShift>(*work.box, leaps, place, hn::ConvertTo(df, distance)), Set(1))};
@@ -284,8 +283,8 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   // Addresses depend on `inside` alone, so that loads need not wait for the samples before.
   auto inside = hn::Lt(k, owned.end), alive = inside;
   std::uint64_t shaded = 0;
-  SurfaceWalk<T> surfaces(work, packet.among);
-  const bool has_surfaces = kAll && !look.isovalues.empty();
+  const bool has_surfaces = kAll && work.to_surfaces != nullptr;
+  SurfaceWalk<T> surfaces(work, packet.among, has_surfaces ? OctantStart(*work.to_surfaces, packet.among) : hn::Zero(IntTag()));
   if constexpr (kAll) {
     alive = hn::And(alive, hn::Lt(gathered.alpha, opaque));
     if (kSamples != Samples::kLayered && !look.volume_shows) alive = hn::Lt(one, zero);
@@ -297,6 +296,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
   if (has_ends) ends = EndSamplesOf(*work.rays, packet.of_frame, LeapScalesOf(packet.of_frame), part);
 
   Sums sums = gathered;
+  const Ints octant_start = OctantStart(*work.to_samples, packet.among);
   bool in_matter = false;  // most of the last samples were visible
   // The next samples: where they are. Rays leap until some ray has one.
   const auto place = [&](Step<Voxels>& step, Step<Voxels>& before) SLABSTREAM_INLINED {
@@ -304,7 +304,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
     while (!hn::AllFalse(df, alive)) {
       step.place = PlaceSample(packet.among, *work.box, k);
       Stride stride = {inside, one};
-      if (!in_matter) stride = LeapFrom(work, packet.leaps, step.place, inside);
+      if (!in_matter) stride = LeapFrom(work, packet.leaps, octant_start, step.place, inside);
       step.k = k;
       step.sampled = hn::And(alive, stride.sampled);
       k = hn::Add(k, stride.steps);
@@ -387,7 +387,7 @@ HWY_INLINE std::uint64_t MarchPacket(const MarchWork& work, const RayPacket& of_
   Sums sums = {zero, zero, zero, zero};
   std::uint64_t shaded = 0;
   // Plain frames stand first and in line: behind a branch that g++ thinks likelier they take 8 % longer.
-  const bool has_parts = !work.rays->clip.empty() || !work.look->isovalues.empty() || work.look->by_gradient();
+  const bool has_parts = !work.rays->clip.empty() || work.to_surfaces != nullptr || work.look->by_gradient();
   if (HWY_LIKELY(work.layers == nullptr && !has_parts)) {
     shaded = MarchSamples<T, Samples::kPlain, Voxels>(work, packet, owned, nullptr, sums);
   } else if (work.layers == nullptr) {

@@ -20,6 +20,7 @@
 #include "worker/light/frame_light.h"
 #include "worker/rays/ray_box.h"
 #include "worker/rays/ray_look.h"
+#include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/gradient_bricks.h"
 #include "worker/renderers/raycast/ray_layers.h"
 
@@ -29,10 +30,12 @@ struct MarchWork {
   const ViewRays* rays = nullptr;
   const RayBox* box = nullptr;
   const RayLook* look = nullptr;
-  const std::uint8_t* empty_distance = nullptr;  // EmptyDistances of the box's cells
-  float termination = 0;                         // a ray ends where it transmits less; 0: never
-  const RayLayers* layers = nullptr;             // null: none is shown
-  const FrameLight::View* light = nullptr;       // shadows and ambient occlusion, by positions in the box; null: there are none
+  // Of the box's cells, for the octants of the rays: to cells with visible samples, and to those that an isosurface passes through.
+  const EmptyDistances* to_samples = nullptr;
+  const EmptyDistances* to_surfaces = nullptr;  // null: no isosurface is shown
+  float termination = 0;                        // a ray ends where it transmits less; 0: never
+  const RayLayers* layers = nullptr;            // null: none is shown
+  const FrameLight::View* light = nullptr;      // shadows and ambient occlusion, by positions in the box; null: there are none
 };
 
 // Premultiplied RGBA of the samples that the box owns on the rays of the pixels of `tile`; `rgba` points to the first pixel. Pixels without

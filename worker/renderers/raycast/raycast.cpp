@@ -2,7 +2,7 @@
 // computes.
 //
 //   1. once a padded box: pad its voxels (RayVolume) and find the range of each small cell
-//   2. once a transfer function, and look of layers: for each cell, find the distance to the nearest visible one (EmptyDistances)
+//   2. once a transfer function, look of layers, and octant of directions: for each cell, find how far rays may leap (EmptyDistances)
 //   3. once a frame: tiles of pixels are separate tasks; a tile's rays march through the box (March)
 #include <tbb/enumerable_thread_specific.h>
 
@@ -25,8 +25,9 @@ namespace {
 
 // Of one piece of a padded box.
 struct Visibility {
-  std::vector<std::uint8_t> distances;
-  SampledRegion region;  // positions in visible cells; empty if low.x > high.x
+  EmptyDistances to_samples;
+  std::optional<EmptyDistances> to_surfaces;  // none: no isosurface is shown
+  SampledRegion region;                       // positions in visible cells; empty if low.x > high.x
 };
 
 // What is visible of a padded box: samples of the volume, and what layers add.
@@ -37,28 +38,34 @@ struct VisibleValues {
   friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
-// `layers`: of the piece; null if none is shown.
-Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers) {
-  std::vector<std::uint8_t> cells_shown = VisibleCells(piece.cells, visible.volume);
+// `has_surfaces`: isosurfaces are shown. `layers`: of the piece; null if none is shown.
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, bool has_surfaces, const LayerPiece* layers) {
+  const Index3& counts = piece.cells.counts;
+  std::vector<std::uint8_t> with_samples =
+      VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnyMatterBetween(low, high); });
   const auto add = [&](const MacrocellRanges& of, const auto& shown) {
     for (std::size_t i = 0; i < of.ranges.size(); ++i) {
-      if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) cells_shown[i] = 0;
+      if (shown.AnyBetween(of.ranges[i].min, of.ranges[i].max)) with_samples[i] = 0;
     }
   };
   if (visible.labels) add(layers->label_cells, *visible.labels);
   if (visible.overlay) add(layers->overlay_cells, *visible.overlay);
-  Visibility result{EmptyDistances(piece.cells.counts, std::move(cells_shown)), {{1, 0, 0}, {0, 0, 0}}};
-  const Index3& counts = piece.cells.counts;
+  std::vector<std::uint8_t> with_surfaces;
+  if (has_surfaces) {
+    with_surfaces = VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnySurfaceBetween(low, high); });
+  }
   Box cells;
   std::size_t number = 0;
   for (Index3 cell; cell.z < counts.z; ++cell.z) {
     for (cell.y = 0; cell.y < counts.y; ++cell.y) {
       for (cell.x = 0; cell.x < counts.x; ++cell.x, ++number) {
-        if (result.distances[number] != 0) continue;
+        if (with_samples[number] != 0 && (!has_surfaces || with_surfaces[number] != 0)) continue;
         cells = Hull(cells, {cell, {cell.x + 1, cell.y + 1, cell.z + 1}});
       }
     }
   }
+  Visibility result{EmptyDistances(counts, std::move(with_samples)), std::nullopt, {{1, 0, 0}, {0, 0, 0}}};
+  if (has_surfaces) result.to_surfaces.emplace(counts, std::move(with_surfaces));
   if (cells.empty()) return result;
   const Vec3 origin = ToVec3(piece.voxels.box.begin) - Vec3{1, 1, 1};
   result.region = {origin + double(kCellSide) * ToVec3(cells.begin), origin + double(kCellSide) * ToVec3(cells.end)};
@@ -110,7 +117,7 @@ class VisibilityCache : public BoxCache {
  public:
   // By piece.
   const std::vector<Visibility>& Of(const std::vector<RayPiece>& pieces, const RayLook& look, const LayerLooks& looks,
-                                    const ShownLayers& shown) {
+                                    const ShownLayers& shown, OctantSet octants) {
     VisibleValues visible{.volume = VisibleSamples(look)};
     if (looks.labels && looks.labels->mode == LabelMode::kSurface) visible.labels.emplace(*looks.labels);
     if (shown.overlay) visible.overlay.emplace(*shown.overlay);
@@ -118,15 +125,20 @@ class VisibilityCache : public BoxCache {
       visible_ = std::move(visible);
       pieces_.clear();
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
+        pieces_.push_back(
+            VisibilityOf(pieces[i], *visible_, !look.isovalues.empty(), shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
       }
+    }
+    for (Visibility& piece : pieces_) {
+      piece.to_samples.Find(octants);
+      if (piece.to_surfaces) piece.to_surfaces->Find(octants);
     }
     return pieces_;
   }
 
   std::size_t bytes() const override {
     std::size_t total = 0;
-    for (const Visibility& piece : pieces_) total += piece.distances.capacity();
+    for (const Visibility& piece : pieces_) total += piece.to_samples.bytes() + (piece.to_surfaces ? piece.to_surfaces->bytes() : 0);
     return total;
   }
 
@@ -171,11 +183,11 @@ class RaycastRenderer : public Renderer {
                                GeometryOf(setup, at.level).spacing);
     look.regions = data.CacheOf<RegionCache>().Of(setup, classification, look);
     const ShownLayers shown = LayersOf(data, pieces, setup, samples_per_voxel);
-    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown);
-    clock.Charge(Stage::kPrepare);
-
     const ViewRays rays = Jittered(MakeViewRays(setup.camera, setup.description.geometry, samples_per_voxel, setup.clip), setup.camera,
                                    setup.clip, setup.parameters.at(1));
+    const std::vector<Visibility>& visible = data.CacheOf<VisibilityCache>().Of(pieces, look, setup.looks, shown, OctantsOf(rays));
+    clock.Charge(Stage::kPrepare);
+
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
     std::atomic<std::uint64_t> shaded = 0;
@@ -187,7 +199,8 @@ class RaycastRenderer : public Renderer {
           const MarchWork work = {.rays = &rays,
                                   .box = &ray_box,
                                   .look = &look,
-                                  .empty_distance = visible[piece].distances.data(),
+                                  .to_samples = &visible[piece].to_samples,
+                                  .to_surfaces = visible[piece].to_surfaces ? &*visible[piece].to_surfaces : nullptr,
                                   .termination = float(setup.termination),
                                   .layers = layers ? &*layers : nullptr,
                                   .light = light ? &*light : nullptr};

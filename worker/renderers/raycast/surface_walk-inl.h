@@ -29,6 +29,22 @@ HWY_BEFORE_NAMESPACE();
 namespace slabstream {
 namespace HWY_NAMESPACE {
 
+// Where the distances of the octants in which the rays move begin.
+HWY_INLINE Ints OctantStart(const EmptyDistances& distances, const RayPacket& packet) {
+  const IntTag di;
+  auto octant = hn::Zero(di);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto down = hn::Lt(packet.move[i], hn::Zero(FloatTag()));
+    octant = hn::Add(octant, hn::IfThenElseZero(hn::RebindMask(di, down), SetInt(1 << i)));
+  }
+  return hn::GatherIndex(di, distances.starts().data(), octant);
+}
+// Of cells, which lie at `cell` from there.
+HWY_INLINE Ints DistanceAt(const EmptyDistances& distances, Ints octant_start, Ints cell) {
+  const auto four = hn::GatherOffset(IntTag(), reinterpret_cast<const std::int32_t*>(distances.data()), hn::Add(octant_start, cell));
+  return hn::And(four, SetInt(0xFF));
+}
+
 // f(x) along a ray, x from 0 where it enters a cell to 3 where it leaves.
 struct Cubic {
   Floats c0, c1, c2, c3;
@@ -67,7 +83,9 @@ HWY_INLINE Extrema ExtremaOf(const Cubic& f) {
 template <class T>
 class SurfaceWalk {
  public:
-  HWY_INLINE SurfaceWalk(const MarchWork& work, const RayPacket& packet) : work_(work), box_(*work.box), packet_(packet) {}
+  // `octant_start`: OctantStart in work.to_surfaces.
+  HWY_INLINE SurfaceWalk(const MarchWork& work, const RayPacket& packet, Ints octant_start)
+      : work_(work), box_(*work.box), packet_(packet), octant_start_(octant_start) {}
 
   // Finds each ray's first crossing in `part`.
   HWY_NOINLINE void Start(const PacketPart& part) {
@@ -116,8 +134,7 @@ class SurfaceWalk {
         place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
         place.fraction[i] = place.position[i] = hn::Zero(df);
       }
-      const auto group = CellOf<kCellShift>(place, box_.cells, searching);
-      const auto distance = hn::And(hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(work_.empty_distance), group), SetInt(0xFF));
+      const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, CellOf<kCellShift>(place, box_.cells, searching));
       const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
       const auto busy = hn::AndNot(empty, searching);
       if (!hn::AllFalse(df, busy)) searching = hn::AndNot(FindIn(place, busy), searching);
@@ -323,6 +340,7 @@ class SurfaceWalk {
   const MarchWork& work_;
   const RayBox& box_;
   const RayPacket& packet_;
+  const Ints octant_start_;
   Floats from_, to_;               // samples
   Mask still_[3];                  // rays that do not move along an axis
   Floats inverse_[3];              // 1 / move

@@ -338,10 +338,16 @@ TEST(Layers, AgreeWithTheReference) {
       layers.overlay_samples = reinterpret_cast<const float*>(layer_pieces[0].overlay.samples.get());
     }
     // Nothing is leapt over.
-    std::vector<std::uint8_t> distances(pieces[0].cells.ranges.size() + kEmptyDistancePadding, 0);
+    EmptyDistances everywhere(pieces[0].cells.counts, std::vector<std::uint8_t>(pieces[0].cells.ranges.size(), 0));
+    everywhere.Find((1U << kOctants) - 1);
     const RayBox box =
         MakeRayBox(pieces[0].voxels, pieces[0].cells.counts, WholeBox(volume.block.box), WholeBox(volume.block.box), rays, c.setup.camera);
-    const MarchWork work = {.rays = &rays, .box = &box, .look = &look, .empty_distance = distances.data(), .layers = &layers};
+    const MarchWork work = {.rays = &rays,
+                            .box = &box,
+                            .look = &look,
+                            .to_samples = &everywhere,
+                            .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
+                            .layers = &layers};
     const PixelBounds all = {0, 0, c.setup.camera.width, c.setup.camera.height};
     const auto marched = [&](auto&& marcher) {
       LocalImage image = MakeLocalImage(PixelFormat::kRgba, all);

@@ -1,6 +1,7 @@
 // The ray caster's kernel on every instruction set against its definition, and what it leaps with.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -25,17 +26,30 @@ struct Scene {
         cells(FindMacrocellRanges(padded)),
         look(MakeRayLook(Classify(setup.transfer, setup.description, setup.range), setup.transfer, setup.description, camera, setup.shading,
                          rate)),
-        distances(EmptyDistances(cells, VisibleSamples(look))),
-        ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)) {}
+        visible(look),
+        to_samples(cells.counts, VisibleCells(cells, [&](float low, float high) { return visible.AnyMatterBetween(low, high); })),
+        to_surfaces(cells.counts, VisibleCells(cells, [&](float low, float high) { return visible.AnySurfaceBetween(low, high); })),
+        ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)) {
+    to_samples.Find(OctantsOf(rays));
+    to_surfaces.Find(OctantsOf(rays));
+  }
 
-  MarchWork Work(float termination = 0) const { return {&rays, &ray_box, &look, distances.data(), termination}; }
+  MarchWork Work(float termination = 0) const {
+    return {.rays = &rays,
+            .box = &ray_box,
+            .look = &look,
+            .to_samples = &to_samples,
+            .to_surfaces = look.isovalues.empty() ? nullptr : &to_surfaces,
+            .termination = termination};
+  }
 
   Camera camera;
   ViewRays rays;
   PaddedVoxels padded;
   MacrocellRanges cells;
   RayLook look;
-  std::vector<std::uint8_t> distances;
+  VisibleSamples visible;
+  EmptyDistances to_samples, to_surfaces;
   RayBox ray_box;
 };
 
@@ -218,34 +232,64 @@ TEST(MarchTile, EarlyTerminationChangesNoMoreThanItsThreshold) {
   }
 }
 
-TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCell) {
+TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCellOfAnOctant) {
   Random random(83);
   SCOPED_TRACE(random.trace());
   for (int i = 0; i < 6; ++i) {
-    const Volume volume = MakeVolume({{37, 30, 41}, {1, 1, 1}}, ScalarType::kUint8,
-                                     [&](const Index3&) { return random.Integer(0, 400 * (1 + i)) == 0 ? 100 : 0; });
-    SetupOptions options;
-    const FrameSetup setup = MakeSetup(volume, options);
-    const Scene scene(volume, volume.block.box, setup, 1);
-    const Index3& n = scene.cells.counts;
-    std::vector<Index3> visible;
-    for (Index3 c; c.z < n.z; ++c.z) {
-      for (c.y = 0; c.y < n.y; ++c.y) {
-        for (c.x = 0; c.x < n.x; ++c.x) {
-          if (scene.cells.ranges[NumberIn(n, c)].max > 0) visible.push_back(c);
-        }
-      }
-    }
-    for (Index3 c; c.z < n.z; ++c.z) {
-      for (c.y = 0; c.y < n.y; ++c.y) {
-        for (c.x = 0; c.x < n.x; ++c.x) {
+    const Index3 n{9 - i, 8, 5 + i};
+    std::vector<std::uint8_t> shown(std::size_t(CountIn(n)));
+    for (std::uint8_t& cell : shown) cell = random.Integer(0, 10 * (1 + i)) == 0 ? 0 : 255;
+    EmptyDistances distances(n, shown);
+    OctantSet asked = 0;
+    for (const OctantSet octants : {OctantSet{1}, OctantSet{0x24}, OctantSet{0x20}, OctantSet{0xFF}}) {
+      distances.Find(octants);
+      asked = (octants & ~asked) != 0 ? octants : asked;
+      for (unsigned octant = 0; octant < kOctants; ++octant) {
+        if ((asked >> octant & 1) == 0) continue;
+        // From c to v along the octant: how far along each axis, negative if it lies behind.
+        const auto ahead = [&](const Index3& c, const Index3& v, int axis) {
+          return (octant >> axis & 1) != 0 ? c[axis] - v[axis] : v[axis] - c[axis];
+        };
+        for (std::int32_t number = 0; number < CountIn(n); ++number) {
+          const Index3 c{number % n.x, number / n.x % n.y, number / n.x / n.y};
           int nearest = 255;
-          for (const Index3& v : visible)
-            nearest = std::min(nearest, std::max({std::abs(v.x - c.x), std::abs(v.y - c.y), std::abs(v.z - c.z)}));
-          ASSERT_EQ(int(scene.distances[NumberIn(n, c)]), nearest) << c.x << "," << c.y << "," << c.z;
+          for (std::int32_t other = 0; other < CountIn(n); ++other) {
+            const Index3 v{other % n.x, other / n.x % n.y, other / n.x / n.y};
+            const int x = ahead(c, v, 0), y = ahead(c, v, 1), z = ahead(c, v, 2);
+            if (shown[std::size_t(other)] == 0 && std::min({x, y, z}) >= 0) nearest = std::min(nearest, std::max({x, y, z}));
+          }
+          ASSERT_EQ(int(distances.data()[distances.starts()[octant] + number]), nearest) << "octant " << octant << ", cell " << number;
         }
       }
     }
+  }
+}
+
+// The direction of every pixel's ray is in one of the octants, whatever the view.
+TEST(OctantsOf, ContainTheDirectionsOfAllRays) {
+  Random random(84);
+  SCOPED_TRACE(random.trace());
+  const Volume volume = MakeVolume({{20, 30, 25}, {1, 2, 0.5}}, ScalarType::kUint8, [](const Index3&) { return 1; });
+  for (int i = 0; i < 60; ++i) {
+    SetupOptions options;
+    const bool perspective = i % 2 != 0;
+    options.view.projection = perspective ? Projection::kPerspective : Projection::kOrthographic;
+    options.view.azimuth_degrees = i % 3 == 0 ? 90.0 * (i % 4) : random.Real(0, 360);
+    options.view.elevation_degrees = i % 5 == 0 ? 0 : random.Real(-90, 90);
+    const FrameSetup setup = MakeSetup(volume, options);
+    const ViewRays rays = MakeViewRays(setup.camera, volume.description.geometry, 1);
+    const OctantSet octants = OctantsOf(rays);
+    for (int y = 0; y < setup.camera.height; ++y) {
+      for (int x = 0; x < setup.camera.width; ++x) {
+        unsigned octant = 0;
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const float offset = (float(x) - rays.centre_x) * rays.right[axis] + (float(y) - rays.centre_y) * rays.down[axis];
+          if (rays.forward[axis] + (perspective ? offset : 0) < 0) octant |= 1U << axis;
+        }
+        ASSERT_NE(octants >> octant & 1, 0U) << "view " << i << ", pixel " << x << "," << y;
+      }
+    }
+    EXPECT_LE(std::popcount(octants), perspective ? 8 : 4) << "view " << i;
   }
 }
 
