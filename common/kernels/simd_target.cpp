@@ -17,11 +17,21 @@ std::string NameOf(std::int64_t target) {
   return name;
 }
 
+// Those that are not to be used, as bits.
+std::int64_t disabled = 0;
+
+// Highway 1.0 forgets what is disabled when it lists the targets: kernels would use the best one from then on.
+std::vector<std::int64_t> Targets() {
+  std::vector<std::int64_t> targets = hwy::SupportedAndGeneratedTargets();
+  if (disabled != 0) hwy::DisableTargets(disabled);
+  return targets;
+}
+
 }  // namespace
 
 std::vector<std::string> SimdTargets() {
   std::vector<std::string> names;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(NameOf(target));  // better ones have lower bits
+  for (const std::int64_t target : Targets()) names.push_back(NameOf(target));  // better ones have lower bits
   return names;
 }
 
@@ -29,9 +39,10 @@ Status LimitSimdTargetByEnvironment() {
   const char* name = std::getenv("SLABSTREAM_SIMD");
   if (name == nullptr || *name == '\0') return Status::Ok();
   std::string known;
-  for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+  for (const std::int64_t target : Targets()) {
     if (NameOf(target) == name) {
-      hwy::DisableTargets(target - 1);
+      disabled = target - 1;  // better ones have lower bits
+      hwy::DisableTargets(disabled);
       return Status::Ok();
     }
     known += (known.empty() ? "" : ", ") + NameOf(target);
