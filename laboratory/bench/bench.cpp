@@ -94,7 +94,7 @@ Status Export(const std::vector<BenchCase>& cases, const BenchOptions& options) 
 
 Status RunBench(const BenchOptions& options) {
   if (options.list) {
-    for (const BenchCase& c : StandardBenchCases()) std::cout << fmt::format("{:<20} {}\n", c.name, c.purpose);
+    for (const BenchCase& c : StandardBenchCases()) std::cout << fmt::format("{:<25} {}\n", c.name, c.purpose);
     return Status::Ok();
   }
   const Result<std::vector<BenchCase>> cases = ChooseCases(options);

@@ -57,11 +57,23 @@ BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind*
                     HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
 }
 
+namespace {
+
+std::string CaseName(const RendererKind& renderer, const std::string& dataset) {
+  return renderer.name() == DefaultRenderer().name() ? dataset : std::string(renderer.name()) + "-" + dataset;
+}
+
+// One sample a voxel length, as other programs take by default.
+ParameterTexts StandardParameters(const RendererKind& renderer) {
+  return SamplesAlongRays(renderer) ? ParameterTexts{{std::string(SamplingRate().name), "1"}} : ParameterTexts{};
+}
+
+}  // namespace
+
 BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
   const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
   const std::string dataset = SphereName(sphere);
-  return {.name = fmt::format("{}{}{}", renderer == &DefaultRenderer() ? std::string() : std::string(renderer->name()) + "-", dataset,
-                              opacity == kOpaqueSphere && !points ? "-opaque" : ""),
+  return {.name = CaseName(*renderer, dataset) + (opacity == kOpaqueSphere && !points ? "-opaque" : ""),
           .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
                                  sphere.size, sphere.occupancy * 100, opacity, renderer->title()),
           .dataset = dataset,
@@ -69,15 +81,17 @@ BenchCase SphereCase(const SphereRequest& sphere, double opacity, const Renderer
           .renderer = renderer,
           .transfer = {SphereTransfer(opacity)},
           .opacity = opacity,
-          .parameters = SamplesAlongRays(*renderer) ? ParameterTexts{{std::string(SamplingRate().name), "1"}} : ParameterTexts{}};
+          .parameters = StandardParameters(*renderer)};
 }
 
-BenchCase BrainCase() {
-  return {.name = "brain",
-          .purpose = "the MRI brain of Debian's package mricron-data, splatting",
+BenchCase BrainCase(const RendererKind* renderer) {
+  return {.name = CaseName(*renderer, "brain"),
+          .purpose = fmt::format("the MRI brain of Debian's package mricron-data, {}", renderer->title()),
           .dataset = "brain",
           .volume = std::string("/usr/share/mricron/templates/ch2better.nii.gz"),
-          .transfer = {BrainTransfer()}};
+          .renderer = renderer,
+          .transfer = {BrainTransfer()},
+          .parameters = StandardParameters(*renderer)};
 }
 
 const std::vector<BenchCase>& StandardBenchCases() {
@@ -94,7 +108,10 @@ const std::vector<BenchCase>& StandardBenchCases() {
       StandardSphere(SphereClass::kFilled, 256, FindRenderer("shear")),
       StandardSphere(SphereClass::kHollow, 256, FindRenderer("mip")),
       StandardSphere(SphereClass::kFilled, 256, FindRenderer("mip")),
+      SphereCase({SphereClass::kHollow, 256, kHollowOccupancy}, kOpaqueSphere, FindRenderer("raycast")),
+      SphereCase({SphereClass::kFilled, 256, kFilledOccupancy}, kOpaqueSphere, FindRenderer("raycast")),
       BrainCase(),
+      BrainCase(FindRenderer("raycast")),
   };
   return cases;
 }

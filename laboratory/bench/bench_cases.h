@@ -22,7 +22,7 @@ struct BenchCase {
   const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
-  ParameterTexts parameters;      // of the renderer; spheres: one sample a voxel length, as other programs take by default
+  ParameterTexts parameters;      // of the renderer; standard cases: one sample a voxel length, as other programs take by default
 };
 
 const std::vector<BenchCase>& StandardBenchCases();
@@ -33,7 +33,7 @@ BenchCase SphereCase(const SphereRequest& sphere, double opacity, const Renderer
 BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer = &DefaultRenderer());
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
 // The MRI brain of Debian's package mricron-data.
-BenchCase BrainCase();
+BenchCase BrainCase(const RendererKind* renderer = &DefaultRenderer());
 
 // A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer.
 // NotFound, InvalidArgument: naming the text.

@@ -20,7 +20,8 @@ TEST(BenchCases, NamesAreStableUniqueAndFitForFiles) {
   for (const BenchCase& c : StandardBenchCases()) names.push_back(c.name);
   EXPECT_EQ(names, (std::vector<std::string>{"class1-256", "class2-256", "class1-256-opaque", "class2-256-opaque", "class1-512",
                                              "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256", "shear-class1-256",
-                                             "shear-class2-256", "mip-class1-256", "mip-class2-256", "brain"}));
+                                             "shear-class2-256", "mip-class1-256", "mip-class2-256", "raycast-class1-256-opaque",
+                                             "raycast-class2-256-opaque", "brain", "raycast-brain"}));
 }
 
 TEST(BenchCases, AllTransferFunctionsAndRequestsAreValid) {

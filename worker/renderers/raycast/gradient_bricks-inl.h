@@ -29,49 +29,83 @@ namespace slabstream::HWY_NAMESPACE {
 using ShortTag = hn::CappedTag<std::int16_t, 16>;
 using Shorts = hn::Vec<ShortTag>;
 
+using Words = hn::Vec<hn::RebindToUnsigned<ShortTag>>;
+
+// Samples from `at` on along x.
+HWY_INLINE Words SamplesAt(const std::uint8_t* at) {
+  return hn::PromoteTo(hn::RebindToUnsigned<ShortTag>(), hn::LoadU(hn::Rebind<std::uint8_t, ShortTag>(), at));
+}
+HWY_INLINE Words SamplesAt(const std::uint16_t* at) { return hn::LoadU(hn::RebindToUnsigned<ShortTag>(), at); }
+
+// Samples before and after others along an axis.
+struct Around {
+  Words before, after;
+};
 struct CornerVectors {
   Shorts value, x, y, z;
 };
-// Of the voxels from `at` on along x. `row` and `slice`: strides.
-HWY_INLINE CornerVectors CornersAt(const std::uint8_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+HWY_INLINE CornerVectors CornersOf(std::uint8_t /*type*/, Words value, const Around& x, const Around& y, const Around& z) {
   const ShortTag ds;
-  const auto load = [&](std::ptrdiff_t offset)
-                        HWY_ATTR { return hn::PromoteTo(ds, hn::LoadU(hn::Rebind<std::uint8_t, ShortTag>(), at + offset)); };
-  return {load(0), hn::Sub(load(1), load(-1)), hn::Sub(load(row), load(-row)), hn::Sub(load(slice), load(-slice))};
+  const auto difference = [&](const Around& of) HWY_ATTR { return hn::BitCast(ds, hn::Sub(of.after, of.before)); };
+  return {hn::BitCast(ds, value), difference(x), difference(y), difference(z)};
 }
 // Values minus 32768. Where a difference does not fit into 16 bits, all three are those of halved samples.
-HWY_INLINE CornerVectors CornersAt(const std::uint16_t* at, std::ptrdiff_t row, std::ptrdiff_t slice) {
+HWY_INLINE CornerVectors CornersOf(std::uint16_t /*type*/, Words value, const Around& x, const Around& y, const Around& z) {
   const ShortTag ds;
   const hn::RebindToUnsigned<ShortTag> du;
-  struct Difference {
-    Shorts exact, of_halves, size;  // size: negative if `exact` does not fit
+  // Negative where the difference does not fit.
+  const auto size = [&](const Around& of) HWY_ATTR {
+    return hn::BitCast(ds, hn::Or(hn::SaturatedSub(of.after, of.before), hn::SaturatedSub(of.before, of.after)));
   };
-  const auto difference = [&](std::ptrdiff_t offset) HWY_ATTR {
-    const auto before = hn::LoadU(du, at - offset), after = hn::LoadU(du, at + offset);
-    const auto size = hn::Or(hn::SaturatedSub(after, before), hn::SaturatedSub(before, after));
-    return Difference{hn::BitCast(ds, hn::Sub(after, before)),
-                      hn::BitCast(ds, hn::Sub(hn::ShiftRight<1>(after), hn::ShiftRight<1>(before))), hn::BitCast(ds, size)};
+  const auto large = hn::Lt(hn::Or(hn::Or(size(x), size(y)), size(z)), hn::Zero(ds));
+  const auto difference = [&](const Around& of) HWY_ATTR {
+    const auto of_halves = hn::Sub(hn::ShiftRight<1>(of.after), hn::ShiftRight<1>(of.before));
+    return hn::IfThenElse(large, hn::BitCast(ds, of_halves), hn::BitCast(ds, hn::Sub(of.after, of.before)));
   };
-  const Difference x = difference(1), y = difference(row), z = difference(slice);
-  const auto large = hn::Lt(hn::Or(hn::Or(x.size, y.size), z.size), hn::Zero(ds));
-  return {hn::BitCast(ds, hn::Xor(hn::LoadU(du, at), hn::Set(du, 0x8000))), hn::IfThenElse(large, x.of_halves, x.exact),
-          hn::IfThenElse(large, y.of_halves, y.exact), hn::IfThenElse(large, z.of_halves, z.exact)};
+  return {hn::BitCast(ds, hn::Xor(value, hn::Set(du, 0x8000))), difference(x), difference(y), difference(z)};
+}
+
+// Writes the corners of a row, and up to eight more.
+HWY_INLINE void StoreCorners(const CornerVectors& c, GradientCorner* to) {
+  const ShortTag ds;
+  static_assert(sizeof(GradientCorner) == 8);
+  if constexpr (hn::MaxLanes(ds) == 16) {
+    const hn::RepartitionToWide<ShortTag> dw;
+    const auto wide = [&](Shorts v) HWY_ATTR { return hn::BitCast(dw, v); };
+    const auto vx_low = wide(hn::InterleaveLower(ds, c.value, c.x)), yz_low = wide(hn::InterleaveLower(ds, c.y, c.z));
+    const auto vx_high = wide(hn::InterleaveUpper(ds, c.value, c.x)), yz_high = wide(hn::InterleaveUpper(ds, c.y, c.z));
+    const hn::Half<decltype(dw)> half;
+    const auto store = [&](auto pair, std::int32_t corner)
+                           HWY_ATTR { hn::StoreU(pair, half, reinterpret_cast<std::int32_t*>(to + corner)); };
+    const auto first = hn::InterleaveLower(dw, vx_low, yz_low);  // corners 0, 1, 8 and 9
+    store(hn::LowerHalf(half, first), 0);
+    store(hn::LowerHalf(half, hn::InterleaveUpper(dw, vx_low, yz_low)), 2);
+    store(hn::LowerHalf(half, hn::InterleaveLower(dw, vx_high, yz_high)), 4);
+    store(hn::LowerHalf(half, hn::InterleaveUpper(dw, vx_high, yz_high)), 6);
+    store(hn::UpperHalf(half, first), 8);
+  } else {
+    hn::StoreInterleaved4(c.value, c.x, c.y, c.z, ds, &to->value);
+  }
 }
 
 // The corners of `rows` rows and `slices` slices. `first`: the sample of the first one.
 template <class T>
 HWY_INLINE void MakeCorners(const T* first, std::ptrdiff_t row, std::ptrdiff_t slice, std::int32_t rows, std::int32_t slices,
                             GradientCorner* corners) {
-  const ShortTag ds;
-  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(ds));
-  for (std::int32_t z = 0; z < slices; ++z) {
-    for (std::int32_t y = 0; y < rows; ++y) {
-      const T* const from = first + z * slice + y * row;
-      GradientCorner* const to = corners + z * GradientBricks::kSlice + y * GradientBricks::kRow;
-      // What is written beyond a row, the next one overwrites.
-      for (std::int32_t x = 0; x < GradientBricks::kRow; x += kAtOnce) {
-        const CornerVectors c = CornersAt(from + x, row, slice);
-        hn::StoreInterleaved4(c.value, c.x, c.y, c.z, ds, &to[x].value);
+  constexpr std::int32_t kAtOnce = std::int32_t(hn::MaxLanes(ShortTag()));
+  // What is written beyond a row, later ones overwrite.
+  for (std::int32_t x = (GradientBricks::kRow - 1) / kAtOnce * kAtOnce; x >= 0; x -= kAtOnce) {
+    for (std::int32_t z = 0; z < slices; ++z) {
+      const T* from = first + z * slice + x;
+      GradientCorner* to = corners + z * GradientBricks::kSlice + x;
+      auto before = SamplesAt(from - row), value = SamplesAt(from);
+      for (std::int32_t y = 0; y < rows; ++y, from += row, to += GradientBricks::kRow) {
+        const auto after = SamplesAt(from + row);
+        StoreCorners(CornersOf(T(), value, {SamplesAt(from - 1), SamplesAt(from + 1)}, {before, after},
+                               {SamplesAt(from - slice), SamplesAt(from + slice)}),
+                     to);
+        before = value;
+        value = after;
       }
     }
   }
