@@ -36,6 +36,8 @@ std::vector<std::string> SimdTargets() {
 }
 
 Status LimitSimdTargetByEnvironment() {
+  disabled = 0;
+  hwy::DisableTargets(disabled);
   const char* name = std::getenv("SLABSTREAM_SIMD");
   if (name == nullptr || *name == '\0') return Status::Ok();
   std::string known;

@@ -110,8 +110,8 @@ const std::vector<BenchCase>& StandardBenchCases() {
       StandardSphere(SphereClass::kFilled, 256, FindRenderer("mip")),
       SphereCase({SphereClass::kHollow, 256, kHollowOccupancy}, kOpaqueSphere, FindRenderer("raycast")),
       SphereCase({SphereClass::kFilled, 256, kFilledOccupancy}, kOpaqueSphere, FindRenderer("raycast")),
-      BrainCase(),
       BrainCase(FindRenderer("raycast")),
+      BrainCase(),
   };
   return cases;
 }

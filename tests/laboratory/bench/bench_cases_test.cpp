@@ -21,7 +21,7 @@ TEST(BenchCases, NamesAreStableUniqueAndFitForFiles) {
   EXPECT_EQ(names, (std::vector<std::string>{"class1-256", "class2-256", "class1-256-opaque", "class2-256-opaque", "class1-512",
                                              "zbuffer-class1-256", "raycast-class1-256", "raycast-class2-256", "shear-class1-256",
                                              "shear-class2-256", "mip-class1-256", "mip-class2-256", "raycast-class1-256-opaque",
-                                             "raycast-class2-256-opaque", "brain", "raycast-brain"}));
+                                             "raycast-class2-256-opaque", "raycast-brain", "brain"}));
 }
 
 TEST(BenchCases, AllTransferFunctionsAndRequestsAreValid) {

@@ -45,7 +45,7 @@ class GradientBricks {
 
   const std::byte* samples_ = nullptr;
   Index3 counts_;
-  std::vector<std::int32_t> firsts_;
+  PooledVector<std::int32_t> firsts_;
   std::vector<std::int32_t> made_;  // the numbers of bricks, by where they are among the corners; 0: none
   std::size_t next_ = 0;            // where the next one comes
   PooledVector<GradientCorner> corners_;

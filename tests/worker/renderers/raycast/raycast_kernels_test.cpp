@@ -250,10 +250,10 @@ TEST(EmptyDistances, AreChebyshevDistancesToTheNearestVisibleCellOfAnOctant) {
         const auto ahead = [&](const Index3& c, const Index3& v, int axis) {
           return (octant >> axis & 1) != 0 ? c[axis] - v[axis] : v[axis] - c[axis];
         };
-        for (std::int32_t number = 0; number < CountIn(n); ++number) {
+        for (std::int32_t number = 0; number < std::int32_t(CountIn(n)); ++number) {
           const Index3 c{number % n.x, number / n.x % n.y, number / n.x / n.y};
           int nearest = 255;
-          for (std::int32_t other = 0; other < CountIn(n); ++other) {
+          for (std::int32_t other = 0; other < std::int32_t(CountIn(n)); ++other) {
             const Index3 v{other % n.x, other / n.x % n.y, other / n.x / n.y};
             const int x = ahead(c, v, 0), y = ahead(c, v, 1), z = ahead(c, v, 2);
             if (shown[std::size_t(other)] == 0 && std::min({x, y, z}) >= 0) nearest = std::min(nearest, std::max({x, y, z}));
