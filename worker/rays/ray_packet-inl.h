@@ -40,8 +40,9 @@ HWY_INLINE Ints SetInt(std::int32_t value) { return hn::Set(IntTag(), value); }
 
 // Whole numbers of floats that fit them: hn::ConvertTo and hn::NearestInt take care of others, which costs four operations more.
 #if HWY_TARGET <= HWY_AVX3 && HWY_ARCH_X86
-HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm512_cvttps_epi32(v.raw)}; }
-HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm512_cvtps_epi32(v.raw)}; }
+// With a mask of all lanes: without one, g++ 12 takes the intrinsics' operand for uninitialised.
+HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm512_maskz_cvttps_epi32(0xFFFF, v.raw)}; }
+HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm512_maskz_cvtps_epi32(0xFFFF, v.raw)}; }
 #elif HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
 HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm256_cvttps_epi32(v.raw)}; }
 HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm256_cvtps_epi32(v.raw)}; }

@@ -18,14 +18,16 @@
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
 
-// The entry of RayLook::entries, times four, by which samples of these values look. Values are finite.
-HWY_INLINE Ints EntryOf(const RayLook& look, Floats value) {
+// The entry of RayLook::entries by which samples of these values look, before it is cut to a whole number.
+HWY_INLINE Floats EntryAt(const RayLook& look, Floats value) {
   const auto number = hn::Add(hn::Mul(hn::Sub(value, Set(look.origin)), Set(look.scale)), Set(look.rounding));
-  return hn::ShiftLeft<2>(Truncated(hn::Min(hn::Max(number, hn::Zero(FloatTag())), Set(look.last))));
+  return hn::Min(hn::Max(number, hn::Zero(FloatTag())), Set(look.last));
 }
+// That entry, times four. Values are finite.
+HWY_INLINE Ints EntryOf(const RayLook& look, Floats value) { return hn::ShiftLeft<2>(Truncated(EntryAt(look, value))); }
 // 0 where a value is not finite.
 HWY_INLINE Ints EntryOf(const RayLook& look, Floats value, Mask finite) {
-  return hn::IfThenElseZero(hn::RebindMask(IntTag(), finite), EntryOf(look, hn::IfThenElseZero(finite, value)));
+  return hn::ShiftLeft<2>(Truncated(hn::IfThenElseZero(finite, EntryAt(look, value))));
 }
 
 // Central differences, times two, of stored samples around a position, interpolated.

@@ -44,7 +44,9 @@ TEST(SimdTarget, StaysTheOneOfTheEnvironment) {
   }
   ASSERT_EQ(::setenv("SLABSTREAM_SIMD", before.c_str(), 1), 0);
   ASSERT_TRUE(LimitSimdTargetByEnvironment().ok());
-  if (before.empty()) EXPECT_EQ(SimdTargets(), all);
+  if (before.empty()) {
+    EXPECT_EQ(SimdTargets(), all);
+  }
 }
 
 }  // namespace
