@@ -1,6 +1,6 @@
 // EmptyDistances: how far rays may leap. For each cell, and each octant of directions, the Chebyshev distance in cells to the nearest
 // visible cell in that octant; 0 in a visible cell. A ray of the octant that is in a cell of distance d may leap over all cells less than d
-// away: proximity clouds (Zuiderveld et al. 1992), by direction (Deakin and Knoll 2019). A ray that leaves an object leaps to its end.
+// away: proximity clouds (Zuiderveld et al. 1992) for each direction. A ray that has left an object leaps to its end.
 #pragma once
 
 #include <array>

@@ -213,7 +213,7 @@ HWY_NOINLINE void MakeBricks(const RayBox& box, GradientBricks& bricks, BrickPla
   before.Find(bricks);
 }
 
-// Finds samples in bricks, and those of rays that are not `inside` in the first brick: what is read never waits for what became of a ray.
+// Finds samples in bricks. Rays that are not `inside` get a corner that may be read: what is read never waits for what became of a ray.
 // `before`: as in MakeBricks.
 template <class T>
 HWY_INLINE void FindInBricks(const RayBox& box, const SamplePlace& place, Mask inside, GradientBricks& bricks, BrickPlace& found,
@@ -341,7 +341,7 @@ HWY_INLINE Entries EntriesAt(const float* table, const LaneNumbers& index) {
   return entries;
 }
 
-// `index`: BrickPlace::at.
+// `index`: BrickPlace::corner.
 template <class T>
 HWY_INLINE LitSample InterpolateCorners(const GradientCorner* corners, const LaneNumbers& index, const SamplePlace& place) {
   const FloatTag df;
