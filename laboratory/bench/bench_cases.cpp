@@ -60,7 +60,7 @@ BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind*
 namespace {
 
 std::string CaseName(const RendererKind& renderer, const std::string& dataset) {
-  return renderer.name() == DefaultRenderer().name() ? dataset : std::string(renderer.name()) + "-" + dataset;
+  return &renderer == &DefaultRenderer() ? dataset : std::string(renderer.name()) + "-" + dataset;
 }
 
 // One sample a voxel length, as other programs take by default.

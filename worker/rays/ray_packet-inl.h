@@ -4,7 +4,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstdint>
 
 #include "worker/rays/ray_box.h"
@@ -46,7 +45,7 @@ HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm512_maskz_cvtps_epi32(0xFFFF,
 #elif HWY_TARGET <= HWY_AVX2 && HWY_ARCH_X86
 HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm256_cvttps_epi32(v.raw)}; }
 HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm256_cvtps_epi32(v.raw)}; }
-#elif HWY_TARGET != HWY_SCALAR && HWY_ARCH_X86
+#elif HWY_TARGET <= HWY_SSSE3 && HWY_ARCH_X86
 HWY_INLINE Ints Truncated(Floats v) { return Ints{_mm_cvttps_epi32(v.raw)}; }
 HWY_INLINE Ints Nearest(Floats v) { return Ints{_mm_cvtps_epi32(v.raw)}; }
 #else
