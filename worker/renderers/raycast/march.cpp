@@ -24,45 +24,53 @@ HWY_INLINE Light LightOn(const MarchWork& work, const Gradient& gradient, const 
 }
 HWY_INLINE bool IsLit(const MarchWork& work) { return work.look->phong || work.light != nullptr; }
 
-// Adds a crossing with an isosurface as labels have it: tinted, thinned or taken away like a sample there, and not in the place of a label
-// that is matter.
-HWY_INLINE void AddLabelled(const MarchWork& work, Mask rays, const SamplePlace& place, Ints entry, const Light& light, Sums& sums) {
+// Adds crossings with isosurfaces. With labels: tinted, thinned or taken away like a sample there, and not in the place of a label that is
+// matter.
+template <class T>
+HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& crossing, Sums& sums) {
   const FloatTag df;
+  const SamplePlace place = crossing.Place();
+  const auto at = IndexBefore(*work.box, place, rays);
+  Light light = {Set(1), hn::Zero(df)};
+  if (IsLit(work))
+    light = LightOn(work, GradientAt(NeighboursAt<T>(*work.box, reinterpret_cast<const T*>(work.box->samples), at), place), place);
+  const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
+  const float* const colors = work.look->surface_looks.data();
+  const auto opacity = hn::GatherIndex(df, colors + 3, entry);
+  if (work.layers == nullptr || work.layers->labels == nullptr) return sums.Add(rays, opacity, colors, entry, light);
   const LabelTables& tables = *work.layers->labels;
-  const float *const colors = work.look->surface_looks.data(), *const tints = tables.entries.data();
-  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, IndexBefore(*work.box, place, rays)));
+  const float* const tints = tables.entries.data();
+  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, at));
   const auto changed = hn::GatherIndex(df, tints + 3, label);
   const auto shown = hn::Ge(changed, hn::Zero(df));
   const auto factor = hn::IfThenElse(shown, tables.surface ? hn::Zero(df) : changed, Set(1));
   const auto tint = hn::IfThenElseZero(shown, Set(tables.tint));
-  sums.AddChannels(rays, hn::Mul(hn::GatherIndex(df, colors + 3, entry), factor), [&](std::size_t channel) HWY_ATTR {
+  sums.AddChannels(rays, hn::Mul(opacity, factor), [&](std::size_t channel) HWY_ATTR {
     return Sums::Lit(Lerp(tint, hn::GatherIndex(df, colors + channel, entry), hn::GatherIndex(df, tints + channel, label)), light);
   });
 }
 
 // Adds the crossings of rays with isosurfaces up to `before`, in samples. Returns how many.
 template <class T>
-HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Mask rays, Floats before, SurfaceWalk<T>& walk, Sums& sums) {
+HWY_NOINLINE std::uint64_t AddSurfaces(const MarchWork& work, Floats before, SurfaceWalk<T>& walk, Sums& sums) {
+  constexpr float kAhead = 32;  // samples: a packet walks so far at once
   const FloatTag df;
-  const RayLook& look = *work.look;
   const auto opaque = Set(1 - work.termination);
-  const auto due = [&]() HWY_ATTR {
-    return hn::And(rays, hn::And(hn::And(hn::Le(walk.at(), before), hn::Lt(walk.at(), Set(kRayEnd))), hn::Lt(sums.alpha, opaque)));
-  };
   std::uint64_t count = 0;
-  for (auto crossing = due(); !hn::AllFalse(df, crossing); crossing = due()) {
-    count += hn::CountTrue(df, crossing);
-    Light light = {Set(1), hn::Zero(df)};
-    if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, walk.place(), crossing), walk.place()), walk.place());
-    const float* const colors = look.surface_looks.data();
-    if (work.layers != nullptr && work.layers->labels != nullptr) {
-      AddLabelled(work, crossing, walk.place(), walk.look(), light, sums);
-    } else {
-      sums.Add(crossing, hn::GatherIndex(df, colors + 3, walk.look()), colors, walk.look(), light);
+  for (;;) {
+    const auto alive = hn::Lt(sums.alpha, opaque);
+    const auto unknown = hn::And(alive, walk.MayCross(before));
+    if (!hn::AllFalse(df, unknown)) {
+      const auto last = hn::MaxOfLanes(df, hn::IfThenElseZero(unknown, before));
+      walk.Find(alive, hn::Add(last, Set(kAhead)));
     }
-    walk.Next(crossing);
+    const auto at = walk.nearest().at;
+    const auto crossing = hn::And(alive, hn::And(hn::Le(at, before), hn::Lt(at, Set(kRayEnd))));
+    if (hn::AllFalse(df, crossing)) return count;
+    count += hn::CountTrue(df, crossing);
+    AddCrossings<T>(work, crossing, walk.nearest(), sums);
+    walk.Leave(crossing);
   }
-  return count;
 }
 
 // The light on both parts of samples with layers.
@@ -336,7 +344,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
     if (count == 0) return;
     shaded += count;
     if constexpr (kAll) {
-      if (has_surfaces) shaded += AddSurfaces<T>(work, samples.visible, step.k, surfaces, sums);
+      if (has_surfaces) shaded += AddSurfaces<T>(work, step.k, surfaces, sums);
     }
     const auto opacity = has_ends ? OpacityAtEnds(ends, step.k, samples.visible, samples.opacity) : samples.opacity;
     AddSamples<kSamples>(work, step, part, at, samples, opacity, sums);
@@ -357,7 +365,7 @@ HWY_INLINE std::uint64_t MarchSamples(const MarchWork& work, const MarchingPacke
     std::swap(found, next);
   } while (known->any || found->any);
   if constexpr (kAll) {
-    if (has_surfaces) shaded += AddSurfaces<T>(work, packet.of_frame.valid, Set(kRayEnd), surfaces, sums);
+    if (has_surfaces) shaded += AddSurfaces<T>(work, Set(kRayEnd), surfaces, sums);
   }
   gathered = sums;
   return shaded;

@@ -33,6 +33,7 @@ struct MarchWork {
   // Of the box's cells, for the octants of the rays: to cells with visible samples, and to those that an isosurface passes through.
   const EmptyDistances* to_samples = nullptr;
   const EmptyDistances* to_surfaces = nullptr;  // null: no isosurface is shown
+  const std::int32_t* surface_cells = nullptr;  // FindSurfaceCells
   float termination = 0;                        // a ray ends where it transmits less; 0: never
   const RayLayers* layers = nullptr;            // null: none is shown
   const FrameLight::View* light = nullptr;      // shadows and ambient occlusion, by positions in the box; null: there are none

@@ -17,6 +17,7 @@
 #include "worker/renderers/raycast/empty_distance.h"
 #include "worker/renderers/raycast/layer_volume.h"
 #include "worker/renderers/raycast/march.h"
+#include "worker/renderers/raycast/surface_cells.h"
 #include "worker/renderers/renderer.h"
 #include "worker/renderers/stage_clock.h"
 
@@ -27,6 +28,7 @@ namespace {
 struct Visibility {
   EmptyDistances to_samples;
   std::optional<EmptyDistances> to_surfaces;  // none: no isosurface is shown
+  std::vector<std::int32_t> surface_cells;    // FindSurfaceCells
   SampledRegion region;                       // positions in visible cells; empty if low.x > high.x
 };
 
@@ -50,9 +52,11 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, boo
   };
   if (visible.labels) add(layers->label_cells, *visible.labels);
   if (visible.overlay) add(layers->overlay_cells, *visible.overlay);
+  std::vector<std::int32_t> surface_cells;
   std::vector<std::uint8_t> with_surfaces;
   if (has_surfaces) {
-    with_surfaces = VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnySurfaceBetween(low, high); });
+    surface_cells = FindSurfaceCells(piece.voxels, piece.cells, visible.volume);
+    with_surfaces = MacrocellsWithSurfaces(surface_cells);
   }
   Box cells;
   std::size_t number = 0;
@@ -64,7 +68,7 @@ Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, boo
       }
     }
   }
-  Visibility result{EmptyDistances(counts, std::move(with_samples)), std::nullopt, {{1, 0, 0}, {0, 0, 0}}};
+  Visibility result{EmptyDistances(counts, std::move(with_samples)), std::nullopt, std::move(surface_cells), {{1, 0, 0}, {0, 0, 0}}};
   if (has_surfaces) result.to_surfaces.emplace(counts, std::move(with_surfaces));
   if (cells.empty()) return result;
   const Vec3 origin = ToVec3(piece.voxels.box.begin) - Vec3{1, 1, 1};
@@ -138,7 +142,10 @@ class VisibilityCache : public BoxCache {
 
   std::size_t bytes() const override {
     std::size_t total = 0;
-    for (const Visibility& piece : pieces_) total += piece.to_samples.bytes() + (piece.to_surfaces ? piece.to_surfaces->bytes() : 0);
+    for (const Visibility& piece : pieces_) {
+      total += piece.to_samples.bytes() + (piece.to_surfaces ? piece.to_surfaces->bytes() : 0);
+      total += piece.surface_cells.capacity() * sizeof(piece.surface_cells[0]);
+    }
     return total;
   }
 
@@ -201,6 +208,7 @@ class RaycastRenderer : public Renderer {
                                   .look = &look,
                                   .to_samples = &visible[piece].to_samples,
                                   .to_surfaces = visible[piece].to_surfaces ? &*visible[piece].to_surfaces : nullptr,
+                                  .surface_cells = visible[piece].surface_cells.data(),
                                   .termination = float(setup.termination),
                                   .layers = layers ? &*layers : nullptr,
                                   .light = light ? &*light : nullptr};

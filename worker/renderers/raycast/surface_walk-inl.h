@@ -80,6 +80,34 @@ HWY_INLINE Extrema ExtremaOf(const Cubic& f) {
   return {hn::Min(a, b), hn::Max(a, b)};
 }
 
+// Crossings of rays with isosurfaces.
+struct Crossing {
+  Floats at;       // samples; kRayEnd: there is none
+  Floats surface;  // number
+  Ints voxel[3];   // as in SamplePlace, and so are
+  Floats fraction[3];
+
+  HWY_INLINE void Become(Mask rays, const Crossing& other) {
+    at = hn::IfThenElse(rays, other.at, at);
+    surface = hn::IfThenElse(rays, other.surface, surface);
+    for (std::size_t i = 0; i < 3; ++i) {
+      voxel[i] = hn::IfThenElse(hn::RebindMask(IntTag(), rays), other.voxel[i], voxel[i]);
+      fraction[i] = hn::IfThenElse(rays, other.fraction[i], fraction[i]);
+    }
+  }
+  HWY_INLINE SamplePlace Place() const {
+    SamplePlace place;
+    for (std::size_t i = 0; i < 3; ++i) {
+      place.voxel[i] = voxel[i];
+      place.fraction[i] = fraction[i];
+      place.position[i] = hn::Zero(FloatTag());
+    }
+    return place;
+  }
+};
+
+// Finds crossings of all rays of a packet together, some ahead of where they are asked for, and keeps them: rays that lie side by side
+// cross a surface within a few steps of each other, and share the work.
 template <class T>
 class SurfaceWalk {
  public:
@@ -87,7 +115,7 @@ class SurfaceWalk {
   HWY_INLINE SurfaceWalk(const MarchWork& work, const RayPacket& packet, Ints octant_start)
       : work_(work), box_(*work.box), packet_(packet), octant_start_(octant_start) {}
 
-  // Finds each ray's first crossing in `part`.
+  // Stands where each ray enters `part`.
   HWY_NOINLINE void Start(const PacketPart& part) {
     const FloatTag df;
     const auto zero = hn::Zero(df), far = Set(kRayEnd);
@@ -114,40 +142,57 @@ class SurfaceWalk {
     }
     last_ = hn::Neg(far);
     surface_ = zero;
-    at_ = far;
-    for (std::size_t i = 0; i < 3; ++i) {
-      place_.fraction[i] = place_.position[i] = zero;
-      place_.voxel[i] = hn::Zero(IntTag());
-    }
-    Next(packet_.valid);
+    transmitted_ = Set(1);
+    kept_ = zero;
+    const auto none = hn::Zero(IntTag());
+    for (Crossing& kept : queue_) kept = {far, zero, {none, none, none}, {zero, zero, zero}};
+    known_to_ = hn::IfThenElse(walking_, hn::Neg(far), far);
   }
 
-  // Finds the next crossing of these rays.
-  void Next(Mask rays) {
+  // The nearest crossings that are kept.
+  HWY_INLINE const Crossing& nearest() const { return queue_[0]; }
+  // Forgets those of these rays.
+  HWY_INLINE void Leave(Mask rays) {
+    for (std::size_t i = 0; i + 1 < kMostKept; ++i) queue_[i].Become(rays, queue_[i + 1]);
+    queue_[kMostKept - 1].at = hn::IfThenElse(rays, Set(kRayEnd), queue_[kMostKept - 1].at);
+    kept_ = hn::Sub(kept_, hn::IfThenElseZero(rays, Set(1)));
+  }
+  // Rays of which no crossing is kept, but one up to `before` may be found.
+  HWY_INLINE Mask MayCross(Floats before) const { return hn::And(hn::Eq(kept_, hn::Zero(FloatTag())), hn::Le(known_to_, before)); }
+
+  // Finds crossings of `rays` up to `to` and perhaps some behind, as many as can be kept.
+  HWY_NOINLINE void Find(Mask rays, Floats to) {
     const FloatTag df;
-    const IntTag di;
-    at_ = hn::IfThenElse(rays, Set(kRayEnd), at_);
-    auto searching = hn::And(rays, walking_);
-    while (!hn::AllFalse(df, searching)) {
+    const auto going_on = [&]() HWY_ATTR {
+      return hn::And(hn::And(rays, walking_), hn::And(hn::Le(known_to_, to), hn::Lt(kept_, Set(float(kMostKept)))));
+    };
+    for (auto going = going_on(); !hn::AllFalse(df, going); going = going_on()) {
+      // Rays wait in cells that hold a surface until all of them are in one.
+      const IntTag di;
       SamplePlace place;
-      for (std::size_t i = 0; i < 3; ++i) {
-        place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
-        place.fraction[i] = place.position[i] = hn::Zero(df);
+      auto waiting = hn::Lt(Set(1), hn::Zero(df));
+      for (;;) {
+        const auto moving = hn::AndNot(waiting, going);
+        if (hn::AllFalse(df, moving) || hn::CountTrue(df, moving) < hn::CountTrue(df, waiting)) break;
+        for (std::size_t i = 0; i < 3; ++i) place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
+        const auto group = CellOf<kCellShift>(place, box_.cells, moving);
+        const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, group);
+        const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
+        const auto holds = hn::And(hn::AndNot(empty, moving), HoldsSurface(group, place));
+        waiting = hn::Or(waiting, holds);
+        const auto on = hn::AndNot(holds, moving);
+        const auto leaping = hn::And(on, empty);
+        if (hn::AllFalse(df, leaping)) {
+          Step(on);
+        } else {
+          Move(place, on, leaping, hn::ConvertTo(df, distance));
+        }
+        going = hn::Or(hn::AndNot(on, going), going_on());
       }
-      const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, CellOf<kCellShift>(place, box_.cells, searching));
-      const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-      const auto busy = hn::AndNot(empty, searching);
-      if (!hn::AllFalse(df, busy)) searching = hn::AndNot(FindIn(place, busy), searching);
-      walking_ = hn::Or(hn::AndNot(searching, walking_), Move(place, searching, empty, hn::ConvertTo(df, distance)));
-      searching = hn::And(searching, walking_);
+      if (hn::AllFalse(df, waiting)) continue;
+      CrossCells(waiting);
     }
   }
-
-  // The crossing that was found, in samples; kRayEnd: there is none.
-  Floats at() const { return at_; }
-  const SamplePlace& place() const { return place_; }
-  // Times four: of RayLook::surface_looks.
-  Ints look() const { return hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)); }
 
  private:
   // The way of the rays through their cells, x from 0 where they enter to 3 where they leave.
@@ -201,22 +246,29 @@ class SurfaceWalk {
     values[3] = value_at(way.end[0], way.end[1], way.end[2]);
   }
 
-  // A place between low and high, where `above` changes its sign; `low_side`: its side at low.
+  // A place between low and high, where `above` changes its sign; `low_side`: its side at low. Two halvings at a time, whose polynomials
+  // are evaluated side by side.
   static HWY_INLINE Floats Bisect(const Cubic& above, Mask low_side, Floats low, Floats high) {
-    constexpr int kHalvings = 16;  // of at most 1.8 voxels
-    for (int i = 0; i < kHalvings; ++i) {
-      const auto middle = hn::Mul(Set(0.5F), hn::Add(low, high));
-      const auto behind = hn::Xor(hn::Ge(above.At(middle), hn::Zero(FloatTag())), low_side);
-      high = hn::IfThenElse(behind, middle, high);
-      low = hn::IfThenElse(behind, low, middle);
+    constexpr int kQuarterings = 8;  // of at most 1.8 voxels
+    const auto middle = [&](Floats a, Floats b) HWY_ATTR { return hn::Mul(Set(0.5F), hn::Add(a, b)); };
+    const auto is_behind = [&](Floats x) HWY_ATTR { return hn::Xor(hn::Ge(above.At(x), hn::Zero(FloatTag())), low_side); };
+    for (int i = 0; i < kQuarterings; ++i) {
+      const auto half = middle(low, high), quarter = middle(low, half), three_quarters = middle(half, high);
+      const auto half_behind = is_behind(half), quarter_behind = is_behind(quarter), three_quarters_behind = is_behind(three_quarters);
+      const auto new_low = hn::IfThenElse(half_behind, hn::IfThenElse(quarter_behind, low, quarter),
+                                          hn::IfThenElse(three_quarters_behind, half, three_quarters));
+      high = hn::IfThenElse(half_behind, hn::IfThenElse(quarter_behind, quarter, half),
+                            hn::IfThenElse(three_quarters_behind, three_quarters, high));
+      low = new_low;
     }
     return high;
   }
 
-  // The nearest crossing so far in the cells.
-  struct Crossing {
-    Floats at, x, surface;
+  // The nearest crossing so far in the cells, and how many changes of sides there are.
+  struct Nearest {
+    Floats at, x, surface, changes;
   };
+  static constexpr std::size_t kMostKept = 4;
 
   // Whether a crossing counts: it comes after the last one, within the clipped ray, and the box owns it.
   HWY_INLINE Mask Counts(const Way& way, Floats at, Floats x, Floats surface) const {
@@ -231,7 +283,7 @@ class SurfaceWalk {
 
   // Looks for crossings of `rays` with a surface, stretch by stretch between the extrema of their cubic.
   HWY_INLINE void CrossSurface(const Way& way, const Cubic& cubic, const Extrema& extrema, const Floats (&values)[4], std::size_t surface,
-                               Mask rays, Crossing& nearest) const {
+                               Mask rays, Nearest& nearest) const {
     const FloatTag df;
     const auto zero = hn::Zero(df), value = Set(work_.look->isovalues[surface]);
     const Floats ends[4] = {zero, extrema.first, extrema.second, Set(3)};
@@ -243,24 +295,52 @@ class SurfaceWalk {
       return hn::Or(hn::And(at_end, leaves_above), hn::AndNot(at_end, hn::Ge(above.At(x), zero)));
     };
     const Mask sides[4] = {enters_above, is_above(ends[1]), is_above(ends[2]), leaves_above};
-    for (std::size_t stretch = 0; stretch < 3; ++stretch) {
-      const auto changes = hn::And(rays, hn::Xor(sides[stretch], sides[stretch + 1]));
-      if (hn::AllFalse(df, changes)) continue;
-      const auto x = Bisect(above, sides[stretch], ends[stretch], ends[stretch + 1]);
+    // Each ray takes the first stretch that is left. Most rays have one.
+    Mask left[3];
+    for (std::size_t i = 0; i < 3; ++i) {
+      left[i] = hn::And(rays, hn::Xor(sides[i], sides[i + 1]));
+      nearest.changes = hn::Add(nearest.changes, hn::IfThenElseZero(left[i], Set(1)));
+    }
+    for (;;) {
+      const auto any = hn::Or(left[0], hn::Or(left[1], left[2]));
+      if (hn::AllFalse(df, any)) return;
+      const auto is_first = left[0], is_second = hn::AndNot(is_first, left[1]);
+      const auto low = hn::IfThenElseZero(hn::Not(is_first), hn::IfThenElse(is_second, ends[1], ends[2]));
+      const auto high = hn::IfThenElse(is_first, ends[1], hn::IfThenElse(is_second, ends[2], ends[3]));
+      const auto low_side =
+          hn::Or(hn::And(is_first, sides[0]), hn::AndNot(is_first, hn::Or(hn::And(is_second, sides[1]), hn::AndNot(is_second, sides[2]))));
+      left[2] = hn::And(left[2], hn::Or(is_first, is_second));
+      left[1] = hn::And(left[1], is_first);
+      left[0] = hn::Xor(left[0], left[0]);
+      const auto x = Bisect(above, low_side, low, high);
       const auto at = hn::Add(way.enter, hn::Mul(hn::Mul(x, Set(1.0F / 3)), hn::Sub(way.leave, way.enter)));
       const auto number = Set(float(surface));
-      const auto counts = hn::And(hn::And(changes, hn::Lt(at, nearest.at)), Counts(way, at, x, number));
+      const auto counts = hn::And(hn::And(any, hn::Lt(at, nearest.at)), Counts(way, at, x, number));
       nearest.at = hn::IfThenElse(counts, at, nearest.at);
       nearest.x = hn::IfThenElse(counts, x, nearest.x);
       nearest.surface = hn::IfThenElse(counts, number, nearest.surface);
     }
   }
 
-  // Crossings of these rays in their cells behind the last ones. Returns which rays have one.
-  HWY_NOINLINE Mask FindIn(const SamplePlace& cell, Mask rays) {
+  // Whether a surface passes through the cells that lie at `place`, in a group that has such cells.
+  HWY_INLINE Mask HoldsSurface(Ints group, const SamplePlace& place) const {
+    const IntTag di;
+    const auto among = [&](std::size_t axis) HWY_ATTR { return hn::And(place.voxel[axis], SetInt(kCellSide - 1)); };
+    const auto z = among(2);
+    const auto number = hn::Add(hn::ShiftLeft<1>(group), hn::And(z, SetInt(1)));
+    const auto bit = hn::Add(hn::Add(hn::ShiftLeft<4>(hn::ShiftRight<1>(z)), hn::ShiftLeft<2>(among(1))), among(0));
+    const auto cells = hn::GatherIndex(di, work_.surface_cells, number);
+    return hn::RebindMask(FloatTag(), hn::Ne(hn::And(cells, hn::Shl(SetInt(1), bit)), hn::Zero(di)));
+  }
+
+  // Keeps the next crossing of these rays in their cells, and moves rays on that have no other one there.
+  HWY_NOINLINE void CrossCells(Mask rays) {
     const FloatTag df;
+    const IntTag di;
     const auto zero = hn::Zero(df);
-    const Neighbours<T> voxels = LoadNeighbours<T>(box_, cell, rays);
+    SamplePlace place;
+    for (std::size_t i = 0; i < 3; ++i) place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
+    const Neighbours<T> voxels = LoadNeighbours<T>(box_, place, rays);
     auto least = voxels.inner[0][0].a, greatest = least, magnitude = zero;
     for (const auto& slice : voxels.inner) {
       for (const InnerPair& row : slice) {
@@ -269,40 +349,63 @@ class SurfaceWalk {
         magnitude = hn::Add(magnitude, hn::Add(hn::Abs(row.a), hn::Abs(row.b)));
       }
     }
-    rays = hn::And(rays, hn::Le(magnitude, Set(std::numeric_limits<float>::max())));  // all are finite
-    const std::vector<float>& isovalues = work_.look->isovalues;
-    const auto holds = [&](std::size_t surface) HWY_ATTR {
-      const auto value = Set(isovalues[surface]);
-      return hn::And(rays, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
-    };
-    auto any = hn::Lt(Set(1), zero);
-    for (std::size_t surface = 0; surface < isovalues.size(); ++surface) any = hn::Or(any, holds(surface));
-    if (hn::AllFalse(df, any)) return any;
-
     const Way way = WayThroughCells();
-    rays = hn::And(rays, hn::Le(way.enter, way.leave));
+    const auto finite = hn::Le(magnitude, Set(std::numeric_limits<float>::max()));
+    const auto valid = hn::And(hn::And(rays, finite), hn::Le(way.enter, way.leave));
     Floats values[4];
     InterpolateAlong(way, voxels, values);
     const Cubic cubic = CubicThrough(values);
     const Extrema extrema = ExtremaOf(cubic);
-    Crossing nearest = {Set(kRayEnd), zero, zero};
+    Nearest nearest = {Set(kRayEnd), zero, zero, zero};
+    const std::vector<float>& isovalues = work_.look->isovalues;
     for (std::size_t surface = 0; surface < isovalues.size(); ++surface) {
-      const auto crossed = hn::And(rays, holds(surface));
+      const auto value = Set(isovalues[surface]);
+      const auto crossed = hn::And(valid, hn::And(hn::Lt(least, value), hn::Le(value, greatest)));
       if (!hn::AllFalse(df, crossed)) CrossSurface(way, cubic, extrema, values, surface, crossed, nearest);
     }
-    const auto found = hn::And(rays, hn::Lt(nearest.at, Set(kRayEnd)));
-    at_ = hn::IfThenElse(found, nearest.at, at_);
+    const auto found = hn::Lt(nearest.at, Set(kRayEnd));
     last_ = hn::IfThenElse(found, nearest.at, last_);
     surface_ = hn::IfThenElse(found, nearest.surface, surface_);
-    for (std::size_t i = 0; i < 3; ++i) {
-      place_.fraction[i] = hn::IfThenElse(found, way.FractionAt(i, nearest.x), place_.fraction[i]);
-      place_.voxel[i] = hn::IfThenElse(hn::RebindMask(IntTag(), found), cell.voxel[i], place_.voxel[i]);
+    known_to_ = hn::IfThenElse(found, nearest.at, known_to_);
+    if (!hn::AllFalse(df, found)) {
+      const Crossing crossing = {nearest.at,
+                                 nearest.surface,
+                                 {place.voxel[0], place.voxel[1], place.voxel[2]},
+                                 {way.FractionAt(0, nearest.x), way.FractionAt(1, nearest.x), way.FractionAt(2, nearest.x)}};
+      for (std::size_t i = 0; i < kMostKept; ++i) queue_[i].Become(hn::And(found, hn::Eq(kept_, Set(float(i)))), crossing);
+      kept_ = hn::Add(kept_, hn::IfThenElseZero(found, Set(1)));
+      // A ray ends at the latest where the surfaces alone let too little through. Labels may change their opacity.
+      if (work_.layers == nullptr) {
+        const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, hn::ShiftLeft<2>(hn::ConvertTo(di, surface_)));
+        transmitted_ = hn::Sub(transmitted_, hn::IfThenElseZero(found, hn::Mul(transmitted_, opacity)));
+      }
+      walking_ = hn::And(walking_, hn::Or(hn::Not(found), hn::Gt(transmitted_, Set(work_.termination))));
+      known_to_ = hn::IfThenElse(walking_, known_to_, Set(kRayEnd));
     }
-    return found;
+    const auto on = hn::And(hn::And(rays, walking_), hn::Not(hn::And(found, hn::Gt(nearest.changes, Set(1)))));
+    Step(on);
   }
 
-  // Moves rays into the next cell, or to the border of the empty cells around them. Returns which of them are still in the box.
-  HWY_INLINE Mask Move(const SamplePlace& place, Mask rays, Mask empty, Floats distance) {
+  // Moves rays into the next cell.
+  HWY_INLINE void Step(Mask rays) {
+    const auto zero = hn::Zero(FloatTag()), one = Set(1);
+    Floats plane_at[3], step[3];
+    auto leave = Set(kRayEnd);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto backward = hn::Lt(packet_.move[i], zero);
+      step[i] = hn::IfThenElse(backward, Set(-1), one);
+      const auto plane = hn::IfThenElse(backward, cell_[i], hn::Add(cell_[i], one));
+      plane_at[i] = hn::IfThenElse(still_[i], Set(kRayEnd), PlaneAt(i, plane));
+      leave = hn::Min(leave, plane_at[i]);
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      cell_[i] = hn::Add(cell_[i], hn::IfThenElseZero(hn::And(rays, hn::Eq(plane_at[i], leave)), step[i]));
+    }
+    Moved(rays, leave);
+  }
+
+  // Moves rays into the next cell, or those that leap to the border of the empty groups around them.
+  HWY_INLINE void Move(const SamplePlace& place, Mask rays, Mask leaping, Floats distance) {
     const FloatTag df;
     const auto zero = hn::Zero(df), one = Set(1);
     // The planes through which the rays leave.
@@ -314,11 +417,10 @@ class SurfaceWalk {
       const auto ahead = hn::Add(group, hn::IfThenElse(backward, hn::Sub(one, distance), distance));
       const auto of_groups = hn::Add(hn::Mul(ahead, Set(float(kCellSide))), Set(float(box_.origin[int(i)])));
       const auto of_cell = hn::IfThenElse(backward, cell_[i], hn::Add(cell_[i], one));
-      plane[i] = hn::IfThenElse(empty, of_groups, of_cell);
+      plane[i] = hn::IfThenElse(leaping, of_groups, of_cell);
       plane_at[i] = hn::IfThenElse(still_[i], Set(kRayEnd), PlaneAt(i, plane[i]));
       leave = hn::Min(leave, plane_at[i]);
     }
-    auto inside = hn::And(rays, hn::Le(leave, to_));
     for (std::size_t i = 0; i < 3; ++i) {
       const auto backward = hn::Lt(packet_.move[i], zero);
       const auto last = hn::IfThenElse(backward, plane[i], hn::Sub(plane[i], one));  // cell before the plane
@@ -326,12 +428,19 @@ class SurfaceWalk {
       // A leap along the other axes: never back, and not beyond the plane.
       const auto beside = hn::Floor(PositionOf(packet_, i, leave));
       const auto limited = hn::IfThenElse(backward, hn::Min(hn::Max(beside, last), cell_[i]), hn::Max(hn::Min(beside, last), cell_[i]));
-      const auto next = hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, hn::IfThenElse(empty, limited, cell_[i]));
+      const auto next = hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, hn::IfThenElse(leaping, limited, cell_[i]));
       cell_[i] = hn::IfThenElse(rays, next, cell_[i]);
-      inside = hn::And(inside, hn::And(hn::Ge(cell_[i], lowest_[i]), hn::Le(cell_[i], highest_[i])));
     }
+    Moved(rays, leave);
+  }
+
+  // Rays have passed a plane there, in samples, into other cells.
+  HWY_INLINE void Moved(Mask rays, Floats at) {
+    auto inside = hn::And(rays, hn::Le(at, to_));
+    for (std::size_t i = 0; i < 3; ++i) inside = hn::And(inside, hn::And(hn::Ge(cell_[i], lowest_[i]), hn::Le(cell_[i], highest_[i])));
+    walking_ = hn::Or(hn::AndNot(rays, walking_), inside);
     last_ = hn::IfThenElse(rays, Set(-kRayEnd), last_);
-    return inside;
+    known_to_ = hn::IfThenElse(rays, hn::IfThenElse(inside, at, Set(kRayEnd)), known_to_);
   }
 
   // Where the rays pass a plane of voxel centres, in samples.
@@ -348,8 +457,10 @@ class SurfaceWalk {
   Mask walking_;                   // rays that are still in the box
   Floats cell_[3];                 // floors of the positions in it
   Floats last_, surface_;          // the last crossing found in this cell, and the surface of the last crossing
-  Floats at_;
-  SamplePlace place_;
+  Floats known_to_;                // no other crossing comes before, in samples; kRayEnd: none comes at all
+  Floats transmitted_;             // by all crossings found
+  Floats kept_;                    // how many
+  Crossing queue_[kMostKept];      // nearest first
 };
 
 }  // namespace HWY_NAMESPACE

@@ -340,6 +340,7 @@ TEST(Layers, AgreeWithTheReference) {
     // Nothing is leapt over.
     EmptyDistances everywhere(pieces[0].cells.counts, std::vector<std::uint8_t>(pieces[0].cells.ranges.size(), 0));
     everywhere.Find((1U << kOctants) - 1);
+    const std::vector<std::int32_t> surface_cells(2 * pieces[0].cells.ranges.size(), -1);
     const RayBox box =
         MakeRayBox(pieces[0].voxels, pieces[0].cells.counts, WholeBox(volume.block.box), WholeBox(volume.block.box), rays, c.setup.camera);
     const MarchWork work = {.rays = &rays,
@@ -347,6 +348,7 @@ TEST(Layers, AgreeWithTheReference) {
                             .look = &look,
                             .to_samples = &everywhere,
                             .to_surfaces = look.isovalues.empty() ? nullptr : &everywhere,
+                            .surface_cells = surface_cells.data(),
                             .layers = &layers};
     const PixelBounds all = {0, 0, c.setup.camera.width, c.setup.camera.height};
     const auto marched = [&](auto&& marcher) {

@@ -11,6 +11,7 @@
 #include "tests/worker/renderers/raycast/march_reference.h"
 #include "tests/worker/renderers/render_support.h"
 #include "worker/renderers/raycast/empty_distance.h"
+#include "worker/renderers/raycast/surface_cells.h"
 
 namespace slabstream {
 namespace {
@@ -28,7 +29,8 @@ struct Scene {
                          rate)),
         visible(look),
         to_samples(cells.counts, VisibleCells(cells, [&](float low, float high) { return visible.AnyMatterBetween(low, high); })),
-        to_surfaces(cells.counts, VisibleCells(cells, [&](float low, float high) { return visible.AnySurfaceBetween(low, high); })),
+        surface_cells(FindSurfaceCells(padded, cells, visible)),
+        to_surfaces(cells.counts, MacrocellsWithSurfaces(surface_cells)),
         ray_box(MakeRayBox(padded, cells.counts, WholeBox(box), WholeBox(box), rays, camera)) {
     to_samples.Find(OctantsOf(rays));
     to_surfaces.Find(OctantsOf(rays));
@@ -40,6 +42,7 @@ struct Scene {
             .look = &look,
             .to_samples = &to_samples,
             .to_surfaces = look.isovalues.empty() ? nullptr : &to_surfaces,
+            .surface_cells = surface_cells.data(),
             .termination = termination};
   }
 
@@ -49,7 +52,9 @@ struct Scene {
   MacrocellRanges cells;
   RayLook look;
   VisibleSamples visible;
-  EmptyDistances to_samples, to_surfaces;
+  EmptyDistances to_samples;
+  std::vector<std::int32_t> surface_cells;
+  EmptyDistances to_surfaces;
   RayBox ray_box;
 };
 
@@ -176,6 +181,44 @@ TEST(MarchTile, AgreesWithTheReferenceOnIsosurfaces) {
     });
   }
   EXPECT_GT(all_seen, 20000);
+}
+
+// Every cell of the padded voxels, of every type.
+TEST(FindSurfaceCells, FindsTheCellsWhoseCornersLieOnBothSides) {
+  Random random(89);
+  SCOPED_TRACE(random.trace());
+  std::mt19937 views(89);
+  int held = 0;
+  for (int i = 0; i < 12; ++i) {
+    RandomScene setup(i, random, views);
+    setup.options.transfer.isosurfaces = {{random.Real(1, 60), {1, 1, 1}, 1}, {random.Real(61, 120), {1, 1, 1}, 1}};
+    const Scene scene = setup.Make();
+    const PaddedVoxels& voxels = scene.padded;
+    const Index3 begin = voxels.box.begin - Uniform(1), end = voxels.box.end;  // cells, by their lowest corner
+    const auto value_at = [&](const Index3& voxel) {
+      return VisitScalarType(voxels.type, [&]<class T>(const T*) { return double(*reinterpret_cast<const T*>(voxels.At(voxel))); });
+    };
+    for (const float isovalue : scene.look.isovalues) ASSERT_TRUE(std::isfinite(isovalue));
+    for (Index3 cell = begin; cell.z < end.z; ++cell.z) {
+      for (cell.y = begin.y; cell.y < end.y; ++cell.y) {
+        for (cell.x = begin.x; cell.x < end.x; ++cell.x) {
+          bool holds = false;
+          for (const float isovalue : scene.look.isovalues) {
+            int above = 0;
+            for (int corner = 0; corner < 8; ++corner) {
+              above += value_at(cell + Index3{corner & 1, corner >> 1 & 1, corner >> 2}) >= double(isovalue) ? 1 : 0;
+            }
+            holds = holds || (above != 0 && above != 8);
+          }
+          const Index3 at = cell - begin, group = {at.x / kCellSide, at.y / kCellSide, at.z / kCellSide}, among = at - kCellSide * group;
+          const std::int32_t bits = scene.surface_cells[2 * NumberIn(scene.cells.counts, group) + std::size_t(among.z % 2)];
+          ASSERT_EQ((bits >> (16 * (among.z / 2) + 4 * among.y + among.x) & 1) != 0, holds) << "case " << i;
+          held += holds ? 1 : 0;
+        }
+      }
+    }
+  }
+  EXPECT_GT(held, 1000);
 }
 
 // Differences of neighbours that do not fit into 16 bits.
