@@ -416,11 +416,20 @@ class PageTest(unittest.TestCase):
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         box = viewer.js("(document.querySelector('.joint').scrollIntoView({block: 'center'}), (b => [b.left, b.top, b.width, b.height])(document.querySelector('.joint .region[data-index=\"0\"]').getBoundingClientRect()))")
         x, y = box[0] + box[2] / 2, box[1] + box[3] / 2
-        for kind, dx in (("mousePressed", 0), ("mouseMoved", -10), ("mouseMoved", -20), ("mouseReleased", -20)):
-            viewer.command("Input.dispatchMouseEvent", type=kind, x=x + dx, y=y, button="left", buttons=1, clickCount=1)
-        low, high = (drawn["options"]["transfer"][0]["Regions"][0]["Corners"][i] for i in (0, 2))
-        moved = viewer.final(f"{regions}[0].Corners[0] < {low}")["options"]["transfer"][0]["Regions"][0]["Corners"]
-        self.assertAlmostEqual(moved[2] - moved[0], high - low, places=3)
+        for kind, share in (("mousePressed", 0), ("mouseMoved", 0.5), ("mouseMoved", 1), ("mouseReleased", 1)):
+            viewer.command("Input.dispatchMouseEvent", type=kind, x=x - 20 * share, y=y - 8 * share, button="left", buttons=1, clickCount=1)
+        was = drawn["options"]["transfer"][0]["Regions"][0]["Corners"]
+        drawn = viewer.final(f"{regions}[0].Corners[0] < {was[0]} - 10 && {regions}[0].Corners[1] > {was[1]}")
+        moved = drawn["options"]["transfer"][0]["Regions"][0]["Corners"]
+        rises = [math.sqrt(now) - math.sqrt(before) for before, now in zip(was[1::2], moved[1::2])]  # the plot's axis shows roots
+        for i in range(4):
+            self.assertAlmostEqual(moved[2 * i] - was[2 * i], moved[0] - was[0], places=3)
+            self.assertAlmostEqual(rises[i], rises[0], places=2)
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.find("[aria-label='Softness of the region']").send_keys(Keys.CONTROL, "a", Keys.NULL, "0.75", Keys.ENTER)
+        soft = viewer.final(f"{regions}[0].Softness === 0.75")
+        self.assertEqual(soft["options"]["transfer"][0]["Regions"], [{**drawn["options"]["transfer"][0]["Regions"][0], "Softness": 0.75}, drawn["options"]["transfer"][0]["Regions"][1]])
+        self.assertSamePixels(viewer.pixels(), self.command_line(soft))
         # A double click on an edge inserts a corner, Delete removes it.
         edge = viewer.js("(b => [b.left + b.width / 3, b.bottom - 1])(document.querySelector('.joint .region[data-index=\"0\"]').getBoundingClientRect())")
         for clicks in (1, 2):
@@ -450,6 +459,12 @@ class PageTest(unittest.TestCase):
         self.assertEqual(other.final(f"{regions}?.length === 3")["options"], drawn["options"])
         viewer.focus()
         self.assertEqual(json.loads(copied)[0]["Regions"], drawn["options"]["transfer"][0]["Regions"])
+        viewer.command("Page.setDownloadBehavior", behavior="allow", downloadPath=str(self.programs.folder))
+        viewer.find("[aria-label='Save as a file']").click()
+        saved = self.programs.folder / "transfer.json"
+        wait_until(saved.exists, "saved")
+        self.assertEqual(json.loads(saved.read_text()), drawn["options"]["transfer"])
+        self.assertEqual(viewer.drawn()["options"], drawn["options"], "saving changes nothing")
         drop = "(() => { const d = new DataTransfer(); d.items.add(new File([arguments[0]], 'map.json')); document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"
         viewer.js(drop, '{"Name": "box", "Regions": [{"Values": [70, 200], "Slopes": [0, 90], "Color": [1, 0, 0]}]}')
         viewer.final(f"{regions}?.length === 1 && o.transfer[0].Name === 'box' && {regions}[0].Corners.join() === '70,0,200,0,200,90,70,90'")
