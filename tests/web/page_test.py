@@ -444,6 +444,7 @@ class PageTest(unittest.TestCase):
         viewer.js("(e => { e.value = '#00ff00'; e.dispatchEvent(new Event('input')); return true; })(document.querySelector('[aria-label=\"Colour of the region\"]'))")
         drawn = viewer.final(f"{regions}[2].Color.join() === '0,1,0'")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        self.assertEqual(viewer.js("new Set([...document.querySelectorAll('.joint ~ .button-row button')].map(b => b.offsetTop)).size"), 1, "the buttons stand in one row")
         viewer.save(SHOTS, "regions")
         for theme in ("dark", "light"):
             viewer.theme(theme)

@@ -43,7 +43,7 @@ export class RegionEditor {
   private readonly addCornerButton = iconButton("Add a corner", "add", () => this.addCorner(), "Insert");
   private readonly removeCornerButton = iconButton("Remove the corner", "remove", () => this.removeCorner(), "Delete");
   private readonly addButton = button("Add a region", "add", () => this.addRegion(), "quiet");
-  private readonly removeButton = button("Remove the region", "remove", () => this.removeRegion(), "quiet");
+  private readonly removeButton = button("Remove region", "remove", () => this.removeRegion(), "quiet");
   private readonly hint = h("p", { class: "hint" });
   private selected: Selected = { region: 0, corner: 0, whole: true };
   private grabbed: { at: readonly [number, number]; corners: readonly Corner[] } | null = null; // where a drag of a region began
