@@ -70,7 +70,6 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   look.shininess = shading.shininess;
   const bool whole = shading.shininess <= 128 && shading.shininess == std::floor(shading.shininess);
   look.whole_shininess = whole ? int(shading.shininess) : 0;
-  look.diffuse_without_gradient = phong.WithoutGradient().diffuse;
   return look;
 }
 

@@ -44,8 +44,7 @@ struct RayLook {
   Float3 inverse_spacing{}, viewer{};  // towards the viewer, divided like the lights
   std::vector<Light> lights;
   float ambient = 0, diffuse = 1, specular = 0, shininess = 1;
-  int whole_shininess = 0;             // shininess if it is a whole number up to 128, otherwise 0
-  float diffuse_without_gradient = 1;  // independent of light directions: see Phong::WithoutGradient
+  int whole_shininess = 0;  // shininess if it is a whole number up to 128, otherwise 0
 };
 
 // `steps_per_voxel`: samples in a voxel length along a ray.

@@ -345,7 +345,7 @@ class ReferenceMarch {
     double square = 0;
     for (std::size_t i = 0; i < 3; ++i) square += std::pow(gradient[i] * double(look_.inverse_spacing[i]), 2);
     if (!(square > 0) || !std::isfinite(square)) {
-      diffuse = double(look_.diffuse_without_gradient);
+      diffuse = double(look_.ambient) + double(look_.diffuse) * 0.5 * double(look_.lights.size());  // Phong::WithoutGradient
       return;
     }
     const double per_length = 1 / std::sqrt(square), n_v = dot(look_.viewer) * per_length;
