@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "client/cli/input_volume.h"
+#include "client/cli/progress_display.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 #include "data/positional/slice_stream.h"
