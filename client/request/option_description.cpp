@@ -51,10 +51,12 @@ Json DescribeRenderers() {
   return renderers;
 }
 
-Json DescribePresets() {
-  Json presets = Json::array();
-  for (const TransferPreset& preset : TransferPresets()) presets.push_back(preset.name);
-  return presets;
+void DescribePresets(Json& option) {
+  option["presets"] = option["region_presets"] = Json::array();
+  for (const TransferPreset& preset : TransferPresets()) {
+    option["presets"].push_back(preset.name);
+    if (preset.has_regions) option["region_presets"].push_back(preset.name);
+  }
 }
 
 Json DescribeWindows() {
@@ -91,7 +93,7 @@ Json Describe(CLI::Option& option) {
       json["renderers"] = DescribeRenderers();
       json["automatic"] = {{"volumes", DefaultRenderer(false).name()}, {"grids", DefaultRenderer(true).name()}};
     }
-    if (option.get_type_name() == "TRANSFER") json["presets"] = DescribePresets();
+    if (option.get_type_name() == "TRANSFER") DescribePresets(json);
   }
   if (NameOf(option) == "window") json["windows"] = DescribeWindows();
   json["help"] = option.get_description();

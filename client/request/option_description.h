@@ -15,8 +15,8 @@ namespace slabstream {
 // above, max, repeatable, required, excludes, needs. Fields of a request also have their path in it, and where they apply: unit, ability
 // (that a renderer needs), same_picture (it never changes). The option renderer also tells what each of them is called and can do:
 // renderers, a list of {name, title, purpose, abilities, parameters: {name: default}}; and which of them auto means: automatic, {volumes,
-// grids}. Options that take a transfer function tell the names of its presets: presets. The option window tells its named ones: windows, a
-// list of {name, width, level}.
+// grids}. Options that take a transfer function tell the names of its presets: presets, and of those that have regions: region_presets. The
+// option window tells its named ones: windows, a list of {name, width, level}.
 nlohmann::ordered_json DescribeOptions(CLI::App& command);
 
 }  // namespace slabstream

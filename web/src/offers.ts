@@ -1,7 +1,7 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
 
 export interface Offer {
-  name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
+  name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; region_presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
   automatic?: { volumes: string; grids: string }; // renderers
 }
 export interface NamedWindow { name: string; width: number; level: number }
@@ -41,7 +41,7 @@ export const presetChoices = (): (readonly [string, string])[] =>
   (offers.get("transfer")?.presets ?? ["auto"]).filter(name => name !== "none").map(name => [name, words(name)] as const);
 
 // Whether a preset has regions of values and slopes.
-export const hasRegions = (preset: string): boolean => preset.endsWith("-2d");
+export const hasRegions = (preset: string): boolean => offers.get("transfer")?.region_presets?.includes(preset) ?? false;
 
 // Windows of CT, in Hounsfield units.
 export const namedWindows = (): readonly NamedWindow[] => offers.get("window")?.windows ?? [];

@@ -92,6 +92,7 @@ TEST(Presets, AreValidForEveryHistogram) {
       ASSERT_TRUE(transfer.ok());
       EXPECT_TRUE(Validate(*transfer).ok()) << info.name << ": " << Validate(*transfer).message();
       EXPECT_EQ(*transfer, *MakePreset(info.name, summary));
+      EXPECT_EQ(!transfer->regions.empty(), info.has_regions) << info.name;
     }
   }
 }
