@@ -93,7 +93,7 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
   } else if constexpr (std::is_same_v<T, bool>) {
     option.standard.clear();  // a flag: it is there or not
     return option;
-  } else if constexpr (std::is_arithmetic_v<T>) {
+  } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::optional<float>>) {
     option.range = NumberRange{about.least(), about.most(), about.above_least()};
     option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
   }
@@ -209,6 +209,7 @@ struct OptionReader {
     Take(value, ParseNumber(shown, text, *option.range));
   }
   void Read(const std::string& text, float& value) { Take(value, ParseNumber(shown, text, *option.range)); }
+  void Read(const std::string& text, std::optional<float>& value) { Read(text, value.emplace()); }
   void Read(const std::string& text, int& value) {
     if (IsLeft(text)) return void(value = 0);
     Take(value, ParseInteger(shown, text, int(option.range->min), int(option.range->max)));
@@ -289,8 +290,8 @@ std::vector<std::string> Texts(const RequestOption& option, const Field& field, 
     for (const auto& item : value) texts.push_back(TextOf(item));
     return texts;
   } else if constexpr (requires { value.has_value(); }) {
-    if constexpr (requires { TextOf(*value); }) {
-      return value ? std::vector<std::string>{TextOf(*value)} : std::vector<std::string>{};
+    if constexpr (requires { Text(*value); }) {
+      return value ? std::vector<std::string>{Text(*value)} : std::vector<std::string>{};
     } else {
       return {};
     }

@@ -72,7 +72,7 @@ struct TransferFunction {
   double opacity_distance = 1;                                // voxel lengths, (0, kMaxOpacityDistance]
   std::vector<Isosurface> isosurfaces = {};                   // at most kMaxIsosurfaces, their values ascend
   std::vector<GradientOpacityPoint> gradient_opacities = {};  // at most kMaxTransferPoints; empty: the factor is 1
-  std::optional<Material> material = {};                      // none: that of the request (OnMaterial)
+  std::optional<Material> material = {};                      // none: the standard one; Shading may replace its numbers
   std::vector<TransferRegion> regions = {};                   // at most kMaxTransferRegions
 
   // By the curves; value finite.

@@ -64,7 +64,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   }
   if (Status status = CheckView(view, geometry); !status.ok()) return status;
   if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
-  setup.shading = OnMaterial(request.shading, setup.transfer.material.value_or(Material()));
+  setup.shading = setup.transfer.material ? OnMaterial(request.shading, *setup.transfer.material) : request.shading;
   setup.transfer.material.reset();  // workers find it in the shading
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
   if (setup.shading.shadows > 0 && setup.shading.lights.empty()) setup.shading.lights = {Normalized(BesideViewer(setup.camera))};

@@ -29,7 +29,8 @@ class Phong {
   const std::vector<Vec3>& lights() const { return lights_; }  // unit directions towards them; the headlight if none was given
 
  private:
-  Shading shading_;
+  ShadingModel model_;
+  Material material_;
   std::vector<Vec3> lights_;  // unit
   Vec3 to_viewer_;            // unit
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -27,23 +28,28 @@ struct Shading {
   ShadingModel model = ShadingModel::kPhong;
   std::vector<Vec3> lights;  // directions towards the lights, not zero; of a request in the world, of a FrameSetup along the voxels' axes;
                              // empty: a headlight
-  // As of a Material, and with the same limits.
-  float ambient = Material().ambient, diffuse = Material().diffuse, specular = Material().specular, shininess = Material().shininess;
+  // In place of the numbers of a material (On), and with their limits.
+  std::optional<float> ambient, diffuse, specular, shininess;
   // From the light volume (worker/light): how strong shadows are, and ambient occlusion by matter nearer than a radius. 0: none.
   float shadows = 0, ambient_occlusion = 0;  // [0, 1]
   float occlusion_radius = 0.1F;             // [0.01, 1], of the longest side of the volume
   bool needs_light_volume() const { return shadows > 0 || ambient_occlusion > 0; }
+  // The material with the numbers that stand here in place of its own: in a request on that of the transfer function, in a FrameSetup on
+  // the standard one.
+  Material On(const Material& material = {}) const {
+    return {ambient.value_or(material.ambient), diffuse.value_or(material.diffuse), specular.value_or(material.specular),
+            shininess.value_or(material.shininess)};
+  }
   friend bool operator==(const Shading&, const Shading&) = default;
 };
 
-// The shading of a request, on a transfer function's material. A number that the request changed from the standard one stays.
+// Has all numbers of shading.On(material).
 inline Shading OnMaterial(Shading shading, const Material& material) {
-  constexpr Material kStandard;
-  const auto take = [](float& number, float standard, float of_material) { number = number == standard ? of_material : number; };
-  take(shading.ambient, kStandard.ambient, material.ambient);
-  take(shading.diffuse, kStandard.diffuse, material.diffuse);
-  take(shading.specular, kStandard.specular, material.specular);
-  take(shading.shininess, kStandard.shininess, material.shininess);
+  const auto [ambient, diffuse, specular, shininess] = shading.On(material);
+  shading.ambient = ambient;
+  shading.diffuse = diffuse;
+  shading.specular = specular;
+  shading.shininess = shininess;
   return shading;
 }
 

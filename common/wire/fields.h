@@ -21,6 +21,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -102,6 +103,11 @@ class Writer {
   template <class Inner>
   void Optional(std::string_view, const auto& value, bool (P::*)() const, const Inner& (P::*)() const, Inner* (P::*edit)()) {
     if (value) Write(*value, *(out_.*edit)());
+  }
+  // An optional number.
+  template <class T>
+  void Optional(std::string_view, const std::optional<T>& value, bool (P::*)() const, T (P::*)() const, void (P::*set)(T)) {
+    if (value) (out_.*set)(*value);
   }
   template <class Struct, class Inner>
   void Messages(std::string_view, const std::vector<Struct>& items, const RepeatedMessage<Inner>& (P::*)() const,
@@ -215,6 +221,10 @@ class Reader {
   template <class Inner>
   void Optional(std::string_view field, auto& value, bool (P::*has)() const, const Inner& (P::*get)() const, Inner* (P::*edit)()) {
     if ((in_.*has)()) Message(field, value.emplace(), get, edit);
+  }
+  template <class T>
+  void Optional(std::string_view field, std::optional<T>& value, bool (P::*has)() const, T (P::*get)() const, void (P::*)(T)) {
+    if ((in_.*has)()) value = check_.Finite(field, (in_.*get)());
   }
   // At most `max` items.
   template <class Struct, class Inner>

@@ -193,10 +193,10 @@ void Fields(auto& io, Is<Shading> auto& m) {
   using P = v1::Shading;
   io.OneOf("model", m.model, &P::model, &P::set_model, ShadingModel::kPhong, ShadingModel::kDepthGradient);
   io.Messages("lights", m.lights, &P::lights, &P::mutable_lights, kMaxLights);
-  io.Finite("ambient", m.ambient, &P::ambient, &P::set_ambient);
-  io.Finite("diffuse", m.diffuse, &P::diffuse, &P::set_diffuse);
-  io.Finite("specular", m.specular, &P::specular, &P::set_specular);
-  io.Finite("shininess", m.shininess, &P::shininess, &P::set_shininess);
+  io.Optional("ambient", m.ambient, &P::has_ambient, &P::ambient, &P::set_ambient);
+  io.Optional("diffuse", m.diffuse, &P::has_diffuse, &P::diffuse, &P::set_diffuse);
+  io.Optional("specular", m.specular, &P::has_specular, &P::specular, &P::set_specular);
+  io.Optional("shininess", m.shininess, &P::has_shininess, &P::shininess, &P::set_shininess);
   io.Finite("shadows", m.shadows, &P::shadows, &P::set_shadows);
   io.Finite("ambient_occlusion", m.ambient_occlusion, &P::ambient_occlusion, &P::set_ambient_occlusion);
   io.Finite("occlusion_radius", m.occlusion_radius, &P::occlusion_radius, &P::set_occlusion_radius);

@@ -66,7 +66,7 @@ class SchemaCheck {
       const std::string& ability = chosen->options().GetExtension(v1::value_ability);
       if (!ability.empty()) Require(ability, fmt::format("{} '{}'", AboutOf(field).name(), WordOf(*chosen)));
     } else if constexpr (requires { value.has_value(); }) {
-      if (value.has_value()) Given(field), Members(*value, limits);
+      if (value.has_value()) Given(field), Member(field, *value, most, limits);
     } else if constexpr (requires { value.index(); }) {
       if (const auto* name = std::get_if<std::string>(&value)) {
         Text(*name, 1, kMaxNameBytes);

@@ -173,6 +173,11 @@ class HttpTest(WithService):
         self.assertEqual(status, 200)
         self.assertIn("--transfer color-map.json", command["command"])
         self.assertIn("RGBPoints", command["files"]["color-map.json"])
+        # A number that is said replaces that of the map's material, even if it is the standard one.
+        shiny = [{**color_map[0], "Material": {"ambient": 0.7}}]
+        pixels = lambda **said: png_pixels(self.gateway.request("/api/v1/render.png", method="POST", body=json.dumps({"dataset": "a", "size": 32, "transfer": shiny, **said}))[2])
+        self.assertNotEqual(pixels(), png_pixels(file))
+        self.assertEqual(pixels(ambient=0.2), png_pixels(file))
 
     def test_the_command_makes_the_picture(self):
         options = {"dataset": "a", "azimuth": 33, "size": "32x24", "title": "it's", "clip-box": "-3:3,:,:"}

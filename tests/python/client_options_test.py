@@ -38,6 +38,7 @@ update = load_update()
 # A colour map as ParaView writes it, and the same as Python's own.
 COLOR_MAP = [{"Name": "mine", "RGBPoints": [0, 0, 0, 0.5, 100, 1, 0.5, 0, 255, 1, 1, 1], "Points": [30, 0, 0.5, 0, 200, 0.4, 0.3, 0.5]}]
 FUNCTION = ss.TransferFunction(colors=[(0, (0, 0, 0.5)), (100, (1, 0.5, 0)), (255, (1, 1, 1))], opacities=[(30, 0), (200, 0.4, 0.3, 0.5)])
+SHINY = [{**COLOR_MAP[0], "Material": {"ambient": 0.6, "diffuse": 0.3, "specular": 0.9, "shininess": 60}}]
 REGIONS = [{"Regions": [{"Values": [90, 300], "Slopes": [0, 200], "Color": [1, 0.5, 0], "Opacity": 0.3, "Softness": 0.5},
                         {"Corners": [10, 5, 200, 5, 100, 90], "Color": [0, 0.5, 1]}]}]
 OF_REGIONS = ss.TransferFunction(regions=[ss.Region.box((90, 300), (0, 200), (1, 0.5, 0), opacity=0.3, softness=0.5),
@@ -90,6 +91,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      ["--renderer", "mip", "--interpolation", "nearest", "--projection-mode", "mean", "--sampling-rate", "2"]),
     ({"transfer": COLOR_MAP, "opacity_distance": 3.5}, ["--transfer", "map.json", "--opacity-distance", "3.5"]),
     ({"transfer": FUNCTION}, ["--transfer", "map.json"]),
+    ({"transfer": SHINY, "ambient": 0.2, "shininess": 20}, ["--transfer", "shiny.json", "--ambient", "0.2", "--shininess", "20"]),
     ({"renderer": "raycast", "sampling_rate": 0.5, "jitter": 0.8}, [*RAYCAST, "--sampling-rate", "0.5", "--jitter", "0.8"]),
     ({"renderer": "raycast", "transfer": OF_REGIONS}, [*RAYCAST, "--transfer", "regions.json"]),
     ({"renderer": "raycast", "transfer": REGIONS, "opacity_distance": 2}, [*RAYCAST, "--transfer", "regions.json", "--opacity-distance", "2"]),
@@ -187,6 +189,7 @@ class Pixels(WithAService):
             done = cls.running.run(*map(str, arguments))
             assert done.returncode == 0, done.stderr
         (cls.folder / "map.json").write_text(json.dumps(COLOR_MAP))
+        (cls.folder / "shiny.json").write_text(json.dumps(SHINY))
         (cls.folder / "regions.json").write_text(json.dumps(REGIONS))
         (cls.folder / "camera.json").write_text(json.dumps(CAMERA))
         cls.service = ss.connect(endpoint=cls.running.endpoint)
@@ -234,6 +237,12 @@ class Pixels(WithAService):
                         without = shown(dataset, {other: value for other, value in python.items() if other != name})
                         changes = changes or differ(without, shown(dataset, python))
                 self.assertEqual(changes, not option.same_picture)
+
+    def test_numbers_of_a_material_are_replaced_by_those_of_the_call(self) -> None:
+        plain, shiny = (self.service.render("head", size=48, transfer=transfer).rgba for transfer in (COLOR_MAP, SHINY))
+        self.assertGreater(np.abs(plain - shiny).max(), 0.1)
+        said = self.service.render("head", size=48, transfer=SHINY, ambient=0.2, diffuse=0.8, specular=0.2, shininess=20).rgba
+        np.testing.assert_array_equal(said, plain)
 
     def test_slice_makes_the_command_lines_pixels(self) -> None:
         self.compare("slice", SLICE_CASES)

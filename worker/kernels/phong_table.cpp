@@ -43,12 +43,12 @@ namespace slabstream::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 // `lights`: unit; factors: kPaddedCodes of them.
-void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3& to_viewer, PhongFactors* factors) {
+void FillTable(const Material& material, std::span<const Vec3> lights, const Vec3& to_viewer, PhongFactors* factors) {
   const hn::CappedTag<float, 16> d;
   const CodedNormals& normals = AllNormals();
   // Most normals are far from a highlight: factors less than 1e-9 of its peak count as zero and are not computed.
-  const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / shading.shininess), 1e-30)));
-  const auto shininess = hn::Set(d, shading.shininess);
+  const auto zero = hn::Zero(d), least = hn::Set(d, float(std::max(std::exp(std::log(1e-9) / material.shininess), 1e-30)));
+  const auto shininess = hn::Set(d, material.shininess);
   for (std::size_t i = 0; i < kPaddedCodes; i += hn::Lanes(d)) {
     const auto x = hn::Load(d, &normals[0][i]), y = hn::Load(d, &normals[1][i]), z = hn::Load(d, &normals[2][i]);
     // Not fused: a high power would show the difference between instruction sets.
@@ -66,8 +66,8 @@ void FillTable(const Shading& shading, std::span<const Vec3> lights, const Vec3&
       const auto power = hn::Exp(d, hn::Mul(shininess, hn::Log(d, hn::Min(hn::Max(reflected, least), hn::Set(d, 1.0F)))));
       specular = hn::Add(specular, hn::IfThenElse(shines, power, zero));
     }
-    hn::StoreInterleaved2(hn::MulAdd(diffuse, hn::Set(d, shading.diffuse), hn::Set(d, shading.ambient)),
-                          hn::Mul(specular, hn::Set(d, shading.specular)), d, &factors[i].diffuse);
+    hn::StoreInterleaved2(hn::MulAdd(diffuse, hn::Set(d, material.diffuse), hn::Set(d, material.ambient)),
+                          hn::Mul(specular, hn::Set(d, material.specular)), d, &factors[i].diffuse);
   }
 }
 
@@ -82,7 +82,7 @@ std::vector<PhongFactors> PhongTable(const Shading& shading, const Vec3& view_di
   static_assert(sizeof(PhongFactors) == 2 * sizeof(float));
   const Phong phong(shading, view_direction);
   std::vector<PhongFactors> factors(kPaddedCodes + 1);
-  if (shading.model != ShadingModel::kNone) HWY_DYNAMIC_DISPATCH(FillTable)(shading, phong.lights(), -view_direction, factors.data());
+  if (shading.model != ShadingModel::kNone) HWY_DYNAMIC_DISPATCH(FillTable)(shading.On(), phong.lights(), -view_direction, factors.data());
   factors.resize(kNormalCodes);
   factors[kNoGradient] = phong.WithoutGradient();
   return factors;

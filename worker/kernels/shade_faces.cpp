@@ -301,12 +301,13 @@ FaceShading MakeFaceShading(const Camera& camera, const Shading& shading, const 
     Copy(light, out.light[out.light_count]);
     out.light_to_viewer[out.light_count++] = float(Dot(light, to_viewer));
   }
-  out.ambient = shading.ambient;
-  out.diffuse = shading.diffuse;
-  out.specular = shading.specular;
-  out.shininess = shading.shininess;
+  const auto [ambient, diffuse, specular, shininess] = shading.On();
+  out.ambient = ambient;
+  out.diffuse = diffuse;
+  out.specular = specular;
+  out.shininess = shininess;
   // |N.L| is 1/2 on average over all directions of N.
-  if (out.phong) out.diffuse_without_normal = shading.ambient + shading.diffuse * 0.5F * float(out.light_count);
+  if (out.phong) out.diffuse_without_normal = ambient + diffuse * 0.5F * float(out.light_count);
   out.bricks_x = std::uint32_t(volume_size.x + kFaceBrick - 1) / kFaceBrick;
   out.bricks_y = std::uint32_t(volume_size.y + kFaceBrick - 1) / kFaceBrick;
   return out;

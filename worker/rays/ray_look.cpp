@@ -64,12 +64,13 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   look.inverse_spacing = Divided({1, 1, 1}, spacing);
   look.viewer = Divided(to_viewer, spacing);
   for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, spacing), float(Dot(light, to_viewer))});
-  look.ambient = shading.ambient;
-  look.diffuse = shading.diffuse;
-  look.specular = shading.specular;
-  look.shininess = shading.shininess;
-  const bool whole = shading.shininess <= 128 && shading.shininess == std::floor(shading.shininess);
-  look.whole_shininess = whole ? int(shading.shininess) : 0;
+  const auto [ambient, diffuse, specular, shininess] = shading.On();
+  look.ambient = ambient;
+  look.diffuse = diffuse;
+  look.specular = specular;
+  look.shininess = shininess;
+  const bool whole = shininess <= 128 && shininess == std::floor(shininess);
+  look.whole_shininess = whole ? int(shininess) : 0;
   return look;
 }
 

@@ -31,7 +31,8 @@ FrameRequest Standard() {
   return request;
 }
 
-// A value of each option that is not its standard one, with the options that it needs.
+// A value of each option that is not its standard one, with the options that it needs. Numbers of a material count even if they are those
+// of the standard material: they replace those of the transfer function's.
 const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"size", {"30x20", {}}},
     {"projection", {"perspective", {}}},
@@ -57,7 +58,7 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"gradient-opacity", {"0:0.5,3:1", {{"renderer", "raycast"}}}},
     {"shading", {"none", {}}},
     {"light", {"0,0,1", {}}},
-    {"ambient", {"0.5", {}}},
+    {"ambient", {"0.2", {}}},
     {"diffuse", {"0.25", {}}},
     {"specular", {"0.75", {}}},
     {"shininess", {"3", {}}},

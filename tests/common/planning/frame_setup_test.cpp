@@ -69,8 +69,10 @@ TEST(PlanFrame, TheMaterialOfATransferFunctionIsLit) {
   const FrameSetup setup = SetupOf(request, summary);
   EXPECT_EQ(setup.shading, (Shading{.ambient = 0.5F, .diffuse = 0.25F, .specular = 0.75F, .shininess = 80}));
   EXPECT_EQ(setup.transfer, plain.transfer) << "nothing is classified anew";
-  request.shading.specular = 0.125F;  // what a request says itself
-  EXPECT_EQ(SetupOf(request, summary).shading, (Shading{.ambient = 0.5F, .diffuse = 0.25F, .specular = 0.125F, .shininess = 80}));
+  // What a request says itself counts, even if it is the standard number.
+  request.shading.ambient = Material().ambient;
+  request.shading.specular = 0.125F;
+  EXPECT_EQ(SetupOf(request, summary).shading, (Shading{.ambient = 0.2F, .diffuse = 0.25F, .specular = 0.125F, .shininess = 80}));
 }
 
 // Splatting renders a grid along the slices and the display worker makes the picture of it; the Z-buffer renders the supersampled picture.

@@ -144,7 +144,7 @@ HWY_EXPORT(LightAll);
 OctetLight::OctetLight(const Shading& shading, const Vec3& view_direction, const FrameLight& light) : view(light.Seen()) {
   const std::vector<Vec3> lights = Phong(shading, view_direction).lights();
   const bool lit = shading.model != ShadingModel::kNone;
-  if (lit) ambient = shading.ambient;
+  if (lit) ambient = shading.On().ambient;
   if (lights.size() == 1) return;
   for (const Vec3& direction : lights) {
     Shading alone = shading;

@@ -56,10 +56,10 @@ CutFaces::CutFaces(BoxData& data, const FrameSetup& setup, const Box& box, const
       alone.lights = {light};
       const PhongFactors factors = Phong(alone, camera.view_direction).AtNormal(normal);
       const float each = 1 / float(phong.lights().size());
-      of_each_light_.push_back(lit ? PhongFactors{factors.diffuse - setup.shading.ambient, factors.specular} : PhongFactors{each, 0});
+      of_each_light_.push_back(lit ? PhongFactors{factors.diffuse - setup.shading.On().ambient, factors.specular} : PhongFactors{each, 0});
     }
   }
-  if (lit) ambient_ = setup.shading.ambient;
+  if (lit) ambient_ = setup.shading.On().ambient;
 }
 
 bool CutFaces::IsWhole(const Box& part) const { return region_.KeepsAll(part, margin_); }
