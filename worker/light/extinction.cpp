@@ -1,17 +1,104 @@
 #include "worker/light/extinction.h"
 
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/light/extinction.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <optional>
+#include <vector>
 
+#include "common/base/aligned_buffer.h"
 #include "common/classification/region_table.h"
 #include "common/renderers/renderer_kind.h"
 
+#ifndef SLABSTREAM_WORKER_LIGHT_EXTINCTION_CPP_  // shared by all instruction sets
+#define SLABSTREAM_WORKER_LIGHT_EXTINCTION_CPP_
+namespace slabstream {
+
+inline constexpr std::int32_t kRowMargin = 16;  // floats before and behind a row: its neighbours, and what whole registers touch
+
+// A row of samples and its neighbours along y and z; where there is none, the row itself. Its neighbours along x are its own samples,
+// and the first and the last one repeat beyond the ends.
+struct SampleRow {
+  const float* at = nullptr;
+  std::array<const float*, 4> beside{};  // before and behind along y, before and behind along z
+};
+
+// The extinction of stored samples, by place: between two bins of the classification table it is linear, and there are several places from
+// bin to bin.
+struct ExtinctionTable {
+  float scale = 1, offset = 0, last = 0;  // the place of a sample s: clamp(s * scale + offset, 0, last), cut to a whole number
+  std::int32_t first = 0;                 // nothing before this place takes any light
+  std::vector<double> each, before;       // extinction, and its integral from the first place to this one
+};
+
+}  // namespace slabstream
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace slabstream::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// The mean extinction around each of `count` samples: of values from it halfway to its least neighbour, and halfway to its greatest one.
+// 0 where a sample is not finite. `out` has room for kRowMargin more.
+void ExtinctionOfRow(const ExtinctionTable& table, const SampleRow& row, std::int32_t count, float* out) {
+  const hn::CappedTag<double, 8> dd;
+  const hn::RebindToSigned<decltype(dd)> dl;
+  const hn::Rebind<float, decltype(dd)> df;
+  const hn::Rebind<std::int32_t, decltype(dd)> di;
+  const auto place_of = [&](auto sample) HWY_ATTR {
+    const auto place = hn::Add(hn::Mul(sample, hn::Set(df, table.scale)), hn::Set(df, table.offset));
+    return hn::ConvertTo(di, hn::Min(hn::Max(place, hn::Zero(df)), hn::Set(df, table.last)));
+  };
+  for (std::int32_t x = 0; x < count; x += std::int32_t(hn::Lanes(dd))) {
+    auto value = hn::LoadU(df, row.at + x);
+    const auto finite = hn::Le(hn::Abs(value), hn::Set(df, std::numeric_limits<float>::max()));
+    value = hn::IfThenElseZero(finite, value);
+    auto least = value, greatest = value;
+    for (const float* const neighbour :
+         {row.at + x - 1, row.at + x + 1, row.beside[0] + x, row.beside[1] + x, row.beside[2] + x, row.beside[3] + x}) {
+      const auto near = hn::LoadU(df, neighbour);
+      least = hn::IfThenElse(hn::Lt(near, least), near, least);  // not if `near` is NaN
+      greatest = hn::IfThenElse(hn::Gt(near, greatest), near, greatest);
+    }
+    const auto half = hn::Set(df, 0.5F);
+    const auto high = place_of(hn::Mul(hn::Add(value, greatest), half));
+    if (hn::AllTrue(di, hn::Lt(high, hn::Set(di, table.first)))) {  // air, most of many volumes
+      hn::StoreU(hn::Zero(df), df, out + x);
+      continue;
+    }
+    const auto low = place_of(hn::Mul(hn::Add(value, least), half)), middle = place_of(value);
+    const auto gathered = [&](const std::vector<double>& from, auto place)
+                              HWY_ATTR { return hn::GatherIndex(dd, from.data(), hn::PromoteTo(dl, place)); };
+    const auto at_middle = gathered(table.each, middle), before_middle = gathered(table.before, middle);
+    const auto mean = [&](auto integral, auto places) HWY_ATTR {
+      const auto length = hn::PromoteTo(dd, places);
+      return hn::IfThenElse(hn::Eq(length, hn::Zero(dd)), at_middle,
+                            hn::Div(hn::Max(integral, hn::Zero(dd)), hn::Max(length, hn::Set(dd, 1))));
+    };
+    const auto below = mean(hn::Sub(before_middle, gathered(table.before, low)), hn::Sub(middle, low));
+    const auto above = mean(hn::Sub(gathered(table.before, high), before_middle), hn::Sub(high, middle));
+    const auto sum = hn::DemoteTo(df, hn::Mul(hn::Add(below, above), hn::Set(dd, 0.5)));
+    hn::StoreU(hn::IfThenElseZero(finite, sum), df, out + x);
+  }
+}
+
+}  // namespace slabstream::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace slabstream {
 namespace {
+
+HWY_EXPORT(ExtinctionOfRow);
 
 constexpr double kMostOpacity = 0.999;  // of a voxel length, or of a surface: more is not seen in a shadow
 
@@ -20,43 +107,29 @@ double ExtinctionOfOpacity(double opacity, double opacity_distance) {
   return std::min(of_length, -std::log1p(-kMostOpacity));
 }
 
-// The extinction of stored samples, and its mean over ranges of them. Between two bins of the classification table it is linear; it is
-// looked up at several places from bin to bin.
-class ValueExtinction {
- public:
-  // The extinction of a voxel length times `per_voxel_length`.
-  ValueExtinction(const ClassificationTable& table, double per_voxel_length) {
-    constexpr int kPlaces = 8192;
-    const int fine = std::max(2, kPlaces / table.size());  // even: halfway between two stored integers lies a place
-    scale_ = float(table.bin_from_stored_scale * fine);
-    offset_ = float(0.5 - table.stored_origin * table.bin_from_stored_scale * fine);
-    std::vector<double> bins;
-    for (const float opacity : table.opacity) {
-      bins.push_back(ExtinctionOfOpacity(double(opacity), table.opacity_distance) * per_voxel_length);
-    }
-    const auto last = (bins.size() - 1) * std::size_t(fine);
-    last_ = float(last);
-    for (std::size_t place = 0; place <= last; ++place) {
-      const std::size_t below = place / std::size_t(fine), above = std::min(below + 1, bins.size() - 1);
-      const double t = double(place % std::size_t(fine)) / fine;
-      each_.push_back(bins[below] + t * (bins[above] - bins[below]));
-      before_.push_back(place == 0 ? 0 : before_.back() + (each_[place - 1] + each_[place]) / 2);
-    }
+// The extinction of a voxel length times `per_voxel_length`.
+ExtinctionTable MakeExtinctionTable(const ClassificationTable& table, double per_voxel_length) {
+  constexpr int kPlaces = 8192;
+  const int fine = std::max(2, kPlaces / table.size());  // even: halfway between two stored integers lies a place
+  std::vector<double> bins;
+  for (const float opacity : table.opacity) {
+    bins.push_back(ExtinctionOfOpacity(double(opacity), table.opacity_distance) * per_voxel_length);
   }
-
-  std::size_t PlaceOf(float stored) const { return std::size_t(std::clamp(stored * scale_ + offset_, 0.0F, last_)); }
-  double At(std::size_t place) const { return each_[place]; }
-  // from <= to
-  double MeanBetween(std::size_t from, std::size_t to) const {
-    if (from == to) return each_[from];
-    const double integral = before_[to] - before_[from];
-    return integral > 0 ? integral / double(to - from) : 0;
+  const auto last = (bins.size() - 1) * std::size_t(fine);
+  ExtinctionTable made{.scale = float(table.bin_from_stored_scale * fine),
+                       .offset = float(0.5 - table.stored_origin * table.bin_from_stored_scale * fine),
+                       .last = float(last),
+                       .each = {},
+                       .before = {}};
+  for (std::size_t place = 0; place <= last; ++place) {
+    const std::size_t below = place / std::size_t(fine), above = std::min(below + 1, bins.size() - 1);
+    const double t = double(place % std::size_t(fine)) / fine;
+    made.each.push_back(bins[below] + t * (bins[above] - bins[below]));
+    made.before.push_back(place == 0 ? 0 : made.before.back() + (made.each[place - 1] + made.each[place]) / 2);
   }
-
- private:
-  float scale_ = 1, offset_ = 0, last_ = 0;
-  std::vector<double> each_, before_;  // by place: extinction, and its integral from the first place to this one
-};
+  made.first = std::int32_t(std::ranges::find_if(made.each, [](double each) { return each > 0; }) - made.each.begin());
+  return made;
+}
 
 // The extinction by the regions of a transfer function, of values between two others at one slope.
 class RegionExtinction {
@@ -68,14 +141,27 @@ class RegionExtinction {
   }
 
   // Simpson's rule from low over value to high.
-  double Mean(float low, float value, float high, float slope) const {
-    return (double(At(low, slope)) + 4 * double(At(value, slope)) + double(At(high, slope))) / 6;
+  float Mean(float low, float value, float high, float slope) const {
+    return float((double(At(low, slope)) + 4 * double(At(value, slope)) + double(At(high, slope))) / 6);
   }
 
  private:
   float At(float stored, float slope) const { return table_.At(stored, slope)[3]; }
 
   RegionTable table_;
+};
+
+// A sample of a row, and halfway from it to the least and to the greatest of its neighbours.
+struct NearbyValues {
+  NearbyValues(const SampleRow& row, std::int32_t x) : value(row.at[x]), low(value), high(value) {
+    for (const float near : {row.at[x - 1], row.at[x + 1], row.beside[0][x], row.beside[1][x], row.beside[2][x], row.beside[3][x]}) {
+      if (near < low) low = near;
+      if (near > high) high = near;
+    }
+    low = (value + low) / 2;
+    high = (value + high) / 2;
+  }
+  float value, low, high;
 };
 
 struct SurfaceExtinction {
@@ -113,7 +199,7 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
   const VolumeGeometry& frame = setup.description.geometry;
   const Index3& size = light.size;
   const ClassificationTable table = setup.renderer->Table(setup.transfer, setup.description, setup.range);
-  const ValueExtinction of_values(table, 1 / Least(frame.spacing));
+  const ExtinctionTable of_values = MakeExtinctionTable(table, 1 / Least(frame.spacing));
   std::optional<RegionExtinction> of_regions;
   if (!setup.transfer.regions.empty()) of_regions.emplace(setup, table, 1 / Least(frame.spacing));
   std::vector<SurfaceExtinction> surfaces;
@@ -124,48 +210,53 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
   }
   // The square of a slope: squares of differences of two voxels' values, times these.
   const auto squared = [](double spacing) { return 0.25 / (spacing * spacing); };
-  const double per_x = squared(light.spacing.x), per_y = squared(light.spacing.y), per_z = squared(light.spacing.z);
+  const Vec3 per_square = {squared(light.spacing.x), squared(light.spacing.y), squared(light.spacing.z)};
+  const auto slope_at = [&](const SampleRow& row, std::int32_t x) {
+    const auto square = [](float before, float behind) { return double(behind - before) * double(behind - before); };
+    return float(std::sqrt(square(row.at[x - 1], row.at[x + 1]) * per_square.x + square(row.beside[0][x], row.beside[1][x]) * per_square.y +
+                           square(row.beside[2][x], row.beside[3][x]) * per_square.z));
+  };
   const KeptShare kept(setup, MapBetween(light, frame));
 
-  Extinction extinction{.size = size, .spacing = light.spacing, .each = std::vector<float>(CountIn(size))};
+  Extinction extinction{.size = size, .spacing = light.spacing, .each = UnwrittenVector<float>(CountIn(size))};
   VisitScalarType(values.type, [&]<class T>(const T*) {
     const T* const samples = values.samples<T>();
     tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
-      const std::ptrdiff_t row = size.x, slice = row * size.y;
+      const auto row_room = std::size_t(size.x + 2 * kRowMargin);
+      std::vector<float> room(5 * row_room), found(row_room);
+      const auto load = [&](std::size_t number, std::int32_t row_y, std::int32_t row_z) {
+        float* const row = room.data() + number * row_room + kRowMargin;
+        std::copy_n(samples + NumberIn(size, {0, row_y, row_z}), size.x, row);
+        row[-1] = row[0];
+        row[size.x] = row[size.x - 1];
+        return row;
+      };
       for (std::int32_t y = 0; y < size.y; ++y) {
-        const T* v = samples + z * slice + y * row;
-        float* out = extinction.each.data() + z * slice + y * row;
-        for (std::int32_t x = 0; x < size.x; ++x, ++v, ++out) {
-          const auto value = float(*v);
-          if (!std::isfinite(value)) continue;
-          float least = value, greatest = value;
-          const auto meet = [&](bool there, std::ptrdiff_t step) {
-            const float near = there ? float(v[step]) : value;
-            if (near < least) least = near;
-            if (near > greatest) greatest = near;
-            return near;
-          };
-          const float along_x = -meet(x > 0, -1) + meet(x + 1 < size.x, 1);
-          const float along_y = -meet(y > 0, -row) + meet(y + 1 < size.y, row);
-          const float along_z = -meet(z > 0, -slice) + meet(z + 1 < size.z, slice);
-          const std::size_t place = of_values.PlaceOf(value);
-          const float low = (value + least) / 2, high = (value + greatest) / 2;
-          double sum = 0;
+        const SampleRow row = {load(0, y, z),
+                               {load(1, std::max(y - 1, 0), z), load(2, std::min(y + 1, size.y - 1), z), load(3, y, std::max(z - 1, 0)),
+                                load(4, y, std::min(z + 1, size.z - 1))}};
+        if (of_regions) {
+          std::ranges::fill(found, 0.0F);
+        } else {
+          HWY_DYNAMIC_DISPATCH(ExtinctionOfRow)(of_values, row, size.x, found.data());
+        }
+        for (std::int32_t x = 0; x < size.x && (of_regions || !surfaces.empty()); ++x) {
+          if (!std::isfinite(row.at[x])) continue;
+          const NearbyValues near(row, x);
+          float& sum = found[std::size_t(x)];
           if (of_regions) {
-            const auto square = [](float difference) { return double(difference) * double(difference); };
-            const auto slope = float(std::sqrt(square(along_x) * per_x + square(along_y) * per_y + square(along_z) * per_z));
-            if (std::isfinite(slope)) sum = of_regions->Mean(low, value, high, slope);
-          } else if (least == greatest) {
-            sum = of_values.At(place);
-          } else {
-            sum = (of_values.MeanBetween(of_values.PlaceOf(low), place) + of_values.MeanBetween(place, of_values.PlaceOf(high))) / 2;
+            const float slope = slope_at(row, x);
+            if (std::isfinite(slope)) sum = of_regions->Mean(near.low, near.value, near.high, slope);
           }
           for (const SurfaceExtinction& surface : surfaces) {
-            if (low < surface.value && surface.value <= high) sum += surface.each;
+            if (near.low < surface.value && surface.value <= near.high) sum += float(surface.each);
           }
-          *out = float(sum);
-          if (*out > 0 && !setup.clip.empty()) *out *= float(kept.Of({x, y, z}));
         }
+        for (std::int32_t x = 0; x < size.x && !setup.clip.empty(); ++x) {
+          float& sum = found[std::size_t(x)];
+          if (sum > 0) sum *= float(kept.Of({x, y, z}));
+        }
+        std::copy_n(found.data(), size.x, extinction.each.data() + NumberIn(size, {0, y, z}));
       }
     });
   });
@@ -173,3 +264,4 @@ Extinction ExtinctionOf(const VoxelBlock& values, const FrameSetup& setup) {
 }
 
 }  // namespace slabstream
+#endif

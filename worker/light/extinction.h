@@ -11,16 +11,15 @@
 // opacity without regions.
 #pragma once
 
-#include <vector>
-
+#include "common/base/unwritten_vector.h"
 #include "common/frame/frame_setup.h"
 
 namespace slabstream {
 
 struct Extinction {
   Index3 size;
-  Vec3 spacing;             // distances of centres, in the unit of the world
-  std::vector<float> each;  // by voxel, x fastest: -ln of the transmittance of a unit of length, finite, >= 0
+  Vec3 spacing;                 // distances of centres, in the unit of the world
+  UnwrittenVector<float> each;  // by voxel, x fastest: -ln of the transmittance of a unit of length, finite, >= 0
 };
 
 // `values`: the whole light volume of the setup (setup.light). Parallel; the result is the same for any number of threads and any

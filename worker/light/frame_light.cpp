@@ -7,6 +7,7 @@
 #include <list>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "common/renderers/renderer_kind.h"
@@ -102,11 +103,14 @@ class Matter {
     open_of_ = wanted;
     if (!(shading.ambient_occlusion > 0)) return;
     const Vec3 sides = ToVec3(extinction_->size) * extinction_->spacing;
-    const std::vector<float> openness = FindOpenness(*extinction_, shading.occlusion_radius * std::max({sides.x, sides.y, sides.z}));
-    open_.resize(openness.size());
+    open_.resize(extinction_->each.size());
     const float strength = shading.ambient_occlusion;
-    std::ranges::transform(openness, open_.begin(),
-                           [strength](float open) { return std::uint8_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F); });
+    FindOpenness(*extinction_, shading.occlusion_radius * std::max({sides.x, sides.y, sides.z}),
+                 [&](std::size_t first, std::span<const float> row) {
+                   std::ranges::transform(row, open_.begin() + std::ptrdiff_t(first), [strength](float open) {
+                     return std::uint8_t(255 * (1 - strength * (1 - std::min(2 * open, 1.0F))) + 0.5F);
+                   });
+                 });
   }
 
   // `reached`: empty: all of the light.

@@ -11,6 +11,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 #include "common/base/aligned_buffer.h"
 #include "worker/light/exponential-inl.h"
@@ -39,6 +40,20 @@ struct Way {
   float weight = 0;  // all add up to 1
 };
 
+// Where voxels of a fine grid lie in a coarse one along an axis: `share` of the way from voxel `below` to the next one. kRegister more than
+// there are voxels.
+struct Places {
+  std::vector<std::int32_t> below;
+  std::vector<float> share;
+};
+
+// The four rows of a coarse grid around a row of a fine one.
+struct CoarseRows {
+  std::int32_t count = 0;               // of voxels in a row
+  std::array<const float*, 4> beams{};  // number 2 z + y: above along y, z or both
+  float y = 0, z = 0;                   // the shares of those above
+};
+
 }  // namespace slabstream
 #endif
 
@@ -63,6 +78,38 @@ void OpennessOfSlice(const PaddedExtinction& extinction, const std::array<Way, 2
   }
 }
 
+// Adds what each of `count` voxels transmits along `length`. `sums` has room for kRegister more.
+void AddTransmitted(const float* each, std::int32_t count, float length, float* sums) {
+  const hn::CappedTag<float, 16> d;
+  const auto lanes = std::int32_t(hn::Lanes(d));
+  const auto add = [&](const float* from, float* to) HWY_ATTR {
+    hn::StoreU(hn::Add(hn::LoadU(d, to), ExpOfMinus(hn::Mul(hn::LoadU(d, from), hn::Set(d, length)))), d, to);
+  };
+  std::int32_t x = 0;
+  for (; x + lanes <= count; x += lanes) add(each + x, sums + x);
+  if (x == count) return;
+  HWY_ALIGN float rest[16] = {};
+  std::copy_n(each + x, count - x, rest);
+  add(rest, sums + x);
+}
+
+// A row of the fine grid, from the rows of the coarse one around it. `room` (of a coarse row) and `out` have room for kRegister more.
+void InterpolateRow(const CoarseRows& rows, const Places& along_x, std::int32_t count, float* room, float* out) {
+  const hn::CappedTag<float, 16> d;
+  const hn::RebindToSigned<decltype(d)> di;
+  const auto lerp = [&](auto t, auto from, auto to) HWY_ATTR { return hn::Add(from, hn::Mul(t, hn::Sub(to, from))); };
+  const auto y = hn::Set(d, rows.y), z = hn::Set(d, rows.z);
+  for (std::int32_t x = 0; x < rows.count; x += std::int32_t(hn::Lanes(d))) {
+    const auto beam = [&](std::size_t number) HWY_ATTR { return hn::LoadU(d, rows.beams[number] + x); };
+    hn::StoreU(lerp(z, lerp(y, beam(0), beam(1)), lerp(y, beam(2), beam(3))), d, room + x);
+  }
+  room[rows.count] = room[rows.count - 1];
+  for (std::int32_t x = 0; x < count; x += std::int32_t(hn::Lanes(d))) {
+    const auto at = hn::LoadU(di, along_x.below.data() + x);
+    hn::StoreU(lerp(hn::LoadU(d, along_x.share.data() + x), hn::GatherIndex(d, room, at), hn::GatherIndex(d, room + 1, at)), d, out + x);
+  }
+}
+
 }  // namespace slabstream::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -71,6 +118,8 @@ namespace slabstream {
 namespace {
 
 HWY_EXPORT(OpennessOfSlice);
+HWY_EXPORT(AddTransmitted);
+HWY_EXPORT(InterpolateRow);
 
 // Half as many voxels along the axes of `halved`. What a voxel transmits is the mean of the voxels in it: beside opaque matter half of the
 // light passes.
@@ -80,21 +129,24 @@ Extinction Halved(const Extinction& fine, const Index3& halved) {
   coarse.each.resize(CountIn(coarse.size));
   const double length = std::cbrt(coarse.spacing.x * coarse.spacing.y * coarse.spacing.z);
   tbb::parallel_for(std::int32_t{0}, coarse.size.z, [&](std::int32_t z) {
+    AlignedVector<float> sums(std::size_t(fine.size.x + kRegister));
+    float* out = coarse.each.data() + NumberIn(coarse.size, {0, 0, z});
     for (std::int32_t y = 0; y < coarse.size.y; ++y) {
-      for (std::int32_t x = 0; x < coarse.size.x; ++x) {
-        const Index3 begin = Index3{x, y, z} * block, end = Min(begin + block, fine.size);
-        double transmitted = 0, most = 0;
-        int count = 0;
-        for (std::int32_t k = begin.z; k < end.z; ++k) {
-          for (std::int32_t j = begin.y; j < end.y; ++j) {
-            for (std::int32_t i = begin.x; i < end.x; ++i, ++count) {
-              const double each = fine.each[NumberIn(fine.size, {i, j, k})];
-              most = std::max(most, each);
-              if (each > 0) transmitted += std::exp(-each * length) - 1;
-            }
-          }
+      const Index3 begin = Index3{0, y, z} * block, end = Min(begin + block, fine.size);
+      std::ranges::fill(sums, 0.0F);
+      for (std::int32_t k = begin.z; k < end.z; ++k) {
+        for (std::int32_t j = begin.y; j < end.y; ++j) {
+          const float* const row = fine.each.data() + NumberIn(fine.size, {0, j, k});
+          HWY_DYNAMIC_DISPATCH(AddTransmitted)(row, fine.size.x, float(length), sums.data());
         }
-        if (most > 0) coarse.each[NumberIn(coarse.size, {x, y, z})] = float(-std::log1p(transmitted / count) / length);
+      }
+      const std::int32_t rows = (end.z - begin.z) * (end.y - begin.y);
+      for (std::int32_t i = 0; i < fine.size.x; i += block.x) {
+        const std::int32_t columns = std::min(block.x, fine.size.x - i);
+        double transmitted = 0;
+        for (std::int32_t column = 0; column < columns; ++column) transmitted += double(sums[std::size_t(i + column)]);
+        const double mean = transmitted / (rows * columns);  // of empty voxels exactly 1
+        *out++ = mean < 1 ? float(-std::log(mean) / length) : 0;
       }
     }
   });
@@ -139,73 +191,69 @@ std::array<Way, 26> WaysOf(const PaddedExtinction& extinction, const Vec3& spaci
   return ways;
 }
 
+// From voxels of a grid to those of `coarse`, by axis, where each voxel's place is map.scale * i + map.offset.
+std::array<Places, 3> PlacesOf(const Index3& size, const GridMap& map, const Index3& coarse) {
+  std::array<Places, 3> places;
+  for (int axis = 0; axis < 3; ++axis) {
+    Places& along = places[std::size_t(axis)];
+    for (std::int32_t i = 0; i < size[axis]; ++i) {
+      const double at = std::clamp(map.scale[axis] * i + map.offset[axis], 0.0, coarse[axis] - 1.0);
+      along.below.push_back(std::clamp(std::int32_t(at), 0, std::max(coarse[axis] - 2, 0)));
+      along.share.push_back(float(at - along.below.back()));
+    }
+    along.below.resize(along.below.size() + std::size_t(kRegister));
+    along.share.resize(along.below.size());
+  }
+  return places;
+}
+
 }  // namespace
 
-std::vector<float> FindOpenness(const Extinction& extinction, double radius) {
-  Extinction coarse = extinction;
-  GridMap map;  // from voxels of `extinction` to those of `coarse`
+void FindOpenness(const Extinction& extinction, double radius, const TakeOpenness& take) {
+  const Extinction* used = &extinction;
+  Extinction coarse;
+  GridMap map;  // from voxels of `extinction` to those of `used`
   for (;;) {
     Index3 halved;
     for (const Axis axis : kAxes) {
-      const bool too_many = coarse.size[axis] > kMaxOcclusionSide || radius > (kMostOcclusionSteps + 0.5) * coarse.spacing[axis];
-      halved[axis] = too_many && coarse.size[axis] > 1 ? 1 : 0;
+      const bool too_many = used->size[axis] > kMaxOcclusionSide || radius > (kMostOcclusionSteps + 0.5) * used->spacing[axis];
+      halved[axis] = too_many && used->size[axis] > 1 ? 1 : 0;
     }
     if (halved == Index3{}) break;
-    coarse = Halved(coarse, halved);
+    coarse = Halved(*used, halved);
+    used = &coarse;
     for (const Axis axis : kAxes) {
       if (halved[axis] == 0) continue;
       map.scale[axis] /= 2;
       map.offset[axis] = (map.offset[axis] - 0.5) / 2;
     }
   }
-  const PaddedExtinction padded = Padded(coarse);
-  const std::array<Way, 26> ways = WaysOf(padded, coarse.spacing, radius);
-  AlignedVector<float> open(CountIn(coarse.size));
-  const std::size_t slice = std::size_t(coarse.size.x) * std::size_t(coarse.size.y);
-  tbb::parallel_for(std::int32_t{0}, coarse.size.z, [&](std::int32_t z) {
+  const PaddedExtinction padded = Padded(*used);
+  const std::array<Way, 26> ways = WaysOf(padded, used->spacing, radius);
+  const Index3& size = used->size;
+  AlignedVector<float> open(CountIn(size) + std::size_t(kRegister));
+  const std::size_t slice = std::size_t(size.x) * std::size_t(size.y);
+  tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
     AlignedVector<float> of_slice(slice + std::size_t(kRegister));
     HWY_DYNAMIC_DISPATCH(OpennessOfSlice)(padded, ways, z, of_slice.data());
     std::copy_n(of_slice.data(), slice, open.data() + std::size_t(z) * slice);
   });
-  if (coarse.size == extinction.size) return {open.begin(), open.end()};
 
-  // Places of voxels of `extinction` among those of `coarse`, by axis.
-  struct Place {
-    std::int32_t below = 0;
-    float share = 0;  // of the voxel above
-  };
-  std::array<std::vector<Place>, 3> places;
-  for (int axis = 0; axis < 3; ++axis) {
-    for (std::int32_t i = 0; i < extinction.size[axis]; ++i) {
-      const double at = std::clamp(map.scale[axis] * i + map.offset[axis], 0.0, coarse.size[axis] - 1.0);
-      const auto below = std::clamp(std::int32_t(at), 0, std::max(coarse.size[axis] - 2, 0));
-      places[std::size_t(axis)].push_back({below, float(at - below)});
-    }
-  }
-  std::vector<float> fine(extinction.each.size());
+  const std::array<Places, 3> places = PlacesOf(extinction.size, map, size);
   tbb::parallel_for(std::int32_t{0}, extinction.size.z, [&](std::int32_t z) {
-    const Place pz = places[2][std::size_t(z)];
-    std::vector<float> row(std::size_t(coarse.size.x) + 1);
+    AlignedVector<float> room(std::size_t(size.x + kRegister)), row(std::size_t(extinction.size.x + kRegister));
+    const std::int32_t below_z = places[2].below[std::size_t(z)];
     for (std::int32_t y = 0; y < extinction.size.y; ++y) {
-      const Place py = places[1][std::size_t(y)];
-      const auto beam = [&](int dy, int dz) {
-        const Index3 at = {0, std::min(py.below + dy, coarse.size.y - 1), std::min(pz.below + dz, coarse.size.z - 1)};
-        return open.data() + NumberIn(coarse.size, at);
-      };
-      const float *b00 = beam(0, 0), *b10 = beam(1, 0), *b01 = beam(0, 1), *b11 = beam(1, 1);
-      for (std::size_t x = 0; x < std::size_t(coarse.size.x); ++x) {
-        const float near = b00[x] + py.share * (b10[x] - b00[x]), far = b01[x] + py.share * (b11[x] - b01[x]);
-        row[x] = near + pz.share * (far - near);
+      const std::int32_t below_y = places[1].below[std::size_t(y)];
+      CoarseRows rows{.count = size.x, .y = places[1].share[std::size_t(y)], .z = places[2].share[std::size_t(z)]};
+      for (std::int32_t beam = 0; beam < 4; ++beam) {
+        const Index3 at = {0, std::min(below_y + beam % 2, size.y - 1), std::min(below_z + beam / 2, size.z - 1)};
+        rows.beams[std::size_t(beam)] = open.data() + NumberIn(size, at);
       }
-      row.back() = row[row.size() - 2];
-      float* out = fine.data() + NumberIn(extinction.size, {0, y, z});
-      for (const Place& px : places[0]) {
-        const float* at = row.data() + px.below;
-        *out++ = at[0] + px.share * (at[1] - at[0]);
-      }
+      HWY_DYNAMIC_DISPATCH(InterpolateRow)(rows, places[0], extinction.size.x, room.data(), row.data());
+      take(NumberIn(extinction.size, {0, y, z}), {row.data(), std::size_t(extinction.size.x)});
     }
   });
-  return fine;
 }
 
 }  // namespace slabstream

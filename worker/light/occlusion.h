@@ -5,7 +5,10 @@
 // It is found on a coarser grid, at most kMaxOcclusionSide voxels a side and kMostOcclusionSteps in a radius, and interpolated linearly.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 
 #include "worker/light/extinction.h"
 
@@ -14,8 +17,11 @@ namespace slabstream {
 inline constexpr std::int32_t kMaxOcclusionSide = 64;
 inline constexpr std::int32_t kMostOcclusionSteps = 8;
 
-// `radius`: in the unit of the world, > 0. Of the voxels of the grid that `extinction` is on; x fastest, in [0, 1]. A voxel in the flat
-// surface of opaque matter has about 1/2. Parallel; the result is the same for any number of threads and any instruction set.
-std::vector<float> FindOpenness(const Extinction& extinction, double radius);
+// Gets the openness, in [0, 1], of the voxels of a row along x; the first one has this number (NumberIn).
+using TakeOpenness = std::function<void(std::size_t first, std::span<const float> row)>;
+
+// `radius`: in the unit of the world, > 0. Each row of the grid that `extinction` is on goes to `take` once, on any thread. A voxel in the
+// flat surface of opaque matter has about 1/2. Parallel; the result is the same for any number of threads and any instruction set.
+void FindOpenness(const Extinction& extinction, double radius, const TakeOpenness& take);
 
 }  // namespace slabstream

@@ -178,7 +178,7 @@ bool SweepsAlongX(const Extinction& extinction, const Vec3& to_light) { return S
 
 TurnedExtinction Turned(const Extinction& extinction) {
   const Index3& size = extinction.size;
-  TurnedExtinction turned{.axes = {1, 2, 0}, .each = std::vector<float>(extinction.each.size())};
+  TurnedExtinction turned{.axes = {1, 2, 0}, .each = UnwrittenVector<float>(extinction.each.size())};
   tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
     constexpr std::int32_t kSquare = 16;
     for (std::int32_t y_begin = 0; y_begin < size.y; y_begin += kSquare) {

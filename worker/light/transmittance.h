@@ -20,7 +20,7 @@ inline constexpr double kShadowOffset = 1.5;
 // An Extinction with its axes in another order, for rows along another axis than x.
 struct TurnedExtinction {
   std::array<int, 3> axes = {0, 1, 2};  // the fastest axis first
-  std::vector<float> each;
+  UnwrittenVector<float> each;
 };
 // The fastest axis becomes y, the slowest one x.
 TurnedExtinction Turned(const Extinction& extinction);
