@@ -19,7 +19,7 @@
 namespace slabstream {
 namespace {
 
-using Bytes255 = std::vector<std::uint8_t>;
+using Bytes255 = UnwrittenVector<std::uint8_t>;
 
 // What an Extinction is made from.
 struct MatterKey {

@@ -6,9 +6,8 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/base/unwritten_vector.h"
 #include "common/frame/frame_setup.h"
 #include "common/volume/grid_map.h"
 
@@ -25,7 +24,7 @@ struct FrameLight {
   int fast = 0;
   std::array<std::int32_t, 3> stride{};  // bytes from voxel to voxel, by axis; 2 along the fast one
   std::int32_t light = 0;                // bytes from light to light
-  AlignedVector<std::uint8_t> shares;    // and kSharesPadding more
+  UnwrittenVector<std::uint8_t> shares;  // and kSharesPadding more
   static constexpr std::size_t kSharesPadding = 16;
 
   // Its place among positions of another grid: p lies at scale * p + offset.

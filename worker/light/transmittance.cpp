@@ -147,7 +147,7 @@ void Run(const Sweep& sweep) {
 }
 
 // out[z][y][x] = turned[x][z][y], square by square.
-void TurnBack(const std::vector<std::uint8_t>& turned, const Index3& size, std::uint8_t* out) {
+void TurnBack(const UnwrittenVector<std::uint8_t>& turned, const Index3& size, std::uint8_t* out) {
   constexpr std::int32_t kSquare = 32;
   const std::ptrdiff_t from_x = std::ptrdiff_t{size.y} * size.z;
   tbb::parallel_for(std::int32_t{0}, size.z, [&](std::int32_t z) {
@@ -200,7 +200,7 @@ void FindTransmittance(const Extinction& extinction, const TurnedExtinction& tur
   // The layout's steps from voxel to voxel.
   Vector3<std::ptrdiff_t> stride = {1, size.x, std::ptrdiff_t{size.x} * size.y};
   if (c == 0) stride = {std::ptrdiff_t{size.y} * size.z, 1, size.y};
-  std::vector<std::uint8_t> turned_out(c == 0 ? CountIn(size) : 0);
+  UnwrittenVector<std::uint8_t> turned_out(c == 0 ? CountIn(size) : 0);
 
   const Vec3 steps = to_light / extinction.spacing;  // towards the light, in voxels
   const double per_plane = std::abs(steps[c]);
