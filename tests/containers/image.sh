@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The images of deploy/image, run by podman: a coordinator, workers and a gateway in containers of their own, on a bridge where they find one
-# another by name, as a user that is not root, on root file systems that are read-only. deploy/check image runs it.
+# The images of deploy/image, run by podman: a coordinator, workers and a gateway in containers of their own, on a bridge where they find
+# one another by name, as a user that is not root, on root file systems that are read-only. deploy/check image runs it.
 # Argument: the folder of the images.
 set -euo pipefail
 # shellcheck source=tests/containers/podman.sh
@@ -8,17 +8,18 @@ source "$(dirname "${BASH_SOURCE[0]}")/podman.sh"
 images="$1"
 
 hardened=(--read-only --cap-drop all --security-opt no-new-privileges --network "$network")
-# Arguments: secrets, a name, options of podman; the image; then the program and its options.
-start() { # NAME SECRETS IMAGE PROGRAM...
+# Arguments: a name, secrets, the image, the program and its options. Podman's own clock for health checks would need systemd.
+start() {
   local name="$1" secret secrets=()
-  for secret in $2; do secrets+=(--secret "$secret,target=/etc/slabstream/$secret,uid=10001,gid=10001,mode=0400"); done
-  pod run --detach --name "$name" "${hardened[@]}" "${secrets[@]}" --volume data:/data --health-cmd healthcheck --health-interval disable --memory 2g "${@:3}" > /dev/null
+  for secret in $2; do secrets+=(--secret "$secret,target=/etc/slabstream/$secret"); done
+  pod run --detach --name "$name" "${hardened[@]}" "${secrets[@]}" --volume data:/data --memory 2g \
+    --health-cmd healthcheck --health-interval disable "${@:3}" > /dev/null
 }
 worker() { start "$1" worker.json "$server" slabstream-worker --service /tmp/keys/worker.json --memory 1G --log-level info; }
 # `slabstream` as a client of the service. Its pictures go to the volume "pictures".
 client() {
-  pod run --rm "${hardened[@]}" --secret client.json,target=/etc/slabstream/client.json,uid=10001,gid=10001,mode=0400 --volume data:/data --volume pictures:/pictures \
-    --env SLABSTREAM_SERVICE=/tmp/keys/client.json "$all" slabstream "$@"
+  pod run --rm "${hardened[@]}" --secret client.json,target=/etc/slabstream/client.json --volume data:/data \
+    --volume pictures:/pictures --env SLABSTREAM_SERVICE=/tmp/keys/client.json "$all" slabstream "$@"
 }
 # Arguments: an expression of Python about the service's status, `service`.
 status() { pod exec coordinator slabstream status --service /tmp/keys/client.json --json | python3 -c 'import json, sys
@@ -30,25 +31,9 @@ has_workers() { [[ "$(workers)" == "$1" ]]; }
 healthy() { pod healthcheck run "$1"; }
 frames_done() { find "$pictures" -name 'scaled_*.png' | wc -l; }
 has_frames() { (($(frames_done) >= $1)); }
-pixels() { ffmpeg -nostdin -v error -i "$1" -f rawvideo -pix_fmt rgba "$2"; }
-# No sample of two pictures differs by more than a step of 255: more workers add in another order. What the files say of how they were made
-# differs.
-same() {
-  pixels "$1" "$work/one.raw" && pixels "$2" "$work/other.raw" &&
-    python3 -c 'import sys
-one, other = (open(name, "rb").read() for name in sys.argv[1:])
-sys.exit(len(one) != len(other) or max(abs(a - b) for a, b in zip(one, other)) > 1)' "$work/one.raw" "$work/other.raw"
-  local status=$?
-  rm -f "$work/one.raw" "$work/other.raw"
-  return "$status"
-}
 
 say "Images"
-for image in "$images"/slabstream-[0-9]*.oci.tar "$images"/slabstream-server-*.oci.tar; do
-  printf '%s: %d MB\n' "$(basename "$image")" "$(($(stat -c %s "$image") / 1000000))"
-  pod load --quiet --input "$image" > /dev/null
-done
-all="$(pod images --format '{{.Repository}}:{{.Tag}}' | grep '/slabstream:')" server="${all/slabstream:/slabstream-server:}"
+load_images "$images"
 for image in "$all" "$server"; do
   # shellcheck disable=SC2016  # the inner shell expands them
   # Every library of every program is there: the loader says which are not.
@@ -57,8 +42,7 @@ for image in "$all" "$server"; do
       [ ! -f "$file" ] || /lib64/ld-linux-*.so.2 --list "$file"
     done 2>&1' | grep -E 'not found|error while' || true)"
   [[ -z "$missing" ]] || fail "$image lacks $missing"
-  [[ "$(pod run --rm --network none --read-only "$image" sh -c 'id -u; touch /usr/x 2> /dev/null || echo read-only')" == 10001$'\n'read-only ]] ||
-    fail "$image: runs as root, or writes to its root"
+  is_confined pod run --rm --network none --read-only "$image" || fail "$image: runs as root, or writes to its root"
 done
 
 say "A coordinator, three workers and a gateway on a bridge"
@@ -82,11 +66,11 @@ say "The picture of the service, over its own protocol and over HTTP, is that of
 view=(--azimuth 30 --elevation 20 --renderer raycast)
 small=("${view[@]}" --size 512)
 client render sphere "${small[@]}" -o /pictures/service.png
-pod run --rm --network none --volume data:/data --volume pictures:/pictures "$all" slabstream render /data/sphere.nrrd --local 1 "${small[@]}" \
-  -o /pictures/local.png
+pod run --rm --network none --volume data:/data --volume pictures:/pictures "$all" \
+  slabstream render /data/sphere.nrrd --local 1 "${small[@]}" -o /pictures/local.png
 same "$pictures/service.png" "$pictures/local.png" || fail "the pictures differ"
-pod exec gateway wget -q -O - "http://gateway:8080/api/v1/render.png?token=$(cat "$work/keys/token")&dataset=sphere&azimuth=30&elevation=20&size=512&renderer=raycast" \
-  > "$work/gateway.png"
+query="dataset=sphere&azimuth=30&elevation=20&size=512&renderer=raycast&token=$(cat "$work/keys/token")"
+pod exec gateway wget -q -O - "http://gateway:8080/api/v1/render.png?$query" > "$work/gateway.png"
 same "$work/gateway.png" "$pictures/local.png" || fail "the picture of the gateway differs"
 [[ "$(pod exec gateway wget -q -O - http://gateway:8080/readyz)" == ok ]] || fail "the gateway is not ready"
 
