@@ -245,10 +245,7 @@ class Gateway::Impl : public HttpApplication {
   }
 
   bool MayAsk(const HttpRequest& request, const Target& target) const {
-    constexpr std::string_view kBearer = "Bearer ";
-    if (request.authorization && std::string_view(*request.authorization).starts_with(kBearer)) {
-      return SameToken(std::string_view(*request.authorization).substr(kBearer.size()), options_.token);
-    }
+    if (request.authorization && request.authorization->starts_with("Bearer ")) return IsBearer(request.authorization, options_.token);
     for (const std::string& protocol : request.subprotocols) {
       if (protocol.starts_with(kTokenProtocol)) return SameToken(std::string_view(protocol).substr(kTokenProtocol.size()), options_.token);
     }

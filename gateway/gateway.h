@@ -21,8 +21,8 @@
 
 #include "client/client.h"
 #include "common/base/status.h"
-#include "gateway/address.h"
-#include "gateway/http.h"
+#include "common/http/address.h"
+#include "common/http/http.h"
 
 namespace slabstream {
 

@@ -5,11 +5,11 @@
 
 #include "client/service/service_choice.h"
 #include "client/service/service_state.h"
-#include "common/base/files.h"
 #include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
+#include "common/http/address.h"
 #include "common/transport/context.h"
 #include "gateway/gateway.h"
 
@@ -23,23 +23,11 @@ struct Options {
   std::string token_file;
 };
 
-Result<std::string> TokenOf(const Options& options) {
-  if (options.token_file.empty()) return MakeToken();
-  constexpr std::size_t kMostBytes = 256;
-  Result<std::string> token = ReadTextFile(options.token_file, kMostBytes);
-  if (!token.ok()) return Status(token.status().code(), "--token-file " + token.status().message());
-  while (token->ends_with('\n')) token->pop_back();
-  if (Status status = CheckToken(*token); !status.ok()) {
-    return Status::InvalidArgument("--token-file " + options.token_file + ": " + status.message());
-  }
-  return token;
-}
-
 Status Serve(Options options) {
   BlockStopSignals();
   const Result<ServiceAddress> service = ResolveService(options.service);
   if (!service.ok()) return service.status();
-  Result<std::string> token = TokenOf(options);
+  Result<std::string> token = options.token_file.empty() ? MakeToken() : ReadToken("--token-file", options.token_file);
   if (!token.ok()) return token.status();
   options.gateway.token = *std::move(token);
   if (!options.tls.certificate.empty()) options.gateway.tls = options.tls;

@@ -3,44 +3,14 @@
 #include <fmt/format.h>
 
 #include "client/report/frame_summary.h"
+#include "common/metrics/process_metrics.h"
 
 namespace slabstream {
-namespace {
-
-// Families of the text, each with its lines.
-class Exposition {
- public:
-  void Family(std::string_view name, std::string_view type, std::string_view help) {
-    name_ = name;
-    text_ += fmt::format("# HELP slabstream_{0} {1}\n# TYPE slabstream_{0} {2}\n", name, help, type);
-  }
-  template <class Value>
-  void Line(const Value& value, std::string_view labels = {}, std::string_view suffix = {}) {
-    text_ += fmt::format("slabstream_{}{}{}{}{} {}\n", name_, suffix, labels.empty() ? "" : "{", labels, labels.empty() ? "" : "}", value);
-  }
-  template <class Value>
-  void Single(std::string_view name, std::string_view type, std::string_view help, const Value& value) {
-    Family(name, type, help);
-    Line(value);
-  }
-  std::string Take() { return std::move(text_); }
-
- private:
-  std::string name_, text_;
-};
-
-}  // namespace
-
-void Metrics::Histogram::Add(double seconds) {
-  for (std::size_t i = 0; i < kBounds.size(); ++i) counts[i] += seconds <= kBounds[i] ? 1 : 0;
-  ++count;
-  sum += seconds;
-}
 
 void Metrics::Observe(std::string_view stage, std::int64_t ns) {
   auto found = stages_.find(stage);
-  if (found == stages_.end()) found = stages_.emplace(stage, Histogram()).first;
-  found->second.Add(double(ns) / 1e9);
+  if (found == stages_.end()) found = stages_.emplace(stage, TimeHistogram()).first;
+  found->second.Add(Duration(ns));
 }
 
 void Metrics::CountFrame(const FrameStatistics& statistics, Duration latency) {
@@ -97,51 +67,46 @@ void Metrics::CountSession(int change) {
 std::string Metrics::Text(const ServiceNews& news) const {
   const std::lock_guard lock(mutex_);
   Exposition out;
-  out.Single("gateway_frames_total", "counter", "Frames that the service made for this gateway.", frames_);
-  out.Family("gateway_pictures_total", "counter", "Pictures sent, by their type.");
-  for (const auto& [type, count] : pictures_) out.Line(count, fmt::format("type=\"{}\"", type));
-  out.Family("gateway_answers_total", "counter", "Questions about volumes that the service answered.");
-  for (const auto& [question, count] : answers_) out.Line(count, fmt::format("question=\"{}\"", question));
-  out.Family("gateway_bytes_total", "counter",
+  out.Single("gateway_frames_total", MetricType::kCounter, "Frames that the service made for this gateway.", frames_);
+  out.Family("gateway_pictures_total", MetricType::kCounter, "Pictures sent, by their type.");
+  for (const auto& [type, count] : pictures_) out.Value(count, {{"type", type}});
+  out.Family("gateway_answers_total", MetricType::kCounter, "Questions about volumes that the service answered.");
+  for (const auto& [question, count] : answers_) out.Value(count, {{"question", question}});
+  out.Family("gateway_bytes_total", MetricType::kCounter,
              "Bytes by plane: voxels to workers, what was read from stores for them, images between workers, pictures to the web.");
-  for (const auto& [plane, bytes] : bytes_) out.Line(bytes, fmt::format("plane=\"{}\"", plane));
-  out.Single("gateway_rendered_boxes_total", "counter", "Boxes that workers rendered for this gateway.", voxel_reports_);
-  out.Single("gateway_cached_boxes_total", "counter", "Those whose voxels the worker had already.", voxel_hits_);
-  out.Family("gateway_stage_seconds", "histogram", "Times of a frame by stage, and of answers.");
-  for (const auto& [stage, histogram] : stages_) {
-    for (std::size_t i = 0; i < Histogram::kBounds.size(); ++i) {
-      out.Line(histogram.counts[i], fmt::format("stage=\"{}\",le=\"{}\"", stage, Histogram::kBounds[i]), "_bucket");
-    }
-    out.Line(histogram.count, fmt::format("stage=\"{}\",le=\"+Inf\"", stage), "_bucket");
-    out.Line(histogram.sum, fmt::format("stage=\"{}\"", stage), "_sum");
-    out.Line(histogram.count, fmt::format("stage=\"{}\"", stage), "_count");
-  }
-  out.Family("gateway_responses_total", "counter", "Responses by their HTTP status.");
-  for (const auto& [status, count] : responses_) out.Line(count, fmt::format("status=\"{}\"", status));
-  out.Family("gateway_refusals_total", "counter", "Requests and sessions that the gateway refused or dropped.");
-  for (const auto& [reason, count] : refusals_) out.Line(count, fmt::format("reason=\"{}\"", reason));
-  out.Single("gateway_sessions", "gauge", "Views that are open.", sessions_);
+  for (const auto& [plane, bytes] : bytes_) out.Value(bytes, {{"plane", plane}});
+  out.Single("gateway_rendered_boxes_total", MetricType::kCounter, "Boxes that workers rendered for this gateway.", voxel_reports_);
+  out.Single("gateway_cached_boxes_total", MetricType::kCounter, "Those whose voxels the worker had already.", voxel_hits_);
+  out.Family("gateway_stage_seconds", MetricType::kHistogram, "Times of a frame by stage, and of answers.");
+  for (const auto& [stage, times] : stages_) out.Histogram(times, {{"stage", stage}});
+  out.Family("gateway_responses_total", MetricType::kCounter, "Responses by their HTTP status.");
+  for (const auto& [status, count] : responses_) out.Value(count, {{"status", std::to_string(status)}});
+  out.Family("gateway_refusals_total", MetricType::kCounter, "Requests and sessions that the gateway refused or dropped.");
+  for (const auto& [reason, count] : refusals_) out.Value(count, {{"reason", reason}});
+  out.Single("gateway_sessions", MetricType::kGauge, "Views that are open.", std::uint64_t(sessions_));
 
   const StatusReply& status = news.status;
-  out.Single("service_up", "gauge", "1 while the service answers and has a worker.", news.health == ServiceHealth::kReady ? 1 : 0);
-  out.Single("service_workers", "gauge", "Workers of the service.", status.workers.size());
-  out.Single("service_workers_lost_total", "counter", "Workers that the service has lost.", status.workers_lost);
-  out.Single("service_queued", "gauge", "Frames that wait at the service.", status.queued);
-  out.Single("service_running", "gauge", "Frames that the service works on.", status.running);
-  out.Single("service_frames_done_total", "counter", "Frames that the service has made, for all clients.", status.frames_done);
-  out.Single("service_frames_failed_total", "counter", "Frames that failed.", status.frames_failed);
-  out.Family("service_refused_total", "counter", "Requests that the service refused.");
-  out.Line(status.refused.bad_request, "reason=\"bad request\"");
-  out.Line(status.refused.unknown_dataset, "reason=\"unknown dataset\"");
-  out.Line(status.refused.too_large, "reason=\"too large\"");
-  out.Line(status.refused.over_quota, "reason=\"over quota\"");
+  out.Single("service_up", MetricType::kGauge, "1 while the service answers and has a worker.",
+             std::uint64_t{news.health == ServiceHealth::kReady});
+  out.Single("service_workers", MetricType::kGauge, "Workers of the service.", std::uint64_t{status.workers.size()});
+  out.Single("service_workers_lost_total", MetricType::kCounter, "Workers that the service has lost.", status.workers_lost);
+  out.Single("service_queued", MetricType::kGauge, "Frames that wait at the service.", std::uint64_t{status.queued});
+  out.Single("service_running", MetricType::kGauge, "Frames that the service works on.", std::uint64_t{status.running});
+  out.Single("service_frames_done_total", MetricType::kCounter, "Frames that the service has made, for all clients.", status.frames_done);
+  out.Single("service_frames_failed_total", MetricType::kCounter, "Frames that failed.", status.frames_failed);
+  out.Family("service_refused_total", MetricType::kCounter, "Requests that the service refused.");
+  out.Value(status.refused.bad_request, {{"reason", "bad request"}});
+  out.Value(status.refused.unknown_dataset, {{"reason", "unknown dataset"}});
+  out.Value(status.refused.too_large, {{"reason", "too large"}});
+  out.Value(status.refused.over_quota, {{"reason", "over quota"}});
   std::uint64_t cached = 0, fetched = 0;
   for (const WorkerStatus& worker : status.workers) {
     cached += worker.cached_bytes;
     fetched += worker.fetched_bytes;
   }
-  out.Single("service_cached_bytes", "gauge", "Voxels that workers keep.", cached);
-  out.Single("service_fetched_bytes_total", "counter", "Voxels that the present workers have fetched.", fetched);
+  out.Single("service_cached_bytes", MetricType::kGauge, "Voxels that workers keep.", cached);
+  out.Single("service_fetched_bytes_total", MetricType::kCounter, "Voxels that the present workers have fetched.", fetched);
+  AddProcess(out, 0);
   return out.Take();
 }
 

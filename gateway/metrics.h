@@ -1,7 +1,6 @@
 // Metrics: what the gateway counts, and its text for Prometheus. Any thread.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include <string_view>
 
 #include "common/base/time.h"
+#include "common/metrics/exposition.h"
 #include "common/wire/client_messages.h"
 #include "gateway/service_monitor.h"
 
@@ -34,18 +34,10 @@ class Metrics {
   std::string Text(const ServiceNews& news) const;
 
  private:
-  // Cumulative counts by upper bound, in seconds.
-  struct Histogram {
-    static constexpr std::array<double, 11> kBounds = {0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 5};
-    std::array<std::uint64_t, kBounds.size()> counts{};
-    std::uint64_t count = 0;
-    double sum = 0;
-    void Add(double seconds);
-  };
   void Observe(std::string_view stage, std::int64_t ns);  // with the mutex held
 
   mutable std::mutex mutex_;
-  std::map<std::string, Histogram, std::less<>> stages_;  // by stage
+  std::map<std::string, TimeHistogram, std::less<>> stages_;  // by stage
   std::map<std::string, std::uint64_t, std::less<>> pictures_, bytes_, refusals_, answers_;
   std::map<unsigned, std::uint64_t> responses_;
   std::uint64_t frames_ = 0, voxel_reports_ = 0, voxel_hits_ = 0;

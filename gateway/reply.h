@@ -6,7 +6,7 @@
 
 #include "client/request/json_value.h"
 #include "common/base/status.h"
-#include "gateway/http.h"
+#include "common/http/http.h"
 
 namespace slabstream {
 

@@ -6,7 +6,7 @@
 
 #include "client/request/picture_fields.h"
 #include "common/base/status.h"
-#include "gateway/http.h"
+#include "common/http/http.h"
 #include "gateway/target.h"
 
 namespace slabstream {

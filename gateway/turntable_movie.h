@@ -14,8 +14,8 @@
 #include "client/client.h"
 #include "client/movie/movie_encoder.h"
 #include "client/request/picture_fields.h"
+#include "common/http/http.h"
 #include "common/transport/context.h"
-#include "gateway/http.h"
 #include "gateway/metrics.h"
 #include "gateway/service_link.h"
 

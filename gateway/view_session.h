@@ -11,8 +11,8 @@
 #include <string>
 #include <string_view>
 
+#include "common/http/http.h"
 #include "gateway/frame_message.h"
-#include "gateway/http.h"
 #include "gateway/metrics.h"
 #include "gateway/page_message.h"
 #include "gateway/service_link.h"

@@ -1,7 +1,7 @@
 // What pages and scripts send to the gateway: messages of a WebSocket, and targets of requests.
 #include <algorithm>
 
-#include "gateway/address.h"
+#include "common/http/address.h"
 #include "gateway/page_message.h"
 #include "gateway/target.h"
 #include "tests/fuzz/decoders.h"

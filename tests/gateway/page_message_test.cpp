@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "gateway/address.h"
+#include "common/http/address.h"
 #include "gateway/target.h"
 
 namespace slabstream {

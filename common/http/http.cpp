@@ -1,4 +1,4 @@
-#include "gateway/http.h"
+#include "common/http/http.h"
 
 #include <fmt/format.h>
 #include <poll.h>
@@ -500,7 +500,7 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
 
 class Server final : public HttpServer {
  public:
-  Server(asio::io_context& io, std::shared_ptr<Shared> shared) : acceptor_(io), shared_(std::move(shared)) {}
+  Server(asio::io_context& io, std::shared_ptr<Shared> shared) : acceptor_(io), pause_(io), shared_(std::move(shared)) {}
   ~Server() override { Stop(); }
 
   Status Listen(const std::string& host, std::uint16_t port, const std::optional<TlsFiles>& tls) {
@@ -527,6 +527,7 @@ class Server final : public HttpServer {
   void Stop() override {
     Error ignored;
     acceptor_.close(ignored);
+    pause_.cancel();
     for (Connection* connection : std::set<Connection*>(shared_->open)) connection->CloseNow();
   }
 
@@ -545,8 +546,17 @@ class Server final : public HttpServer {
   void AcceptNext() {
     acceptor_.async_accept([this](Error error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error) Begin(std::move(socket));
-      AcceptNext();
+      if (error) return AcceptLater();
+      AcceptNext();  // first, so that the listener stays even if there is no memory for this connection
+      Begin(std::move(socket));
+    });
+  }
+
+  // Without a free file descriptor the next call would fail at once, too, and the thread would never rest.
+  void AcceptLater() {
+    pause_.expires_after(std::chrono::milliseconds(100));
+    pause_.async_wait([this](Error error) {
+      if (!error && acceptor_.is_open()) AcceptNext();
     });
   }
 
@@ -584,6 +594,7 @@ class Server final : public HttpServer {
 
   std::optional<asio::ssl::context> tls_;
   tcp::acceptor acceptor_;
+  asio::steady_timer pause_;
   std::shared_ptr<Shared> shared_;
 };
 

@@ -1,4 +1,4 @@
-#include "gateway/address.h"
+#include "common/http/address.h"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
@@ -9,6 +9,7 @@
 #include <cctype>
 #include <utility>
 
+#include "common/base/files.h"
 #include "common/base/parse_number.h"
 #include "common/base/printable.h"
 
@@ -126,10 +127,26 @@ Status CheckToken(std::string_view token) {
       fmt::format("the token has {} characters; it needs {} to {} letters, digits, - and _", token.size(), kLeast, kMost));
 }
 
+Result<std::string> ReadToken(std::string_view option, const std::string& path) {
+  constexpr std::size_t kMostBytes = 256;
+  Result<std::string> token = ReadTextFile(path, kMostBytes);
+  if (!token.ok()) return Status(token.status().code(), fmt::format("{} {}", option, token.status().message()));
+  while (token->ends_with('\n')) token->pop_back();
+  if (const Status checked = CheckToken(*token); !checked.ok()) {
+    return Status::InvalidArgument(fmt::format("{} {}: {}", option, path, checked.message()));
+  }
+  return token;
+}
+
 bool SameToken(std::string_view a, std::string_view b) {
   unsigned difference = a.size() == b.size() ? 0 : 1;
   for (std::size_t i = 0; i < a.size(); ++i) difference |= unsigned(a[i] ^ (b.empty() ? 'x' : b[i % b.size()]));
   return difference == 0;
+}
+
+bool IsBearer(const std::optional<std::string>& authorization, std::string_view token) {
+  constexpr std::string_view kBearer = "Bearer ";
+  return authorization && authorization->starts_with(kBearer) && SameToken(std::string_view(*authorization).substr(kBearer.size()), token);
 }
 
 }  // namespace slabstream

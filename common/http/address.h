@@ -1,4 +1,5 @@
-// Where the gateway listens and under which names it may be asked: the checks of Host and Origin that keep foreign pages out. Pure.
+// Where an HTTP server listens, who may ask it by a token, and under which names it may be asked: the checks of Host and Origin that keep
+// foreign pages out.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
 // "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
 Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
 
-// Which requests are the gateway's own.
+// Which requests are the server's own.
 class OriginRules {
  public:
   // `proxy_origin`: of the proxy in front; empty: there is none.
@@ -42,7 +43,11 @@ class OriginRules {
 Result<std::string> MakeToken();
 // What may stand in --token-file: 16 to 128 letters, digits, - and _. InvalidArgument.
 Status CheckToken(std::string_view token);
+// The token in a file, without the end of its line. InvalidArgument and the errors of ReadTextFile, which name the option.
+Result<std::string> ReadToken(std::string_view option, const std::string& path);
 // In time that does not depend on where they differ.
 bool SameToken(std::string_view a, std::string_view b);
+// Whether this is the header `Authorization: Bearer TOKEN`.
+bool IsBearer(const std::optional<std::string>& authorization, std::string_view token);
 
 }  // namespace slabstream
