@@ -402,4 +402,19 @@ DatasetSizes DatasetMachine::sizes() const {
           .uploads = state.uploads.size()};
 }
 
+DatasetCounts DatasetMachine::counts() const {
+  State& state = *state_;
+  DatasetCounts counts{.voxel_bytes = state.datasets.bytes(), .refused = state.refused};
+  state.datasets.ForEach([&](const std::string& name, const DatasetTable::Entry& entry) {
+    if (entry.awaited != 0 || IsLevelName(name)) return;
+    switch (entry.state) {
+      case DatasetState::kUnloaded: ++counts.unloaded; break;
+      case DatasetState::kLoading: ++counts.loading; break;
+      case DatasetState::kReady: ++counts.ready; break;
+      case DatasetState::kFailed: ++counts.failed; break;
+    }
+  });
+  return counts;
+}
+
 }  // namespace slabstream

@@ -191,6 +191,13 @@ struct DatasetSizes {
   std::size_t questions = 0, uploads = 0;
 };
 
+// What there is, and what has been counted since the start.
+struct DatasetCounts {
+  std::size_t unloaded = 0, loading = 0, ready = 0, failed = 0;  // in the catalogue
+  std::uint64_t voxel_bytes = 0;                                 // in the coordinator's memory
+  RefusedRequests refused;                                       // questions and uploads, and what could not be decoded
+};
+
 class DatasetMachine {
  public:
   explicit DatasetMachine(DatasetConfig config);
@@ -200,6 +207,7 @@ class DatasetMachine {
   std::vector<DatasetAction> Step(const DatasetEvent& event, Time now);
   Time NextWake() const;  // Time::max(): nothing happens by itself
   DatasetSizes sizes() const;
+  DatasetCounts counts() const;
 
  private:
   struct State;

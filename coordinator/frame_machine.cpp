@@ -418,4 +418,22 @@ FrameSizes FrameMachine::sizes() const {
           .slots = state.roster.slots().slots.size()};
 }
 
+FrameCounts FrameMachine::counts() const {
+  const State& state = *state_;
+  const std::size_t staying = state.roster.staying();
+  return {.clients = state.clients.size(),
+          .queued = state.queue.size(),
+          .running = state.frames.size(),
+          .workers_staying = staying,
+          .workers_leaving = state.roster.members().size() - staying,
+          .slots_vacant = std::size_t(std::ranges::count(state.roster.slots().slots, WorkerId{0})),
+          .frames_done = state.frames_done,
+          .frames_failed = state.frames_failed,
+          .frames_cancelled = state.frames_cancelled,
+          .workers_lost = state.workers_lost,
+          .refused = state.refused};
+}
+
+std::uint64_t FrameMachine::frames_done() const { return state_->frames_done; }
+
 }  // namespace slabstream

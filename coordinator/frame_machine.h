@@ -144,6 +144,16 @@ struct FrameSizes {
   std::size_t workers = 0, slots = 0;
 };
 
+// What there is, and what has been counted since the start.
+struct FrameCounts {
+  std::size_t clients = 0, queued = 0, running = 0;
+  std::size_t workers_staying = 0, workers_leaving = 0, slots_vacant = 0;
+  std::uint64_t frames_done = 0, frames_failed = 0;
+  std::uint64_t frames_cancelled = 0;  // by their clients, or because these have gone
+  std::uint64_t workers_lost = 0;
+  RefusedRequests refused;
+};
+
 class FrameMachine {
  public:
   explicit FrameMachine(CoordinatorConfig config);
@@ -153,6 +163,8 @@ class FrameMachine {
   std::vector<FrameAction> Step(const FrameEvent& event, Time now);
   Time NextWake() const;
   FrameSizes sizes() const;
+  FrameCounts counts() const;
+  std::uint64_t frames_done() const;  // as in counts()
 
  private:
   struct State;

@@ -178,8 +178,8 @@ void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status
   EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
   if (as != nullptr) {
     ++(refused.*as);
-  } else if (status.code() != StatusCode::kCancelled) {
-    ++frames_failed;
+  } else {
+    ++(status.code() == StatusCode::kCancelled ? frames_cancelled : frames_failed);
   }
 }
 
@@ -195,11 +195,15 @@ void FrameMachine::State::FreeClient(PeerToken client) {
   actions.emplace_back(std::in_place_type<ToDatasets>, ForgetClient{client});
   if (!clients.Forget(client)) return;
   actions.emplace_back(ClientLeft{client});
-  for (const OpenRequest& request : queue.Forget(client)) actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
+  for (const OpenRequest& request : queue.Forget(client)) {
+    actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
+    ++frames_cancelled;
+  }
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
     if (frame.request().client == client) orphans.push_back(frame.id());
   }
+  frames_cancelled += orphans.size();
   for (const FrameId id : orphans) EndFrame(id, "its client has gone");
 }
 

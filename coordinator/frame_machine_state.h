@@ -59,7 +59,7 @@ struct FrameMachine::State {
   std::optional<Time> started;  // the first Step
   Time next_ping;               // while there are workers
   bool stopped = false;
-  std::uint64_t frames_done = 0, frames_failed = 0, workers_lost = 0;
+  std::uint64_t frames_done = 0, frames_failed = 0, frames_cancelled = 0, workers_lost = 0;
   RefusedRequests refused;
 
   std::vector<FrameAction> actions;  // of this Step

@@ -11,6 +11,7 @@
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
+#include "common/metrics/metrics_listener.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
@@ -20,14 +21,17 @@
 namespace slabstream {
 namespace {
 
-Status Serve(CoordinatorOptions options) {
+Status Serve(CoordinatorOptions options, const MetricsOptions& metrics) {
   BlockStopSignals();
   Context context;
   auto service = CoordinatorService::Start(context, std::move(options));
   if (!service.ok()) return service.status();
+  const auto listener = MetricsListener::Start(metrics, [&coordinator = **service] { return coordinator.MetricsText(); });
+  if (!listener.ok()) return listener.status();
   // Whoever started this process reads the ports that were chosen from this line.
-  (void)std::printf("slabstream-coordinator ready client=%s workers=%s\n", (*service)->client_endpoint().c_str(),
-                    (*service)->worker_endpoint().c_str());
+  const std::string measured = *listener == nullptr ? "" : " metrics=" + (*listener)->url();
+  (void)std::printf("slabstream-coordinator ready client=%s workers=%s%s\n", (*service)->client_endpoint().c_str(),
+                    (*service)->worker_endpoint().c_str(), measured.c_str());
   if (Status told = FlushOutput(); !told.ok()) return told;
   WaitUntilStopped(**service);
   return Status::Ok();
@@ -35,6 +39,7 @@ Status Serve(CoordinatorOptions options) {
 
 int Run(int argc, char** argv) {
   CoordinatorOptions options;
+  MetricsOptions metrics;
   options.client_endpoint = "tcp://127.0.0.1:7420";
   std::vector<std::string> data;
   bool compress = false;
@@ -67,6 +72,7 @@ int Run(int argc, char** argv) {
             "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
       ->type_name("LINK")
       ->default_str(kDefaultLink);
+  AddMetricsOptions(app, metrics);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
     SetReadMemory(options.machine.memory_bytes);  // before anything is read
     FoundData found = FindData(data);
@@ -78,7 +84,7 @@ int Run(int argc, char** argv) {
     options.machine.log_level = LeastLogLevel();
     LimitMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
-    return Serve(std::move(options));
+    return Serve(std::move(options), metrics);
   });
 }
 

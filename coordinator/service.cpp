@@ -19,6 +19,7 @@
 #include "common/base/shared_arena.h"
 #include "common/transport/endpoint.h"
 #include "coordinator/background_actions.h"
+#include "coordinator/coordinator_metrics.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/service_keys.h"
 #include "coordinator/voxel_server.h"
@@ -67,8 +68,8 @@ struct CoordinatorService::Impl {
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
         voxels(std::move(voxel_server)),
-        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *voxels) {
-  }
+        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *voxels),
+        metrics(service_options.machine.memory_bytes) {}
 
   void Run();
   void Loop();
@@ -89,6 +90,7 @@ struct CoordinatorService::Impl {
     }
   }
   void Step(auto& machine, auto&& event);
+  void CountFrames(const std::vector<FrameAction>& actions);
   // One for each kind of action.
   void Perform(ToDatasets& action) { Step(datasets, action); }
   void Perform(DatasetNews& action) { Step(frames, action); }
@@ -122,6 +124,7 @@ struct CoordinatorService::Impl {
   std::array<LimitedLog, 3> notes = {LimitedLog(kNotesAtOnce, kEachNote), LimitedLog(kNotesAtOnce, kEachNote),
                                      LimitedLog(kNotesAtOnce, kEachNote)};
   Time next_forget;
+  CoordinatorMetrics metrics;
   std::jthread thread;  // owns the sockets and the machines; last member: ends first
 };
 
@@ -151,6 +154,7 @@ void CoordinatorService::Impl::Loop() {
     Wait(sockets, &background.wakeup(),
          std::clamp(std::min(frames.NextWake(), datasets.NextWake()) - MonotonicNow(), Duration::zero(), kLongestWait));
     for (CoordinatorEvent& event : background.TakeEvents()) HandleEvent(std::move(event));
+    if (metrics.now.wanted()) metrics.now.Set({frames.counts(), datasets.counts()});
     ReceiveFromWorkers();
     ReceiveFromClients();
     const Time now = MonotonicNow();
@@ -179,8 +183,22 @@ void CoordinatorService::Impl::HandleEvent(CoordinatorEvent event) {
 }
 
 void CoordinatorService::Impl::Step(auto& machine, auto&& event) {
-  for (auto& action : machine.Step(std::forward<decltype(event)>(event), MonotonicNow())) {
+  const std::uint64_t done_before = frames.frames_done();
+  auto actions = machine.Step(std::forward<decltype(event)>(event), MonotonicNow());
+  if constexpr (std::same_as<decltype(actions), std::vector<FrameAction>>) {
+    if (frames.frames_done() != done_before) CountFrames(actions);
+  }
+  for (auto& action : actions) {
     std::visit([this](auto& each) { Perform(each); }, action);
+  }
+}
+
+// Of a step that has made a frame: its answer is among the actions. Answers that are sent again are not of such steps.
+void CoordinatorService::Impl::CountFrames(const std::vector<FrameAction>& actions) {
+  for (const FrameAction& action : actions) {
+    const auto* const to_client = std::get_if<ToClient>(&action);
+    const auto* const reply = to_client == nullptr ? nullptr : std::get_if<FrameReply>(&to_client->message);
+    if (reply != nullptr && reply->groups_done == reply->group_count) metrics.CountFrame(reply->statistics);
   }
 }
 
@@ -339,6 +357,10 @@ const std::string& CoordinatorService::worker_endpoint() const { return impl_->w
 void CoordinatorService::RequestStop() {
   impl_->stop_requested = true;
   impl_->background.wakeup().Notify();
+}
+
+std::string CoordinatorService::MetricsText() {
+  return impl_->metrics.Text([this] { impl_->background.wakeup().Notify(); });
 }
 
 void CoordinatorService::WaitUntilStopped() { impl_->stopped.wait(false); }

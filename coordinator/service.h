@@ -42,6 +42,8 @@ class CoordinatorService {
   const std::string& client_endpoint() const;  // with the port that was chosen
   const std::string& worker_endpoint() const;
 
+  std::string MetricsText();  // for Prometheus; from any thread
+
   void RequestStop();       // from any thread or a signal-handling one; returns at once
   void WaitUntilStopped();  // until RequestStop or a client's ShutDown has been carried out
   bool stopped() const;

@@ -12,6 +12,7 @@
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
+#include "common/metrics/metrics_listener.h"
 #include "common/service/service_file.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
@@ -21,12 +22,14 @@
 namespace slabstream {
 namespace {
 
-Status Serve(WorkerOptions options) {
+Status Serve(WorkerOptions options, const MetricsOptions& metrics) {
   if (Status simd = LimitSimdTargetByEnvironment(); !simd.ok()) return simd;
   BlockStopSignals();
   Context context;
   auto service = WorkerService::Start(context, std::move(options));
   if (!service.ok()) return service.status();
+  const auto listener = MetricsListener::Start(metrics, [&worker = **service] { return worker.MetricsText(); });
+  if (!listener.ok()) return listener.status();
   WaitUntilStopped<WorkerService, &WorkerService::RequestLeave>(**service);
   return (*service)->ended();
 }
@@ -34,6 +37,7 @@ Status Serve(WorkerOptions options) {
 int Run(int argc, char** argv) {
   constexpr int kMaxCacheMib = 1 << 24;  // 16 TiB
   WorkerOptions options;
+  MetricsOptions metrics;
   int cache_mib = 0;
   std::string compress = "auto", service;
   bool frames_only = false;
@@ -71,6 +75,7 @@ int Run(int argc, char** argv) {
       ->type_name("TIME")
       ->default_str("30s");
   app.add_flag("--no-shared-memory", frames_only, "Send images to workers of this host over sockets, too");
+  AddMetricsOptions(app, metrics);
   return RunService(app, argc, argv, "worker " + std::to_string(::getpid()), [&] {
     if (options.coordinator_endpoint.empty()) {
       const char* const variable = std::getenv("SLABSTREAM_SERVICE");
@@ -88,7 +93,7 @@ int Run(int argc, char** argv) {
     options.share_memory = !frames_only;
     SetReadMemory(options.machine.memory_bytes);
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;
-    return Serve(std::move(options));
+    return Serve(std::move(options), metrics);
   });
 }
 

@@ -26,6 +26,7 @@
 #include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
 #include "worker/stored_voxels.h"
+#include "worker/worker_metrics.h"
 
 namespace slabstream {
 namespace {
@@ -117,9 +118,10 @@ struct WorkerService::Impl {
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
-  Status ended;                    // set before `stopped`
-  bool stop_now = false;           // set by the machine
-  LimitedLog complaints;           // about messages
+  Status ended;           // set before `stopped`
+  bool stop_now = false;  // set by the machine
+  LimitedLog complaints;  // about messages
+  WorkerMetrics metrics{options.machine.memory_bytes};
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
   std::optional<Executor> executor;
@@ -152,6 +154,7 @@ Status WorkerService::Impl::Loop() {
     Wait(sockets, &outbox.wakeup(), std::clamp(machine.NextWake() - MonotonicNow(), Duration::zero(), kLongestWait));
     if (executor->broken()) throw std::runtime_error("a task could not report its failure");
     for (ExecutorOutput& output : outbox.TakeAll()) HandleOutput(output);
+    if (metrics.now.wanted()) metrics.now.Set(machine.counts());
     Receive<CoordinatorToWorker>(control, Plane::kControl);
     Receive<WorkerToWorker>(images, Plane::kImages);
     if (voxels) Receive<VoxelsToWorker>(*voxels, Plane::kVoxels);
@@ -235,12 +238,14 @@ void WorkerService::Impl::SetRegistered() {
 
 void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
   if (auto* event = std::get_if<WorkerEvent>(&output)) {
+    metrics.Count(*event);
     HandleEvent(std::move(*event));
   } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
     const Status sent = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
       return control.Send({}, std::move(frame->header), frame->payload);
     });
+    metrics.CountSent(Plane::kControl, frame->payload.size(), sent.ok());
     if (!sent.ok()) HandleEvent(SendFailed{frame->key, sent});
   } else {
     auto& partial = std::get<OutgoingPartial>(output);
@@ -250,6 +255,7 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
       if (options.task_hook) options.task_hook("send");
       sent = peers.Send(partial.to, std::move(partial.header), partial.payload, MonotonicNow());
     });
+    metrics.CountSent(Plane::kImages, partial.payload.size(), tried.ok() && sent.ok());
     if (!tried.ok()) return HandleEvent(SendFailed{partial.key, tried});  // no fault of the peer's
     if (sent.ok()) return;
     LogWarning("worker " + std::to_string(partial.to.worker) + " is not reached: " + sent.message());
@@ -364,6 +370,10 @@ void WorkerService::RequestLeave() {
 void WorkerService::RequestStop() {
   impl_->stop_requested = true;
   impl_->outbox.wakeup().Notify();
+}
+
+std::string WorkerService::MetricsText() {
+  return impl_->metrics.Text([this] { impl_->outbox.wakeup().Notify(); });
 }
 
 void WorkerService::WaitUntilRegistered() { impl_->registered.wait(false); }

@@ -35,6 +35,8 @@ class WorkerService {
 
   const std::string& images_endpoint() const;  // where other workers send images at first, with the port that was chosen
 
+  std::string MetricsText();  // for Prometheus; from any thread
+
   // Returns once the coordinator has registered this worker for the first time, or the service has stopped.
   void WaitUntilRegistered();
 

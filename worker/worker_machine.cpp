@@ -510,4 +510,12 @@ WorkerSizes WorkerMachine::sizes() const {
           .boxes = state.boxes.size()};
 }
 
+WorkerCounts WorkerMachine::counts() const {
+  return {.sizes = sizes(),
+          .cached_bytes = state_->boxes.cached_bytes(),
+          .fetched_bytes = state_->boxes.fetched_bytes(),
+          .registered = registered(),
+          .leaving = state_->leave_by.has_value()};
+}
+
 }  // namespace slabstream

@@ -314,6 +314,13 @@ struct WorkerSizes {
   std::size_t boxes = 0;
 };
 
+// What is told of the worker from outside the service (metrics).
+struct WorkerCounts {
+  WorkerSizes sizes;
+  std::uint64_t cached_bytes = 0, fetched_bytes = 0;  // as in Heartbeat
+  bool registered = false, leaving = false;
+};
+
 class WorkerMachine {
  public:
   explicit WorkerMachine(WorkerConfig config);
@@ -328,6 +335,7 @@ class WorkerMachine {
   WorkerId worker() const;                      // 0 while unregistered
   const Peer* FindPeer(WorkerId worker) const;  // another worker, as the coordinator has named it; null: it has not, or it has gone
   WorkerSizes sizes() const;
+  WorkerCounts counts() const;
 
  private:
   struct State;

@@ -272,6 +272,10 @@ void DeclareUp(const CommandLine& line) {
             "Memory limit of all processes: the coordinator gets a third, the workers share the rest")
       ->type_name("SIZE")
       ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
+  AddInteger(*sub, "--metrics", options->metrics, 1, 65535,
+             "Serve metrics for Prometheus on loopback: the coordinator at this port, each worker at one of the next")
+      ->type_name("PORT")
+      ->default_str("no metrics");
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   AddLogLevel(*sub, line.log_level)->default_str("info for the processes that it starts, warning for itself");
   sub->callback([&run = line.run, options, &log_level = line.log_level] {

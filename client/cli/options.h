@@ -120,6 +120,7 @@ struct UpOptions {
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
   std::uint64_t memory = 0;       // bytes, of all processes together
+  int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none
   bool detach = false;
   std::string log_level;  // of the processes that it starts; empty: info
 };

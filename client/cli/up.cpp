@@ -186,6 +186,7 @@ class LocalService {
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
+    AddMetrics(arguments, 0);
     if (Status started = StartChild(0, kCoordinatorProgram, std::move(arguments)); !started.ok()) return started;
     Child& child = *children_.front().process;
     state_.coordinator = child.pid();
@@ -217,10 +218,15 @@ class LocalService {
     } else {
       arguments.insert(arguments.end(), {"--service", ServiceFileOf(Role::kWorker)});
     }
+    AddMetrics(arguments, number);
     if (Status started = StartChild(number, kWorkerProgram, std::move(arguments)); !started.ok()) return started;
     state_.workers.resize(std::max(state_.workers.size(), number));
     state_.workers[number - 1] = children_[number].process->pid();
     return Status::Ok();
+  }
+
+  void AddMetrics(std::vector<std::string>& arguments, std::size_t number) const {
+    if (options_.metrics != 0) arguments.insert(arguments.end(), {"--metrics", std::to_string(std::size_t(options_.metrics) + number)});
   }
 
   std::string LogLevelOfChildren() const { return options_.log_level.empty() ? "info" : options_.log_level; }
@@ -356,6 +362,9 @@ Status CheckData(const std::vector<std::string>& data) {
 }  // namespace
 
 Status RunUp(const UpOptions& options) {
+  if (options.metrics + options.workers > 65535) {
+    return Status::InvalidArgument(fmt::format("--metrics {}: {} workers need the ports after it", options.metrics, options.workers));
+  }
   const Result<MemoryShares> memory = ShareMemory(options.memory, options.workers);
   if (!memory.ok()) return memory.status();
   if (Status readable = CheckData(options.data); !readable.ok()) return readable;

@@ -1,0 +1,39 @@
+// WorkerMetrics: what a worker measures, as text for Prometheus (docs/operating.md). Count, CountSent and Set are called by the thread of
+// the machine, Text by any.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <string>
+
+#include "common/metrics/exposition.h"
+#include "common/metrics/snapshot.h"
+#include "common/stats/report.h"
+#include "common/wire/any_message.h"
+#include "worker/worker_machine.h"
+
+namespace slabstream {
+
+class WorkerMetrics {
+ public:
+  explicit WorkerMetrics(std::uint64_t memory_limit) : memory_limit_(memory_limit) {}
+
+  void Count(const WorkerEvent& event);                           // of those of the executor
+  void CountSent(Plane plane, std::size_t bytes, bool has_left);  // a payload: kImages, to a worker; kControl, a picture
+
+  Snapshot<WorkerCounts> now;
+
+  std::string Text(const std::function<void()>& wake);  // as in Snapshot
+
+ private:
+  const std::uint64_t memory_limit_;  // 0: none
+  mutable std::mutex mutex_;
+  TimeHistogram render_times_, combine_times_;
+  StageTimes stage_ns_{};
+  std::uint64_t rendered_ = 0, failed_ = 0, cancelled_ = 0;
+  std::uint64_t stored_bytes_ = 0, image_bytes_ = 0, picture_bytes_ = 0, unsent_ = 0;
+};
+
+}  // namespace slabstream
