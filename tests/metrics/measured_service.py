@@ -83,7 +83,7 @@ class MeasuredService:
     """A coordinator, two workers, of which the second one wants a token, and a gateway, on free ports."""
 
     def __init__(self, programs):
-        self.programs = Path(programs)
+        self.programs = Path(programs).resolve()
         self.folder = Path(tempfile.mkdtemp(prefix="slabstream-metrics-", dir="/tmp"))
         self.environment = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder)}
         for name in ("SLABSTREAM_ENDPOINT", "SLABSTREAM_SERVICE"):
