@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/log.h"
+#include "common/base/notify_ready.h"
 #include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
@@ -33,6 +34,7 @@ Status Serve(CoordinatorOptions options, const MetricsOptions& metrics) {
   (void)std::printf("slabstream-coordinator ready client=%s workers=%s%s\n", (*service)->client_endpoint().c_str(),
                     (*service)->worker_endpoint().c_str(), measured.c_str());
   if (Status told = FlushOutput(); !told.ok()) return told;
+  NotifyReady();
   WaitUntilStopped(**service);
   return Status::Ok();
 }

@@ -5,6 +5,7 @@
 
 #include "client/service/service_choice.h"
 #include "client/service/service_state.h"
+#include "common/base/notify_ready.h"
 #include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
@@ -37,6 +38,7 @@ Status Serve(Options options) {
   // Whoever started this process reads the address from this line.
   (void)std::printf("ready %s\n", (*gateway)->url().c_str());
   if (Status told = FlushOutput(); !told.ok()) return told;
+  NotifyReady();
   const sigset_t signals = StopSignals();
   int signal = 0;
   (void)::sigwait(&signals, &signal);

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -114,8 +115,11 @@ Status WritePrivateTextFile(const std::string& path, const std::string& text) { 
 Result<std::string> ReadPrivateTextFile(const std::string& path, std::size_t max_bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
-  constexpr auto kOthers = fs::perms::group_all | fs::perms::others_all;
-  if (fs::exists(status) && (status.permissions() & kOthers) != fs::perms::none)
+  // systemd gives a service its credentials, which nobody else can reach, by an access list, and that shows as rights of the group.
+  const char* const credentials = std::getenv("CREDENTIALS_DIRECTORY");
+  const bool credential = credentials != nullptr && fs::path(path).parent_path() == credentials;
+  const auto others = credential ? fs::perms::others_all : fs::perms::group_all | fs::perms::others_all;
+  if (fs::exists(status) && (status.permissions() & others) != fs::perms::none)
     return Status::InvalidArgument(fmt::format("others can use '{}', which holds a secret (chmod 600)", path));
   return ReadTextFile(path, max_bytes);
 }
