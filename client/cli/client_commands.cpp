@@ -128,7 +128,7 @@ void DeclareTransfer(const CommandLine& line) {
   auto options = std::make_shared<TransferOptions>();
   std::vector<std::string_view> names;
   for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
-  AddParsed(
+  CLI::Option* const preset = AddParsed(
       *sub, "PRESET", options->request.transfer.choice,
       [is_name = OneOf(names)](const std::string& option, const std::string& text) -> Result<std::variant<std::string, TransferFunction>> {
         const Result<std::string> name = is_name(option, text);
@@ -136,6 +136,7 @@ void DeclareTransfer(const CommandLine& line) {
         return std::variant<std::string, TransferFunction>(*name);
       },
       "Which" + Explained(TransferPresets()));
+  NoteChoices(preset, names);
   sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values");
   CLI::Option* const list =
       sub->add_flag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");

@@ -12,10 +12,12 @@
 
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
+#include "client/cli/completion.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/cli/man_page.h"
 #include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
 
@@ -72,6 +74,12 @@ CLI::App* DeclareOptions(const CommandLine& line) {
                       [](CLI::App& found, const std::string&) { std::cout << DescribeOptions(found).dump(1) << "\n"; });
 }
 
+// `man COMMAND`, for the build, which makes manual pages.
+CLI::App* DeclareMan(const CommandLine& line) {
+  return DeclareAbout(line, "man", "Print the manual page of a command",
+                      [](CLI::App& found, const std::string& full_name) { std::cout << ManPage(found, full_name); });
+}
+
 // A number after --local is its value, as with --local=4; anything else is not, so that a SOURCE after a bare --local stays the source.
 // Last argument first, as CLI::App::parse wants them.
 std::vector<std::string> Arguments(int argc, const char* const* argv) {
@@ -102,11 +110,15 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   const CommandLine line{app, run, typed, log_level};
   for (const DeclareCommand declare : ClientCommands()) declare(line);
   for (const DeclareCommand declare : more) declare(line);
+  DeclareCompletion(line);
   DeclareHelp(line);
-  const CLI::App* const options = DeclareOptions(line);
+  const CLI::App *const options = DeclareOptions(line), *const man = DeclareMan(line);
   for (CLI::App* sub : app.get_subcommands(nullptr)) {
-    sub->group(sub == options || sub->get_name() == kAnnotateCommand ? kHidden : "Commands");
+    sub->group(sub == options || sub == man || sub->get_name() == kAnnotateCommand ? kHidden : "Commands");
     AllowLogLevel(*sub, log_level);
+  }
+  if (argc > 1 && argv[1] == kCompleteCommand) {  // before the parse: the words need not be complete
+    return Finish("slabstream", RunComplete(app, std::vector<std::string>(argv + 2, argv + argc)));
   }
 
   const auto name = [&app] {

@@ -48,15 +48,17 @@ std::string HelpFormatter::make_option_opts(const CLI::Option* option) const {
 }
 
 // Lists of choices follow the first line, so notes about the whole option go there.
-std::string HelpFormatter::make_option_desc(const CLI::Option* option) const {
-  std::string text = option->get_description();
+std::string OptionText(const CLI::Option& option) {
+  std::string text = option.get_description();
   const std::size_t end = std::min(text.find('\n'), text.size());
-  if (option->get_required()) {
+  if (option.get_required()) {
     text.insert(end, " (required)");
-  } else if (!option->get_default_str().empty()) {
-    text.insert(end, " (default: " + option->get_default_str() + ")");
+  } else if (!option.get_default_str().empty()) {
+    text.insert(end, " (default: " + option.get_default_str() + ")");
   }
-  return Wrapped(text);
+  return text;
 }
+
+std::string HelpFormatter::make_option_desc(const CLI::Option* option) const { return Wrapped(OptionText(*option)); }
 
 }  // namespace slabstream

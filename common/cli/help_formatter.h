@@ -6,6 +6,9 @@
 
 namespace slabstream {
 
+// The description of an option with its default or "required"; not wrapped.
+std::string OptionText(const CLI::Option& option);
+
 class HelpFormatter : public CLI::Formatter {
  public:
   HelpFormatter();

@@ -19,6 +19,7 @@
 #include "common/base/open_files.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
+#include "common/cli/man_page.h"
 
 namespace slabstream {
 
@@ -71,6 +72,12 @@ void SetUp(CLI::App& app, const std::string& version) {
   app.formatter(std::make_shared<HelpFormatter>());
   app.set_help_flag("-h,--help", "Print this text");
   app.set_version_flag("--version", version, "Print the version");
+  // For the build, which makes manual pages.
+  const auto print_page = [&app] {
+    std::cout << ManPage(app, app.get_name());
+    throw CLI::Success();
+  };
+  app.add_flag_callback("--man", print_page, "Print the manual page")->group("");
 }
 
 int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run) {
@@ -87,8 +94,9 @@ int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::fun
 CLI::Option* AddLogLevel(CLI::App& app, std::string& level) {
   std::vector<std::string_view> levels;
   for (const auto& [name, unused] : LogLevelNames()) levels.push_back(name);
-  return AddParsed(app, "--log-level", level, OneOf(std::move(levels)), "Least level logged to stderr: debug, info, warning, error or off")
-      ->type_name("NAME");
+  CLI::Option* const option =
+      AddParsed(app, "--log-level", level, OneOf(levels), "Least level logged to stderr: debug, info, warning, error or off");
+  return NoteChoices(option->type_name("NAME"), levels);
 }
 
 int RunService(CLI::App& app, int argc, const char* const* argv, const std::string& log_name, const std::function<Status()>& serve) {

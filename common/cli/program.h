@@ -29,7 +29,7 @@ Status ReportAll(const std::string& who, const std::vector<Status>& failures);
 void PrintNote(const std::string& message);
 void PrintWarning(const std::string& message);
 
-// The style of help texts, --help and --version.
+// The style of help texts, --help, --version, and --man for the build, which help texts do not mention.
 void SetUp(CLI::App& app, const std::string& version);
 
 // Parses, and runs `run`. Returns the exit status.
