@@ -30,17 +30,15 @@ template <class T>
 HWY_INLINE void AddCrossings(const MarchWork& work, Mask rays, const Crossing& crossing, Sums& sums) {
   const FloatTag df;
   const SamplePlace place = crossing.Place();
-  const auto at = IndexBefore(*work.box, place, rays);
   Light light = {Set(1), hn::Zero(df)};
-  if (IsLit(work))
-    light = LightOn(work, GradientAt(NeighboursAt<T>(*work.box, reinterpret_cast<const T*>(work.box->samples), at), place), place);
+  if (IsLit(work)) light = LightOn(work, GradientAt(LoadNeighbours<T>(*work.box, place, rays), place), place);
   const auto entry = hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), crossing.surface));
   const float* const colors = work.look->surface_looks.data();
   const auto opacity = hn::GatherIndex(df, colors + 3, entry);
   if (work.layers == nullptr || work.layers->labels == nullptr) return sums.Add(rays, opacity, colors, entry, light);
   const LabelTables& tables = *work.layers->labels;
   const float* const tints = tables.entries.data();
-  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, at));
+  const auto label = hn::ShiftLeft<2>(NearestLabel(*work.layers, *work.box, place, IndexBefore(*work.box, place, rays)));
   const auto changed = hn::GatherIndex(df, tints + 3, label);
   const auto shown = hn::Ge(changed, hn::Zero(df));
   const auto factor = hn::IfThenElse(shown, tables.surface ? hn::Zero(df) : changed, Set(1));

@@ -40,8 +40,9 @@ struct VisibleValues {
   friend bool operator==(const VisibleValues&, const VisibleValues&) = default;
 };
 
-// `has_surfaces`: isosurfaces are shown. `layers`: of the piece; null if none is shown.
-Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, bool has_surfaces, const LayerPiece* layers) {
+// `layers`: of the piece; null if none is shown.
+Visibility VisibilityOf(const RayPiece& piece, const VisibleValues& visible, const LayerPiece* layers) {
+  const bool has_surfaces = !visible.volume.isovalues().empty();
   const Index3& counts = piece.cells.counts;
   std::vector<std::uint8_t> with_samples =
       VisibleCells(piece.cells, [&](float low, float high) { return visible.volume.AnyMatterBetween(low, high); });
@@ -129,8 +130,7 @@ class VisibilityCache : public BoxCache {
       visible_ = std::move(visible);
       pieces_.clear();
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces_.push_back(
-            VisibilityOf(pieces[i], *visible_, !look.isovalues.empty(), shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
+        pieces_.push_back(VisibilityOf(pieces[i], *visible_, shown.pieces == nullptr ? nullptr : &(*shown.pieces)[i]));
       }
     }
     for (Visibility& piece : pieces_) {

@@ -20,38 +20,41 @@ Sides SidesOfRow(const T* corners, std::int32_t count, float value) {
   return {above & above >> 1 & cells, (above | above >> 1) & cells};
 }
 
+// Sets the bits of the cells of a macrocell that hold the surface. `corners`: the first one's lowest corner; `count`: cells along each
+// axis.
+template <class T>
+void SetBits(const T* corners, std::int32_t row, std::int64_t slice, const Index3& count, float value, std::int32_t (&bits)[2]) {
+  Sides rows[kCellSide + 1][kCellSide + 1];
+  for (std::int32_t z = 0; z <= count.z; ++z) {
+    for (std::int32_t y = 0; y <= count.y; ++y) rows[z][y] = SidesOfRow(corners + z * slice + std::int64_t{y} * row, count.x, value);
+  }
+  for (std::int32_t z = 0; z < count.z; ++z) {
+    for (std::int32_t y = 0; y < count.y; ++y) {
+      const Sides &a = rows[z][y], &b = rows[z][y + 1], &c = rows[z + 1][y], &d = rows[z + 1][y + 1];
+      const unsigned holds = (a.any | b.any | c.any | d.any) & ~(a.all & b.all & c.all & d.all);
+      bits[z & 1] |= std::int32_t(holds << (16 * (z >> 1) + 4 * y));
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::int32_t> FindSurfaceCells(const PaddedVoxels& voxels, const MacrocellRanges& cells, const VisibleSamples& visible) {
   const Index3& counts = cells.counts;
   std::vector<std::int32_t> found(2 * cells.ranges.size());
-  const Index3 most = voxels.box.size() + Uniform(2 * kPad - 2);  // cells along each axis, the first one next to voxel box.begin - 1
+  const Index3 cells_along = voxels.box.size() + Uniform(2 * kPad - 2);  // the first one is next to voxel box.begin - 1
   VisitScalarType(voxels.type, [&]<class T>(const T*) {
     const T* const first = reinterpret_cast<const T*>(voxels.At(voxels.box.begin - Uniform(1)));
     tbb::parallel_for(std::int32_t{0}, counts.z, [&](std::int32_t group_z) {
-      auto number = std::size_t(group_z) * std::size_t(counts.y) * std::size_t(counts.x);
       for (Index3 group{0, 0, group_z}; group.y < counts.y; ++group.y) {
-        for (group.x = 0; group.x < counts.x; ++group.x, ++number) {
-          const MacrocellRange& range = cells.ranges[number];
-          if (!visible.AnySurfaceBetween(range.min, range.max)) continue;
-          const Index3 begin = kCellSide * group;
-          const Index3 count = Min(Uniform(kCellSide), most - begin);
-          if (count.x <= 0) continue;
-          for (const float value : visible.isovalues()) {
-            const T* const corners = first + begin.z * voxels.slice + std::ptrdiff_t{begin.y} * voxels.row + begin.x;
-            Sides rows[kCellSide + 1][kCellSide + 1];
-            for (std::int32_t z = 0; z <= count.z; ++z) {
-              for (std::int32_t y = 0; y <= count.y; ++y)
-                rows[z][y] = SidesOfRow(corners + z * voxels.slice + y * voxels.row, count.x, value);
-            }
-            for (std::int32_t z = 0; z < count.z; ++z) {
-              for (std::int32_t y = 0; y < count.y; ++y) {
-                const Sides &a = rows[z][y], &b = rows[z][y + 1], &c = rows[z + 1][y], &d = rows[z + 1][y + 1];
-                const unsigned holds = (a.any | b.any | c.any | d.any) & ~(a.all & b.all & c.all & d.all);
-                found[2 * number + std::size_t(z & 1)] |= std::int32_t(holds << (16 * (z >> 1) + 4 * y));
-              }
-            }
-          }
+        for (group.x = 0; group.x < counts.x; ++group.x) {
+          const std::size_t number = NumberIn(counts, group);
+          const Index3 begin = kCellSide * group, count = Min(Uniform(kCellSide), cells_along - begin);
+          if (count.x <= 0 || !visible.AnySurfaceBetween(cells.ranges[number].min, cells.ranges[number].max)) continue;
+          const T* const corners = first + begin.z * voxels.slice + std::int64_t{begin.y} * voxels.row + begin.x;
+          std::int32_t bits[2] = {};
+          for (const float value : visible.isovalues()) SetBits(corners, voxels.row, voxels.slice, count, value, bits);
+          std::copy_n(bits, 2, &found[2 * number]);
         }
       }
     });

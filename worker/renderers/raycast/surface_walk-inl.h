@@ -160,37 +160,28 @@ class SurfaceWalk {
   // Rays of which no crossing is kept, but one up to `before` may be found.
   HWY_INLINE Mask MayCross(Floats before) const { return hn::And(hn::Eq(kept_, hn::Zero(FloatTag())), hn::Le(known_to_, before)); }
 
-  // Finds crossings of `rays` up to `to` and perhaps some behind, as many as can be kept.
+  // Finds the crossings of `rays` up to `to`, and perhaps some beyond. A ray that has as many as are kept stops there.
   HWY_NOINLINE void Find(Mask rays, Floats to) {
     const FloatTag df;
     const auto going_on = [&]() HWY_ATTR {
       return hn::And(hn::And(rays, walking_), hn::And(hn::Le(known_to_, to), hn::Lt(kept_, Set(float(kMostKept)))));
     };
     for (auto going = going_on(); !hn::AllFalse(df, going); going = going_on()) {
-      // Rays wait in cells that hold a surface until all of them are in one.
-      const IntTag di;
-      SamplePlace place;
-      auto waiting = hn::Lt(Set(1), hn::Zero(df));
-      for (;;) {
-        const auto moving = hn::AndNot(waiting, going);
-        if (hn::AllFalse(df, moving) || hn::CountTrue(df, moving) < hn::CountTrue(df, waiting)) break;
-        for (std::size_t i = 0; i < 3; ++i) place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
+      // Rays wait in cells that hold a surface until more of them wait than move.
+      auto moving = going, waiting = hn::Lt(Set(1), hn::Zero(df));
+      while (!hn::AllFalse(df, moving) && hn::CountTrue(df, moving) >= hn::CountTrue(df, waiting)) {
+        const SamplePlace place = PlaceOfCells();
         const auto group = CellOf<kCellShift>(place, box_.cells, moving);
         const auto distance = DistanceAt(*work_.to_surfaces, octant_start_, group);
-        const auto empty = hn::RebindMask(df, hn::Gt(distance, hn::Zero(di)));
-        const auto holds = hn::And(hn::AndNot(empty, moving), HoldsSurface(group, place));
+        const auto holds = hn::And(moving, HoldsSurface(group, place));
+        const auto leaping = hn::And(moving, hn::RebindMask(df, hn::Gt(distance, hn::Zero(IntTag()))));
+        const auto stepping = hn::AndNot(hn::Or(holds, leaping), moving);
+        if (!hn::AllFalse(df, stepping)) Step(stepping);
+        if (!hn::AllFalse(df, leaping)) Leap(place, leaping, hn::ConvertTo(df, distance));
         waiting = hn::Or(waiting, holds);
-        const auto on = hn::AndNot(holds, moving);
-        const auto leaping = hn::And(on, empty);
-        if (hn::AllFalse(df, leaping)) {
-          Step(on);
-        } else {
-          Move(place, on, leaping, hn::ConvertTo(df, distance));
-        }
-        going = hn::Or(hn::AndNot(on, going), going_on());
+        moving = hn::AndNot(waiting, going_on());
       }
-      if (hn::AllFalse(df, waiting)) continue;
-      CrossCells(waiting);
+      if (!hn::AllFalse(df, waiting)) CrossCells(waiting);
     }
   }
 
@@ -304,14 +295,16 @@ class SurfaceWalk {
     for (;;) {
       const auto any = hn::Or(left[0], hn::Or(left[1], left[2]));
       if (hn::AllFalse(df, any)) return;
-      const auto is_first = left[0], is_second = hn::AndNot(is_first, left[1]);
-      const auto low = hn::IfThenElseZero(hn::Not(is_first), hn::IfThenElse(is_second, ends[1], ends[2]));
-      const auto high = hn::IfThenElse(is_first, ends[1], hn::IfThenElse(is_second, ends[2], ends[3]));
-      const auto low_side =
-          hn::Or(hn::And(is_first, sides[0]), hn::AndNot(is_first, hn::Or(hn::And(is_second, sides[1]), hn::AndNot(is_second, sides[2]))));
-      left[2] = hn::And(left[2], hn::Or(is_first, is_second));
-      left[1] = hn::And(left[1], is_first);
-      left[0] = hn::Xor(left[0], left[0]);
+      auto rest = any, low_side = hn::Lt(Set(1), zero);
+      auto low = zero, high = zero;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const auto taken = hn::And(rest, left[i]);
+        low = hn::IfThenElse(taken, ends[i], low);
+        high = hn::IfThenElse(taken, ends[i + 1], high);
+        low_side = hn::Or(low_side, hn::And(taken, sides[i]));
+        left[i] = hn::AndNot(taken, left[i]);
+        rest = hn::AndNot(taken, rest);
+      }
       const auto x = Bisect(above, low_side, low, high);
       const auto at = hn::Add(way.enter, hn::Mul(hn::Mul(x, Set(1.0F / 3)), hn::Sub(way.leave, way.enter)));
       const auto number = Set(float(surface));
@@ -322,7 +315,17 @@ class SurfaceWalk {
     }
   }
 
-  // Whether a surface passes through the cells that lie at `place`, in a group that has such cells.
+  // The lowest corners of the cells; fractions are not used.
+  HWY_INLINE SamplePlace PlaceOfCells() const {
+    SamplePlace place;
+    for (std::size_t i = 0; i < 3; ++i) {
+      place.voxel[i] = hn::Sub(hn::ConvertTo(IntTag(), cell_[i]), SetInt(box_.origin[int(i)]));
+      place.fraction[i] = place.position[i] = hn::Zero(FloatTag());
+    }
+    return place;
+  }
+
+  // Whether a surface passes through the cells that lie at `place`, in these groups.
   HWY_INLINE Mask HoldsSurface(Ints group, const SamplePlace& place) const {
     const IntTag di;
     const auto among = [&](std::size_t axis) HWY_ATTR { return hn::And(place.voxel[axis], SetInt(kCellSide - 1)); };
@@ -336,10 +339,8 @@ class SurfaceWalk {
   // Keeps the next crossing of these rays in their cells, and moves rays on that have no other one there.
   HWY_NOINLINE void CrossCells(Mask rays) {
     const FloatTag df;
-    const IntTag di;
     const auto zero = hn::Zero(df);
-    SamplePlace place;
-    for (std::size_t i = 0; i < 3; ++i) place.voxel[i] = hn::Sub(hn::ConvertTo(di, cell_[i]), SetInt(box_.origin[int(i)]));
+    const SamplePlace place = PlaceOfCells();
     const Neighbours<T> voxels = LoadNeighbours<T>(box_, place, rays);
     auto least = voxels.inner[0][0].a, greatest = least, magnitude = zero;
     for (const auto& slice : voxels.inner) {
@@ -376,14 +377,13 @@ class SurfaceWalk {
       kept_ = hn::Add(kept_, hn::IfThenElseZero(found, Set(1)));
       // A ray ends at the latest where the surfaces alone let too little through. Labels may change their opacity.
       if (work_.layers == nullptr) {
-        const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, hn::ShiftLeft<2>(hn::ConvertTo(di, surface_)));
+        const auto opacity = hn::GatherIndex(df, work_.look->surface_looks.data() + 3, hn::ShiftLeft<2>(hn::ConvertTo(IntTag(), surface_)));
         transmitted_ = hn::Sub(transmitted_, hn::IfThenElseZero(found, hn::Mul(transmitted_, opacity)));
       }
       walking_ = hn::And(walking_, hn::Or(hn::Not(found), hn::Gt(transmitted_, Set(work_.termination))));
       known_to_ = hn::IfThenElse(walking_, known_to_, Set(kRayEnd));
     }
-    const auto on = hn::And(hn::And(rays, walking_), hn::Not(hn::And(found, hn::Gt(nearest.changes, Set(1)))));
-    Step(on);
+    Step(hn::And(hn::And(rays, walking_), hn::Not(hn::And(found, hn::Gt(nearest.changes, Set(1))))));
   }
 
   // Moves rays into the next cell.
@@ -404,8 +404,8 @@ class SurfaceWalk {
     Moved(rays, leave);
   }
 
-  // Moves rays into the next cell, or those that leap to the border of the empty groups around them.
-  HWY_INLINE void Move(const SamplePlace& place, Mask rays, Mask leaping, Floats distance) {
+  // Moves rays to the border of the empty groups around them.
+  HWY_INLINE void Leap(const SamplePlace& place, Mask rays, Floats distance) {
     const FloatTag df;
     const auto zero = hn::Zero(df), one = Set(1);
     // The planes through which the rays leave.
@@ -415,9 +415,7 @@ class SurfaceWalk {
       const auto backward = hn::Lt(packet_.move[i], zero);
       const auto group = hn::ConvertTo(df, hn::ShiftRight<kCellShift>(place.voxel[i]));
       const auto ahead = hn::Add(group, hn::IfThenElse(backward, hn::Sub(one, distance), distance));
-      const auto of_groups = hn::Add(hn::Mul(ahead, Set(float(kCellSide))), Set(float(box_.origin[int(i)])));
-      const auto of_cell = hn::IfThenElse(backward, cell_[i], hn::Add(cell_[i], one));
-      plane[i] = hn::IfThenElse(leaping, of_groups, of_cell);
+      plane[i] = hn::Add(hn::Mul(ahead, Set(float(kCellSide))), Set(float(box_.origin[int(i)])));
       plane_at[i] = hn::IfThenElse(still_[i], Set(kRayEnd), PlaneAt(i, plane[i]));
       leave = hn::Min(leave, plane_at[i]);
     }
@@ -425,11 +423,10 @@ class SurfaceWalk {
       const auto backward = hn::Lt(packet_.move[i], zero);
       const auto last = hn::IfThenElse(backward, plane[i], hn::Sub(plane[i], one));  // cell before the plane
       const auto behind = hn::IfThenElse(backward, hn::Sub(plane[i], one), plane[i]);
-      // A leap along the other axes: never back, and not beyond the plane.
+      // Along the other axes: never back, and not beyond the plane.
       const auto beside = hn::Floor(PositionOf(packet_, i, leave));
       const auto limited = hn::IfThenElse(backward, hn::Min(hn::Max(beside, last), cell_[i]), hn::Max(hn::Min(beside, last), cell_[i]));
-      const auto next = hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, hn::IfThenElse(leaping, limited, cell_[i]));
-      cell_[i] = hn::IfThenElse(rays, next, cell_[i]);
+      cell_[i] = hn::IfThenElse(rays, hn::IfThenElse(hn::Eq(plane_at[i], leave), behind, limited), cell_[i]);
     }
     Moved(rays, leave);
   }
