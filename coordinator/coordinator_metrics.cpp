@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "common/metrics/process_metrics.h"
+#include "common/metrics/service_metrics.h"
 
 namespace slabstream {
 
@@ -11,7 +12,7 @@ void CoordinatorMetrics::CountFrame(const FrameStatistics& statistics) {
   frame_times_.Add(Duration(statistics.queued_ns + statistics.end_ns - statistics.begin_ns));
   queue_times_.Add(Duration(statistics.queued_ns));
   for (const RankReport& report : statistics.reports) {
-    for (std::size_t stage = 0; stage < stage_ns_.size(); ++stage) stage_ns_[stage] += report.stage_ns[stage];
+    AddTimes(stage_ns_, report.stage_ns);
     voxel_bytes_ += report.voxel_bytes;
     stored_bytes_ += report.stored_bytes;
     image_bytes_ += report.image_bytes;
@@ -30,11 +31,7 @@ std::string CoordinatorMetrics::Text(const std::function<void()>& wake) {
   out.Value(frames.frames_done, {{"result", "done"}});
   out.Value(frames.frames_failed, {{"result", "failed"}});
   out.Value(frames.frames_cancelled, {{"result", "cancelled"}});
-  out.Family("coordinator_refused_total", MetricType::kCounter, "Requests that were refused, by the reason.");
-  out.Value(refused.bad_request, {{"reason", "bad request"}});
-  out.Value(refused.unknown_dataset, {{"reason", "unknown dataset"}});
-  out.Value(refused.too_large, {{"reason", "too large"}});
-  out.Value(refused.over_quota, {{"reason", "over quota"}});
+  AddRefused(out, "coordinator_refused_total", "Requests that were refused, by the reason.", refused);
   out.Single("coordinator_queued_frames", MetricType::kGauge, "Frames that wait.", gauge(frames.queued));
   out.Single("coordinator_running_frames", MetricType::kGauge, "Frames that workers have parts of.", gauge(frames.running));
   out.Single("coordinator_clients", MetricType::kGauge, "Clients that are known.", gauge(frames.clients));
@@ -48,10 +45,7 @@ std::string CoordinatorMetrics::Text(const std::function<void()>& wake) {
   out.Histogram(frame_times_);
   out.Family("coordinator_queue_seconds", MetricType::kHistogram, "From a frame's request to its start.");
   out.Histogram(queue_times_);
-  out.Family("coordinator_stage_seconds_total", MetricType::kCounter, "Time of workers for frames, by stage; render contains others.");
-  for (std::size_t stage = 0; stage < stage_ns_.size(); ++stage) {
-    out.Value(double(stage_ns_[stage]) / 1e9, {{"stage", ToString(Stage(stage))}});
-  }
+  AddStageSeconds(out, "coordinator_stage_seconds_total", "Time of workers for frames, by stage; render contains others.", stage_ns_);
   out.Family("coordinator_bytes_total", MetricType::kCounter,
              "Bytes for frames by plane: voxels to workers, what was read from stores for them, images between workers.");
   out.Value(voxel_bytes_, {{"plane", "voxels"}});

@@ -1,5 +1,5 @@
-// CoordinatorMetrics: what a coordinator measures, as text for Prometheus (docs/operating.md). CountFrame and Set are called by the thread
-// of the machines, Text by any.
+// CoordinatorMetrics: what a coordinator measures, as text for Prometheus (docs/operating.md). The thread of the machines calls
+// CountFrame and now.Set; any thread calls Text.
 #pragma once
 
 #include <array>

@@ -9,6 +9,9 @@ fail() {
   exit 1
 }
 
+# The version of the project.
+version() { sed -n 's/^project(slabstream VERSION \([0-9.]*\).*/\1/p' "$repository/CMakeLists.txt"; }
+
 # Configures build/ with these options. A new one compiles several files at a time, which takes half the time.
 configure() {
   local unity=()

@@ -4,6 +4,7 @@
 
 #include "client/report/frame_summary.h"
 #include "common/metrics/process_metrics.h"
+#include "common/metrics/service_metrics.h"
 
 namespace slabstream {
 
@@ -94,11 +95,7 @@ std::string Metrics::Text(const ServiceNews& news) const {
   out.Single("service_running", MetricType::kGauge, "Frames that the service works on.", std::uint64_t{status.running});
   out.Single("service_frames_done_total", MetricType::kCounter, "Frames that the service has made, for all clients.", status.frames_done);
   out.Single("service_frames_failed_total", MetricType::kCounter, "Frames that failed.", status.frames_failed);
-  out.Family("service_refused_total", MetricType::kCounter, "Requests that the service refused.");
-  out.Value(status.refused.bad_request, {{"reason", "bad request"}});
-  out.Value(status.refused.unknown_dataset, {{"reason", "unknown dataset"}});
-  out.Value(status.refused.too_large, {{"reason", "too large"}});
-  out.Value(status.refused.over_quota, {{"reason", "over quota"}});
+  AddRefused(out, "service_refused_total", "Requests that the service refused.", status.refused);
   std::uint64_t cached = 0, fetched = 0;
   for (const WorkerStatus& worker : status.workers) {
     cached += worker.cached_bytes;

@@ -1,6 +1,7 @@
 #include "worker/worker_metrics.h"
 
 #include "common/metrics/process_metrics.h"
+#include "common/metrics/service_metrics.h"
 
 namespace slabstream {
 
@@ -14,7 +15,7 @@ void WorkerMetrics::Count(const WorkerEvent& event) {
     } else {
       ++rendered_;
       render_times_.Add(Duration(render->report.stage_ns[std::size_t(Stage::kRender)]));
-      for (std::size_t stage = 0; stage < stage_ns_.size(); ++stage) stage_ns_[stage] += render->report.stage_ns[stage];
+      AddTimes(stage_ns_, render->report.stage_ns);
     }
   } else if (const auto* combine = std::get_if<CombineDone>(&event)) {
     const Duration time(combine->span.end_ns - combine->span.begin_ns);
@@ -52,10 +53,7 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Histogram(render_times_);
   out.Family("worker_combine_seconds", MetricType::kHistogram, "Time to combine two images.");
   out.Histogram(combine_times_);
-  out.Family("worker_stage_seconds_total", MetricType::kCounter, "Time by stage; render contains others.");
-  for (std::size_t stage = 0; stage < stage_ns_.size(); ++stage) {
-    out.Value(double(stage_ns_[stage]) / 1e9, {{"stage", ToString(Stage(stage))}});
-  }
+  AddStageSeconds(out, "worker_stage_seconds_total", "Time by stage; render contains others.", stage_ns_);
   out.Single("worker_cached_bytes", MetricType::kGauge, "Voxels that it keeps, and what was made from them.", counts.cached_bytes);
   out.Single("worker_fetched_bytes_total", MetricType::kCounter, "Voxels that it has received or read.", counts.fetched_bytes);
   out.Single("worker_store_bytes_total", MetricType::kCounter, "Bytes that it has read from stores itself, as they are stored.",

@@ -1,5 +1,5 @@
-// WorkerMetrics: what a worker measures, as text for Prometheus (docs/operating.md). Count, CountSent and Set are called by the thread of
-// the machine, Text by any.
+// WorkerMetrics: what a worker measures, as text for Prometheus (docs/operating.md). The thread of the machine calls Count,
+// CountSent and now.Set; any thread calls Text.
 #pragma once
 
 #include <cstddef>

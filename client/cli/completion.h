@@ -1,4 +1,4 @@
-// Completion of the command line: scripts of bash, zsh and fish, which ask this program what a word may become.
+// Completion of the command line. Scripts for bash, zsh and fish ask this program which words can stand at the cursor.
 //
 //   eval "$(slabstream completion bash)"; slabstream render --rend<Tab>      # the script calls `slabstream complete render --rend`
 #pragma once

@@ -32,7 +32,7 @@ FrameSummary Summarize(const FrameStatistics& statistics) {
   std::map<std::uint32_t, std::int64_t> render_ns;      // by worker
   std::map<std::uint32_t, std::vector<Interval>> busy;  // by worker
   for (const RankReport& report : statistics.reports) {
-    for (std::size_t stage = 0; stage < report.stage_ns.size(); ++stage) summary.stage_ns[stage] += report.stage_ns[stage];
+    AddTimes(summary.stage_ns, report.stage_ns);
     summary.voxel_bytes += report.voxel_bytes;
     summary.image_bytes += report.image_bytes;
     summary.stored_bytes += report.stored_bytes;

@@ -9,6 +9,10 @@ std::string_view ToString(Stage stage) {
   return kNames.at(std::size_t(stage));
 }
 
+void AddTimes(StageTimes& sum, const StageTimes& times) {
+  for (std::size_t stage = 0; stage < sum.size(); ++stage) sum[stage] += times[stage];
+}
+
 void AddStage(RankReport& report, Stage stage, std::int64_t begin_ns, std::int64_t end_ns) {
   report.stage_ns[std::size_t(stage)] += end_ns - begin_ns;
   if (report.spans.size() < kMaxSpans) report.spans.push_back({stage, begin_ns, end_ns});

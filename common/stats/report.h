@@ -29,6 +29,7 @@ inline constexpr int kStageCount = 12;
 std::string_view ToString(Stage stage);  // "transform": names of --stats and --trace
 
 using StageTimes = std::array<std::int64_t, kStageCount>;  // ns, worker time by stage
+void AddTimes(StageTimes& sum, const StageTimes& times);
 
 // One stretch of time on one thread of a worker. On the clock of MonotonicNow().
 struct Span {

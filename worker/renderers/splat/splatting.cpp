@@ -25,7 +25,7 @@ void RenderBand(const SplatPass& pass, std::int32_t y_begin, const RenderControl
 }
 
 void AddTo(RankReport& sum, const RankReport& part) {
-  for (std::size_t stage = 0; stage < sum.stage_ns.size(); ++stage) sum.stage_ns[stage] += part.stage_ns[stage];
+  AddTimes(sum.stage_ns, part.stage_ns);
   sum.drawn_voxels += part.drawn_voxels;
 }
 
