@@ -64,8 +64,8 @@ inline RayLook MakeRayLook(const ClassificationTable& table, const TransferFunct
 class VisibleSamples {
  public:
   explicit VisibleSamples(const RayLook& look);
-  bool AnyMatterBetween(float low, float high) const;   // a sample may have an opacity above 0; false if low > high
-  bool AnySurfaceBetween(float low, float high) const;  // one may lie on an isosurface; false if low > high
+  bool AnyMatterBetween(float low, float high) const;                 // a sample may have an opacity above 0; false if low > high
+  bool AnySurfaceBetween(float low, float high) const;                // one may lie on an isosurface; false if low > high
   const std::vector<float>& isovalues() const { return isovalues_; }  // stored samples
   bool AnyBetween(float low, float high) const { return AnyMatterBetween(low, high) || AnySurfaceBetween(low, high); }
   friend bool operator==(const VisibleSamples&, const VisibleSamples&) = default;
