@@ -4,11 +4,11 @@
 #include <array>
 #include <utility>
 
+#include "client/picture_codec/picture_codec.h"
 #include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
 #include "client/request/picture_record.h"
 #include "client/request/slice_request.h"
-#include "gateway/picture_codec.h"
 
 namespace slabstream {
 namespace {

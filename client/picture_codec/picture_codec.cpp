@@ -1,4 +1,4 @@
-#include "gateway/picture_codec.h"
+#include "client/picture_codec/picture_codec.h"
 
 #include <png.h>
 #include <zlib.h>
