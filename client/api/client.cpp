@@ -1,0 +1,236 @@
+#include "client/api/slabstream/client.h"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <variant>
+
+#include "client/client.h"
+#include "client/image_io/image_writer.h"
+#include "client/picture_codec/picture_codec.h"
+#include "client/report/status_text.h"
+#include "client/request/key_of_picture.h"
+#include "client/request/picture_fields.h"
+#include "client/request/picture_record.h"
+#include "client/service/service_state.h"
+#include "common/base/time.h"
+
+namespace slabstream {
+inline namespace v0 {
+namespace {
+
+constexpr Duration kCancellationTime = std::chrono::milliseconds(20);  // between looks at whether a call was cancelled
+
+void ThrowUnlessOk(const Status& status) {
+  if (!status.ok()) throw Error(ErrorCode(status.code()), status.message());
+}
+
+template <class T>
+T ValueOf(Result<T> result) {
+  ThrowUnlessOk(result.status());
+  return *std::move(result);
+}
+
+RenderRequest ParseRequest(const std::string& dataset, const Options& options) {
+  PictureFields fields = {{"dataset", dataset}};
+  for (const auto& [name, text] : options) fields.push_back({name, text});
+  return ValueOf(ParseRenderFields(fields));
+}
+
+Progress ProgressOf(const FrameProgress& progress) {
+  return {.phase = Progress::Phase(progress.phase),
+          .queue_position = int(progress.queue_position),
+          .read_percent = int(progress.read_percent),
+          .groups_done = int(progress.groups_done),
+          .group_count = int(progress.group_count),
+          .workers = int(progress.workers)};
+}
+
+// Puts the rows of `values`, of the pixels in `bounds` with `channels` each, where they belong in those of the whole picture.
+void PutRows(std::span<const float> values, const PixelBounds& bounds, int width, int channels, std::vector<float>& whole) {
+  const std::size_t row = std::size_t(channels) * std::size_t(bounds.width());
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    const auto from = values.subspan(std::size_t(y - bounds.y_begin) * row, row);
+    const std::size_t to = std::size_t(channels) * (std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));
+    std::ranges::copy(from, whole.begin() + std::ptrdiff_t(to));
+  }
+}
+
+// A request that is under way; cancelled unless it has ended.
+class OpenRender {
+ public:
+  OpenRender(Client& client, const FrameRequest& frame, Duration deadline) : client_(client), id_(client.Submit(frame, deadline)) {}
+  ~OpenRender() {
+    if (!ended_) client_.Cancel(id_);
+  }
+  OpenRender(const OpenRender&) = delete;
+  OpenRender& operator=(const OpenRender&) = delete;
+
+  // Its next event, if there is one within kCancellationTime.
+  std::optional<ClientEvent> Next() {
+    std::optional<ClientEvent> event = client_.Next(kCancellationTime);
+    if (!event || event->request != id_) return std::nullopt;
+    const auto* picture = std::get_if<Picture>(&event->what);
+    ended_ = std::holds_alternative<Status>(event->what) || (picture != nullptr && picture->final);
+    return event;
+  }
+
+ private:
+  Client& client_;
+  RequestId id_;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+// ---- Error
+
+Error::Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
+Error::Error(const Error&) noexcept = default;
+Error::~Error() = default;
+
+// ---- Image
+
+struct __attribute__((visibility("hidden"))) Image::Impl {
+  Picture picture;
+  PictureFormat format;
+  PictureNotes notes;
+};
+
+Image::Image(std::shared_ptr<const Impl> impl) noexcept : impl_(std::move(impl)) {}
+Image::Image(const Image&) noexcept = default;
+Image& Image::operator=(const Image&) noexcept = default;
+Image::~Image() = default;
+
+int Image::width() const noexcept { return impl_->picture.size.width; }
+int Image::height() const noexcept { return impl_->picture.size.height; }
+bool Image::final() const noexcept { return impl_->picture.final; }
+int Image::groups_done() const noexcept { return int(impl_->picture.groups_done); }
+int Image::group_count() const noexcept { return int(impl_->picture.group_count); }
+std::chrono::nanoseconds Image::latency() const noexcept { return impl_->picture.latency; }
+
+std::vector<float> Image::Rgba() const {
+  const LocalImage& image = impl_->picture.image;
+  std::vector<float> rgba(4 * std::size_t(width()) * std::size_t(height()));
+  PutRows(image.rgba, image.bounds, width(), 4, rgba);
+  return rgba;
+}
+
+std::vector<float> Image::Depth() const {
+  const LocalImage& image = impl_->picture.image;
+  if (!HasDepth(image.format)) return {};
+  std::vector<float> depth(std::size_t(width()) * std::size_t(height()), std::numeric_limits<float>::infinity());
+  PutRows(image.depth, image.bounds, width(), 1, depth);
+  return depth;
+}
+
+std::vector<std::byte> Image::Png() const {
+  return ValueOf(PngFile(impl_->picture.image, impl_->picture.size, impl_->format, impl_->notes));
+}
+
+std::vector<std::byte> Image::Jpeg(int quality) const {
+  if (quality < 1 || quality > 100) throw Error(ErrorCode::kInvalidArgument, "quality " + std::to_string(quality) + " is not in [1, 100]");
+  const ComposedPicture composed =
+      ValueOf(ComposedPicture::Make(impl_->picture.image, impl_->picture.size, impl_->format, impl_->notes.geometry, impl_->notes.key));
+  return EncodeJpeg(composed, {0, 0, width(), height()}, quality);
+}
+
+void Image::Save(const std::string& path) const {
+  ThrowUnlessOk(WritePicture(impl_->picture.image, impl_->picture.size, path, impl_->format, impl_->notes));
+}
+
+// ---- Cancellation
+
+struct __attribute__((visibility("hidden"))) Cancellation::Impl {
+  std::atomic<bool> cancelled = false;
+};
+
+Cancellation::Cancellation() : impl_(std::make_shared<Impl>()) {}
+Cancellation::Cancellation(const Cancellation&) noexcept = default;
+Cancellation& Cancellation::operator=(const Cancellation&) noexcept = default;
+Cancellation::~Cancellation() = default;
+
+void Cancellation::Cancel() const noexcept { impl_->cancelled = true; }
+bool Cancellation::cancelled() const noexcept { return impl_->cancelled; }
+
+// ---- Service
+
+struct __attribute__((visibility("hidden"))) Service::Impl {
+  static std::unique_ptr<Impl> Connect(const Address& address, std::chrono::milliseconds timeout) {
+    const ServiceAddress service = ValueOf(ResolveService({.endpoint = address.endpoint, .file = address.service_file}));
+    auto impl = std::make_unique<Impl>();
+    impl->client.emplace(ValueOf(Client::Connect(impl->context, service, timeout)));
+    return impl;
+  }
+
+  // What colour bar and legend say.
+  PictureKey KeyFor(const RenderRequest& request) {
+    if (!request.format.annotations.needs_key()) return {};
+    return KeyOf(request.frame, ValueOf(client->Summarize(request.frame.dataset, request.frame.transfer)));
+  }
+
+  std::mutex mutex;  // for the client
+  Context context;
+  std::optional<Client> client;
+};
+
+Service::Service(std::unique_ptr<Impl> impl) noexcept : impl_(std::move(impl)) {}
+Service::Service(Service&&) noexcept = default;
+Service& Service::operator=(Service&&) noexcept = default;
+Service::~Service() = default;
+
+Service Service::Connect(const Address& address, std::chrono::milliseconds timeout) { return Service(Impl::Connect(address, timeout)); }
+
+Image Service::Render(const std::string& dataset, const Options& options, const RenderCall& call) {
+  if (call.deadline < std::chrono::milliseconds(1) || call.deadline > std::chrono::hours(24)) {
+    throw Error(ErrorCode::kInvalidArgument, "deadline of " + std::to_string(call.deadline.count()) + " ms is not in [1 ms, 24 h]");
+  }
+  RenderRequest request = ParseRequest(dataset, options);
+  request.frame.previews = call.on_preview != nullptr;
+  ThrowUnlessOk(CheckCanDraw(request.format.annotations));
+
+  const std::lock_guard lock(impl_->mutex);
+  const PictureKey key = impl_->KeyFor(request);
+  const auto image_of = [&](Picture picture) {
+    const FrameRequest made = AsMade(request.frame, picture.statistics);
+    PictureNotes notes{.geometry = picture.geometry,
+                       .key = key,
+                       .record = RecordText(dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
+    return Image(std::make_shared<const Image::Impl>(Image::Impl{std::move(picture), request.format, std::move(notes)}));
+  };
+  OpenRender render(*impl_->client, request.frame, call.deadline);
+  while (!call.cancellation.cancelled()) {
+    std::optional<ClientEvent> event = render.Next();
+    if (!event) continue;
+    if (const auto* status = std::get_if<Status>(&event->what)) ThrowUnlessOk(*status);
+    if (const auto* progress = std::get_if<FrameProgress>(&event->what); progress != nullptr && call.on_progress) {
+      call.on_progress(ProgressOf(*progress));
+    }
+    if (auto* picture = std::get_if<Picture>(&event->what)) {
+      const bool final = picture->final;
+      const Image image = image_of(std::move(*picture));
+      if (final) return image;
+      if (call.on_preview) call.on_preview(image);
+    }
+  }
+  throw Error(ErrorCode::kCancelled, "the picture of dataset '" + dataset + "' was cancelled");
+}
+
+std::vector<std::string> Service::Datasets() {
+  const std::lock_guard lock(impl_->mutex);
+  std::vector<std::string> names;
+  for (DatasetStatus& dataset : ValueOf(impl_->client->OrderData({.action = DataAction::kList}))) names.push_back(std::move(dataset.name));
+  return names;
+}
+
+std::string Service::StatusJson() {
+  const std::lock_guard lock(impl_->mutex);
+  const StatusReply reply = ValueOf(impl_->client->QueryStatus());
+  return slabstream::StatusJson(reply).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+}  // namespace v0
+}  // namespace slabstream
