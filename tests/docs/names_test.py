@@ -13,12 +13,13 @@ DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md",
 CODE = {".h", ".cpp", ".py", ".ts", ".js", ".proto", ".cmake", ".txt", ".json", ".html", ".css", ".sh", ""}  # endings of files with names
 TOOLS = {"slabstream", "slabstream-coordinator", "slabstream-worker", "slabstream-gateway", "slabstream-lab"}
 
-# What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman and kubectl.
+# What others name: Slurm, GDCM, FreeSurfer, Python; and options of `unshare`, Google Benchmark, podman, kubectl, CMake
+# and pkg-config.
 FOREIGN = {
     "ConnectionError", "LookupError", "TimeoutError", "TypeError", "ValueError", "CancelledError",
     "GraceTime", "KillWait", "JobId", "StartTime", "FreeSurferColorLUT",
 }  # fmt: skip
-FOREIGN_OPTIONS = {"--mount-proc", "--benchmark_filter", "--health-cmd", "--replicas"}
+FOREIGN_OPTIONS = {"--mount-proc", "--benchmark_filter", "--health-cmd", "--replicas", "--component", "--cflags", "--libs"}
 PREFIXES = "slabstream_|end_to_end_"  # that code puts before names: of metrics, of test programs
 
 
