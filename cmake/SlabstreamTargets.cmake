@@ -69,29 +69,6 @@ function(slabstream_cold level)
   endforeach()
 endfunction()
 
-# slabstream_shareable(target...): they, and all libraries of ours that they link, can become parts of a shared library. What they define is
-# hidden from other libraries, so that programs which link them run the same code as before.
-function(slabstream_shareable)
-  foreach(target IN LISTS ARGN)
-    string(REGEX REPLACE "^slabstream::" "slabstream_" target "${target}")
-    if(NOT TARGET ${target} OR NOT target MATCHES "^slabstream_")
-      continue()
-    endif()
-    get_target_property(done ${target} SLABSTREAM_SHAREABLE)
-    if(done)
-      continue()
-    endif()
-    set_target_properties(${target} PROPERTIES SLABSTREAM_SHAREABLE ON POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
-      VISIBILITY_INLINES_HIDDEN ON)
-    foreach(property LINK_LIBRARIES INTERFACE_LINK_LIBRARIES)
-      get_target_property(links ${target} ${property})
-      if(links)
-        slabstream_shareable(${links})
-      endif()
-    endforeach()
-  endforeach()
-endfunction()
-
 # slabstream_program(NAME SOURCES file... LINKS target... [FOLDER name]): an executable in build/bin, or in the folder `name` of the build.
 function(slabstream_program name)
   cmake_parse_arguments(ARG "" "FOLDER" "SOURCES;LINKS" ${ARGN})

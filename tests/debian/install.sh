@@ -25,7 +25,7 @@ trap 'umount "$root/proc"' EXIT
 in_root() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive "$@"; }
 install=(apt-get install -q -y --no-install-recommends)
 in_root apt-get update -q > build-debian/apt.log
-programs=("$root"/dist/slabstream-server_*.deb "$root"/dist/slabstream_*.deb)
+programs=("$root"/dist/slabstream-server_*.deb "$root"/dist/libslabstream0_*.deb "$root"/dist/slabstream_*.deb)
 programs=("${programs[@]#"$root"}")
 in_root "${install[@]}" --download-only "${programs[@]}" >> build-debian/apt.log
 
@@ -43,6 +43,16 @@ in_root python3 -c 'import slabstream; print("import slabstream:", slabstream.__
 in_root slabstream-lab --help > /dev/null
 for program in slabstream-coordinator slabstream-worker; do
   if in_root ldd "/usr/bin/$program" | grep -q OpenImageIO; then fail "$program loads OpenImageIO"; fi
+done
+
+say "The examples, against libslabstream-dev"
+in_root "${install[@]}" g++ make cmake pkg-config curl >> build-debian/apt.log 2>&1
+cp tests/install/use_installed.sh "$root/tmp/"
+mkdir "$root/tmp/examples"
+libraries="$(basename "$(dirname "$(echo "$root"/usr/lib/*/libslabstream.so)")")"
+in_root /tmp/use_installed.sh /usr "lib/$libraries" share/doc/libslabstream-dev/examples python3 /tmp/examples
+for client in cmake pkgconfig python curl; do
+  [[ -s "$root/tmp/examples/$client.png" ]] || fail "the example for $client made no picture"
 done
 
 say "The units"
@@ -64,6 +74,6 @@ for page in "$root"/usr/share/man/man1/slabstream*.1.gz; do
   [[ -z "$complaints" ]] || fail "$page: $complaints"
 done
 say "Purging"
-in_root bash -c "dpkg --purge slabstream-lab python3-slabstream slabstream slabstream-server" >> build-debian/apt.log 2>&1
+in_root bash -c "dpkg --purge slabstream-lab python3-slabstream libslabstream-dev slabstream libslabstream0 slabstream-server" >> build-debian/apt.log 2>&1
 left="$(find "$root/etc" "$root/usr" "$root/var/lib/slabstream" "$root/var/cache" -name '*slabstream*' 2> /dev/null | grep -v '/var/cache/apt' || true)"
 [[ -z "$left" ]] || printf 'left behind: %s\n' "$left"

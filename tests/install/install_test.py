@@ -21,6 +21,7 @@ from client_support import read_png  # noqa: E402
 
 CMAKE, BUILD, LIB, VERSION = (sys.argv[1:5] + [""] * 4)[:4]
 PROGRAMS = ("slabstream", "slabstream-coordinator", "slabstream-dicom-decoder", "slabstream-gateway", "slabstream-worker")
+EXAMPLES = "share/doc/slabstream/examples"
 CLIENTS = ("cmake", "pkgconfig", "python", "curl")
 
 
@@ -112,7 +113,7 @@ class Installed(unittest.TestCase):
 
     def test_examples_make_the_picture_of_the_command_line(self) -> None:
         folder = self.new_folder()
-        said = run(HERE / "use_installed.sh", self.prefix, LIB, sys.executable, folder)
+        said = run(HERE / "use_installed.sh", self.prefix, LIB, EXAMPLES, sys.executable, folder)
         self.assertIn('picture: no dataset "nothing"', said)
         self.check_pictures(folder)
 
@@ -123,7 +124,7 @@ class Installed(unittest.TestCase):
         folder = self.new_folder()
         shutil.copy(HERE / "use_installed.sh", folder)
         run(*unshare, HERE / "in_bare_root.sh", self.new_folder(), self.prefix, folder,
-            "/work/use_installed.sh", "/opt/slabstream", LIB, sys.executable, "/work")  # fmt: skip
+            "/work/use_installed.sh", "/opt/slabstream", LIB, EXAMPLES, sys.executable, "/work")  # fmt: skip
         self.check_pictures(folder)
 
 

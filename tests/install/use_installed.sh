@@ -1,10 +1,9 @@
 #!/usr/bin/env bash
-# use_installed.sh PREFIX LIB PYTHON FOLDER: builds the examples against what is installed in PREFIX, with its libraries in PREFIX/LIB, starts
-# its programs, and leaves the picture of each client in FOLDER: commandline.png, cmake.png, pkgconfig.png, python.png and, if there is curl,
-# curl.png.
+# use_installed.sh PREFIX LIB EXAMPLES PYTHON FOLDER: builds the examples, in PREFIX/EXAMPLES, against what is installed in PREFIX, with its
+# libraries in PREFIX/LIB, starts its programs, and leaves the picture of each client in FOLDER: commandline.png, cmake.png, pkgconfig.png,
+# python.png and, if there is curl, curl.png.
 set -euo pipefail
-prefix="$1" lib="$1/$2" python="$3" folder="$4"
-examples="$prefix/share/doc/slabstream/examples"
+prefix="$1" lib="$1/$2" examples="$1/$3" python="$4" folder="$5"
 cd "$folder"
 export XDG_RUNTIME_DIR="$folder" HOME="$folder" PYTHONDONTWRITEBYTECODE=1
 unset SLABSTREAM_ENDPOINT SLABSTREAM_SERVICE LD_LIBRARY_PATH
