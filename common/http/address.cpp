@@ -30,6 +30,12 @@ bool IsLoopback(const std::string& host) {
   return host == "::1";
 }
 
+bool IsNumeric(const std::string& host) {
+  in_addr v4{};
+  in6_addr v6{};
+  return ::inet_pton(AF_INET, host.c_str(), &v4) == 1 || ::inet_pton(AF_INET6, host.c_str(), &v6) == 1;
+}
+
 struct HostAndPort {
   std::string host;  // without brackets
   std::optional<std::uint16_t> port;
@@ -66,11 +72,10 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
   if (!parts) return refuse();
   ListenAddress listen;
   listen.host = parts->host == "localhost" ? "127.0.0.1" : parts->host;
-  in_addr v4{};
-  in6_addr v6{};
-  if (::inet_pton(AF_INET, listen.host.c_str(), &v4) != 1 && ::inet_pton(AF_INET6, listen.host.c_str(), &v6) != 1) return refuse();
+  if (!IsNumeric(listen.host)) return refuse();
   listen.port = parts->port.value_or(0);
   listen.loopback = IsLoopback(listen.host);
+  listen.any = listen.host == "0.0.0.0" || listen.host == "::";
   return listen;
 }
 
@@ -94,7 +99,9 @@ bool OriginRules::IsOwnHost(std::string_view host) const {
   // Any port of this machine's own names: a tunnel's near end has another one. No foreign page has such a name.
   if (parts->host == "localhost" || IsLoopback(parts->host)) return true;
   // With TLS, whoever reaches the gateway under a name had its certificate checked for it.
-  return tls_ || parts->host == listen_.host;
+  if (tls_ || parts->host == listen_.host) return true;
+  // At every address, it is asked under any of them. A page whose name was made to point here asks under that name, never under a number.
+  return listen_.any && IsNumeric(parts->host);
 }
 
 std::optional<std::string> OriginRules::Refusal(std::string_view host, std::optional<std::string_view> origin) const {

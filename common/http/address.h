@@ -15,6 +15,7 @@ struct ListenAddress {
   std::string host = "127.0.0.1";  // a numeric address; IPv6 without brackets
   std::uint16_t port = 0;          // 0: any free one
   bool loopback = true;
+  bool any = false;  // 0.0.0.0 or [::]: every address of this machine
 };
 
 // "HOST:PORT", "HOST", or "[::1]:8080"; a port of 0 or * is any. InvalidArgument.

@@ -35,8 +35,8 @@ done
 pod pod start slabstream-coordinator-pod-0 > /dev/null # whose name others wait for
 pod pod start slabstream-{worker-pod-0,worker-pod-1,gateway-pod-0} > /dev/null
 coordinator=slabstream-coordinator-pod-0-coordinator gateway=slabstream-gateway-pod-0-gateway
-# shellcheck disable=SC2016  # the inner shell expands it
-ready() { [[ "$(pod exec "$gateway" sh -c 'wget -q -O - "http://$(hostname -i | cut -d " " -f 1):8080/readyz"')" == ok ]]; }
+# At the pod's loopback, as kubectl port-forward asks; healthcheck below asks at its address, as Kubernetes does.
+ready() { [[ "$(pod exec "$gateway" wget -q -O - http://127.0.0.1:8080/readyz)" == ok ]]; }
 await 30 "the gateway is ready" ready
 for container in "$coordinator" "$gateway" slabstream-worker-pod-0-worker slabstream-worker-pod-1-worker; do
   await 30 "$container is well" pod exec "$container" healthcheck

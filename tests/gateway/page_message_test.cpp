@@ -86,6 +86,15 @@ TEST(AddressTest, OnlyOwnHostsAndOriginsMayAsk) {
   EXPECT_EQ(proxied.Refusal("viewer.example.org", "https://viewer.example.org"), std::nullopt);
   EXPECT_EQ(proxied.Refusal("localhost:4000", "https://viewer.example.org"), std::nullopt);  // a proxy that changes Host
   EXPECT_NE(proxied.Refusal("viewer.example.org", "https://other.example.org"), std::nullopt);
+  for (const char* any : {"0.0.0.0:4000", "[::]:4000"}) {
+    const OriginRules everywhere(*ParseListenAddress("--listen", any), false, "");
+    EXPECT_EQ(everywhere.Refusal("192.168.1.7:4000", "http://192.168.1.7:4000"), std::nullopt) << any;
+    EXPECT_EQ(everywhere.Refusal("[fd00::7]:4000", std::nullopt), std::nullopt) << any;
+    EXPECT_NE(everywhere.Refusal("evil.example:4000", std::nullopt), std::nullopt) << any;
+    EXPECT_NE(everywhere.Refusal("192.168.1.7:4000", "http://192.168.1.8:4000"), std::nullopt) << any;
+  }
+  const OriginRules one(*ParseListenAddress("--listen", "192.168.1.7:4000"), false, "");
+  EXPECT_NE(one.Refusal("192.168.1.8:4000", std::nullopt), std::nullopt);
   for (const char* wrong : {"", "viewer", "https://", "https://a/b", "ftp://a", "https://a b"}) {
     EXPECT_FALSE(ParseOrigin("--behind-proxy", wrong).ok()) << wrong;
   }
