@@ -1,4 +1,4 @@
-// CoordinatorMetrics: what a coordinator measures, as text for Prometheus (docs/operating.md). The thread of the machines calls
+// CoordinatorMetrics: what a coordinator measures, as text for Prometheus (docs/on-servers.md). The thread of the machines calls
 // CountFrame and now.Set; any thread calls Text.
 #pragma once
 

@@ -1,4 +1,4 @@
-// WorkerMetrics: what a worker measures, as text for Prometheus (docs/operating.md). The thread of the machine calls Count,
+// WorkerMetrics: what a worker measures, as text for Prometheus (docs/on-servers.md). The thread of the machine calls Count,
 // CountSent and now.Set; any thread calls Text.
 #pragma once
 

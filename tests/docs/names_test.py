@@ -19,7 +19,9 @@ FOREIGN = {
     "ConnectionError", "LookupError", "TimeoutError", "TypeError", "ValueError", "CancelledError",
     "GraceTime", "KillWait", "JobId", "StartTime", "FreeSurferColorLUT",
 }  # fmt: skip
-FOREIGN_OPTIONS = {"--mount-proc", "--benchmark_filter", "--health-cmd", "--replicas", "--component", "--cflags", "--libs"}
+FOREIGN_OPTIONS = {
+    "--mount-proc", "--benchmark_filter", "--health-cmd", "--network", "--replicas", "--user", "--component", "--cflags", "--libs",
+}  # fmt: skip
 PREFIXES = "slabstream_|end_to_end_"  # that code puts before names: of metrics, of test programs
 
 
