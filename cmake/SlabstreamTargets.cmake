@@ -17,6 +17,8 @@ add_library(slabstream_options INTERFACE)
 target_compile_features(slabstream_options INTERFACE cxx_std_20)
 target_include_directories(slabstream_options INTERFACE ${CMAKE_SOURCE_DIR})
 target_compile_options(slabstream_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+# Programs name sources by their place in the repository, wherever that is: the same bytes from any folder.
+target_compile_options(slabstream_options INTERFACE -ffile-prefix-map=${CMAKE_SOURCE_DIR}/=)
 # Designated initialisers name what differs from the defaults and leave out the rest on purpose.
 target_compile_options(slabstream_options INTERFACE -Wno-missing-field-initializers)
 if(SLABSTREAM_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
