@@ -92,5 +92,19 @@ TEST_F(KeysOnHostsTest, KeysAreNeededAndRevokedOnesEnd) {
   for (const auto& worker : workers_) EXPECT_EQ(worker->Wait().exit_status, 0);
 }
 
+// The system would look up the name for minutes.
+TEST_F(KeysOnHostsTest, ANameServerThatDoesNotAnswerHoldsUpNobodysEnd) {
+  StartService();
+  ASSERT_TRUE(hosts_->DropTo(kFirstWorker).ok());
+  const std::string command =
+      "umask 077 && sed 's#//" + hosts_->AddressOf(kCoordinator) +
+      ":#//coordinator.example:#' keys/client.json > lost.json && printf 'nameserver " + hosts_->AddressOf(kFirstWorker) +
+      "\\noptions timeout:30 attempts:5\\n' > resolv.conf && mount --bind resolv.conf /etc/resolv.conf && exec timeout 60 '" +
+      Command({"status"}).front() + "' status --service lost.json";
+  const ProgramResult lost = Run(kClient, {"unshare", "--mount", "sh", "-c", command});
+  EXPECT_EQ(lost.exit_status, 1) << lost.err;
+  EXPECT_THAT(lost.err, HasSubstr("no service answers at tcp://coordinator.example"));
+}
+
 }  // namespace
 }  // namespace slabstream
