@@ -13,12 +13,14 @@
 #include <memory>
 #include <string_view>
 
+#include "common/base/program_beside.h"
 #include "common/base/utf8.h"
 
 namespace slabstream {
 namespace {
 
-constexpr const char* kFont = "/usr/share/fonts/truetype/dejavu/DejaVuSans-Bold.ttf";
+constexpr const char* kFont = "DejaVuSans-Bold.ttf";
+constexpr const char* kFontFolder = "/usr/share/fonts/truetype/dejavu";
 constexpr const char* kFontPackage = "fonts-dejavu-core";
 constexpr const char* kFontVariable = "SLABSTREAM_FONT";
 
@@ -184,13 +186,17 @@ Ink Shifted(Ink ink, int x, int y) {
 
 Result<std::string> AnnotationFont() {
   const char* named = std::getenv(kFontVariable);
-  const bool own = named != nullptr && *named != '\0';
-  const std::string font = own ? named : kFont;
   std::error_code error;
-  if (std::filesystem::is_regular_file(font, error)) return font;
-  if (own) return Status::NotFound(fmt::format("${} names '{}', which is no file", kFontVariable, font));
-  return Status::NotFound(
-      fmt::format("annotations need the font {} of the package {}, or one that ${} names", font, kFontPackage, kFontVariable));
+  if (named != nullptr && *named != '\0') {
+    if (std::filesystem::is_regular_file(named, error)) return std::string(named);
+    return Status::NotFound(fmt::format("${} names '{}', which is no file", kFontVariable, named));
+  }
+  const std::filesystem::path installed = std::filesystem::path(kFontFolder) / kFont;
+  for (const std::filesystem::path& font : {ProgramFolder() / kFont, installed}) {
+    if (std::filesystem::is_regular_file(font, error)) return font.string();
+  }
+  return Status::NotFound(fmt::format("annotations need the font {} of the package {}, or one that ${} names", installed.string(),
+                                      kFontPackage, kFontVariable));
 }
 
 Result<int> TextWidth(const std::string& text, int size) {

@@ -29,8 +29,8 @@ Ink Union(const Ink& a, const Ink& b);                      // the larger covera
 Ink Grown(const Ink& ink, double radius);                   // everything within `radius` pixels of it
 Ink Shifted(Ink ink, int x, int y);                         // by whole pixels
 
-// The font of annotations: the file that $SLABSTREAM_FONT names, or DejaVu Sans Bold. NotFound: there is no such file; the message says
-// what to install.
+// The font of annotations: the file that $SLABSTREAM_FONT names, or DejaVu Sans Bold, from beside the program or from where
+// Debian has it. NotFound: there is no such file; the message says what to install.
 Result<std::string> AnnotationFont();
 
 // What the text measures in pixels, before it is drawn. Errors as TextInk.

@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -220,6 +221,15 @@ TEST_F(RenderTest, AFontThatIsNotThereIsToldBeforeTheWorkBegins) {
   EXPECT_EQ(result.exit_status, 2);
   EXPECT_EQ(result.err, "slabstream render: $SLABSTREAM_FONT names 'no.ttf', which is no file\n");
   EXPECT_THAT(Files(), Not(Contains("x.png")));
+}
+
+TEST_F(RenderTest, AFontBesideTheProgramComesFirst) {
+  std::filesystem::copy_file(Command({}).front(), Path("slabstream"));
+  std::ofstream(Path("DejaVuSans-Bold.ttf")) << "this is no font";
+  const std::string order = R"({"size": [64, 64], "panes": [{}], "title": "x"})";
+  const ProgramResult result = RunningProgram({"/bin/sh", "-c", "echo '" + order + "' | ./slabstream annotate"}, directory_).Wait();
+  EXPECT_EQ(result.exit_status, 2);
+  EXPECT_EQ(result.err, "slabstream annotate: the font '" + Path("DejaVuSans-Bold.ttf") + "' cannot be read\n");
 }
 
 // Copied without libslabstream-pictures.so, the program says so before it looks for the service.

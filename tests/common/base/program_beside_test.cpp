@@ -11,6 +11,7 @@ namespace {
 
 TEST(ProgramBeside, IsInTheFolderOfThisProgram) {
   const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe");
+  EXPECT_EQ(ProgramFolder(), self.parent_path());
   EXPECT_EQ(ProgramBeside(self.filename()).value(), self.string());
   const Status missing = ProgramBeside("slabstream-nobody").status();
   EXPECT_EQ(missing.code(), StatusCode::kNotFound);
