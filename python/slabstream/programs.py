@@ -28,15 +28,17 @@ def end_keeper(keeper: subprocess.Popen[bytes], seconds: float) -> bool:
 
 
 def find_program() -> str:
-    """`slabstream`, in the folder $SLABSTREAM_PROGRAMS, on the path, or in the build of the sources that this package is part of."""
+    """`slabstream`: in the folder $SLABSTREAM_PROGRAMS, in the wheel that this package came with, on the path, or in the build of the
+    sources that this package is part of."""
     folder = os.environ.get("SLABSTREAM_PROGRAMS")
     if folder:
         program = shutil.which("slabstream", path=folder)
         if program is None:
             raise NotFound(f"$SLABSTREAM_PROGRAMS is '{folder}', which has no program slabstream")
         return program
-    built = pathlib.Path(__file__).resolve().parents[2] / "build" / "bin"
-    found = shutil.which("slabstream") or shutil.which("slabstream", path=str(built))
+    packages = pathlib.Path(__file__).resolve().parents[1]
+    places = (str(packages / "slabstream_programs"), None, str(packages.parent / "build" / "bin"))
+    found = next(filter(None, (shutil.which("slabstream", path=place) for place in places)), None)
     if found is None:
         raise NotFound("there is no program slabstream to start a service with: put it on the path, name its folder in $SLABSTREAM_PROGRAMS, "
                        "or connect() to a service that runs")

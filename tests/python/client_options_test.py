@@ -9,6 +9,7 @@ import io
 import json
 import os
 import shutil
+import subprocess
 import sys
 import unittest
 import unittest.mock
@@ -261,6 +262,10 @@ class Pixels(WithAService):
 
 
 class Drift(unittest.TestCase):
+    def test_the_version_is_the_programs(self) -> None:
+        said = subprocess.run([client_support.PROGRAM, "--version"], capture_output=True, text=True, check=True).stdout
+        self.assertEqual(said, f"slabstream {ss.__version__}\n")
+
     def test_options_are_those_that_the_program_prints(self) -> None:
         self.assertEqual(update.OPTIONS.read_text(), update.options_text(client_support.PROGRAM), "run python/update-options")
 

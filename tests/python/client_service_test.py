@@ -20,6 +20,7 @@ from client_support import PROGRAM, PROGRAMS, InAFolder, RunningService, WithASe
 from exr_reader import exr_channels
 
 import slabstream as ss  # noqa: E402
+from slabstream.programs import find_program  # noqa: E402
 
 HEAVY = dict(renderer="raycast", sampling_rate=16, size=2000, opacity_distance=1000, termination=0)
 
@@ -473,6 +474,17 @@ class OwnService(InAFolder):
         with unittest.mock.patch.dict(os.environ, {"SLABSTREAM_PROGRAMS": str(self.folder)}):
             with self.assertRaisesRegex(ss.Unavailable, "slabstream-coordinator' is missing"):
                 ss.render(volume_arrays()[0])
+
+    def test_programs_of_its_own_wheel_come_before_the_path(self) -> None:
+        own, other = self.folder / "slabstream_programs", self.folder / "other"
+        for place in (own, other):
+            place.mkdir()
+            (place / "slabstream").touch(0o755)
+        package = unittest.mock.patch("slabstream.programs.__file__", str(self.folder / "slabstream" / "programs.py"))
+        with package, unittest.mock.patch.dict(os.environ, {"PATH": str(other), "SLABSTREAM_PROGRAMS": ""}):
+            self.assertEqual(find_program(), str(own / "slabstream"))
+            (own / "slabstream").unlink()
+            self.assertEqual(find_program(), str(other / "slabstream"))
 
     def test_it_ends_with_the_interpreter_however_that_ends(self) -> None:
         script = """
