@@ -54,9 +54,10 @@ carry_libraries() {
   done < <(awk '$2 == "=>" && $3 ~ /^\// { print $3 } $1 ~ /^\// && $2 ~ /^\(/ { print $1 }' <<< "$loaded")
 }
 
-# The copyright and the description of each package that a file of $work/carried belongs to.
+# The copyright and the description of each package that a file of $work/carried belongs to, and the list of them all (deploy/sbom).
+# Arguments: a root, and the name of the whole.
 describe_packages() {
-  local root="$1" package paths=()
+  local root="$1" name="$2" package paths=()
   # Packages name a library by /lib or by /usr/lib.
   mapfile -t paths < <(sed 'p; s|^/usr||' "$work/carried")
   mkdir -p "$root/var/lib/dpkg/status.d"
@@ -68,4 +69,5 @@ describe_packages() {
   mkdir -p "$root/usr/share/doc/slabstream"
   cp "$repository/LICENSE" "$root/usr/share/doc/slabstream/copyright"
   cp -r /usr/share/common-licenses "$root/usr/share/"
+  SOURCE_DATE_EPOCH="$(epoch)" "$repository/deploy/sbom" "$root" "$name" > "$root/usr/share/doc/slabstream/slabstream.spdx.json"
 }

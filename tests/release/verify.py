@@ -36,9 +36,9 @@ class Archive:
 def image(path: pathlib.Path) -> Archive:
     files = {}
     with tarfile.open(path) as outer:
-        names = json.load(outer.extractfile("manifest.json"))  # type: ignore[arg-type]
+        names = json.load(outer.extractfile("./manifest.json"))  # type: ignore[arg-type]
         for layer in names[0]["Layers"]:
-            with tarfile.open(fileobj=io.BytesIO(outer.extractfile(layer).read())) as inner:  # type: ignore[union-attr]
+            with tarfile.open(fileobj=io.BytesIO(outer.extractfile(f"./{layer}").read())) as inner:  # type: ignore[union-attr]
                 for member in inner:
                     if member.isfile():
                         files[member.name.removeprefix("./")] = inner.extractfile(member).read()  # type: ignore[union-attr]
