@@ -2,6 +2,7 @@
 
 #include <malloc.h>
 #include <sched.h>
+#include <sys/utsname.h>
 
 #include <algorithm>
 #include <fstream>
@@ -24,6 +25,18 @@ std::string ProcField(const char* path, std::string_view field) {
   return "";
 }
 
+#ifdef __clang__
+constexpr const char* kCompiler = __VERSION__;  // "Clang 14.0.6"
+#else
+constexpr const char* kCompiler = "GCC " __VERSION__;
+#endif
+
+std::string KernelName() {
+  utsname name{};
+  if (::uname(&name) != 0) return "";
+  return std::string(name.sysname) + ' ' + name.release;
+}
+
 int UsableCores() {
   cpu_set_t cores;
   if (::sched_getaffinity(0, sizeof cores, &cores) == 0) return CPU_COUNT(&cores);
@@ -32,7 +45,17 @@ int UsableCores() {
 
 }  // namespace
 
-MachineInfo DescribeMachine() { return {ProcField("/proc/cpuinfo", "model name"), SimdTargets().front(), UsableCores()}; }
+MachineInfo DescribeMachine() {
+  MachineInfo machine{.cpu = ProcField("/proc/cpuinfo", "model name"),
+                      .simd = SimdTargets().front(),
+                      .cores = UsableCores(),
+                      .flags = ProcField("/proc/cpuinfo", "flags"),
+                      .kernel = KernelName(),
+                      .compiler = kCompiler};
+  std::ifstream("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor") >> machine.governor;
+  std::ifstream("/proc/loadavg") >> machine.load;
+  return machine;
+}
 
 void ResetPeakMemory() {
   ::malloc_trim(0);

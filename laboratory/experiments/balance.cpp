@@ -172,9 +172,9 @@ void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredF
     sum.push_back(frame.RenderSeconds());
     longest.push_back(*std::ranges::max_element(seconds));
   }
-  results.Add(of, "imbalance", MedianOf(std::move(imbalance)), Origin::kMeasured);
-  results.Add(of, "render_time", MedianOf(std::move(sum)), Origin::kMeasured);
-  results.Add(of, "longest_render_time", MedianOf(std::move(longest)), Origin::kMeasured);
+  results.Add(of, "imbalance", imbalance, Origin::kMeasured);
+  results.Add(of, "render_time", sum, Origin::kMeasured);
+  results.Add(of, "longest_render_time", longest, Origin::kMeasured);
   results.Add(of, "memory", repeats.front().MostVoxelBytes(), Origin::kMeasured);
 }
 
@@ -190,7 +190,7 @@ Latencies AddLatency(ExperimentContext& context, Results& results, std::string_v
     std::vector<double>& seconds = latencies.emplace_back();
     for (std::size_t i = 0; i < std::min(repeats.size(), machines.size()); ++i)
       seconds.push_back(Simulate(repeats[i], machines[i]).frames.front().latency());
-    results.Add(CaseOf(part, frame, link), "latency", MedianOf(seconds), Origin::kSimulated);
+    results.Add(CaseOf(part, frame, link), "latency", seconds, Origin::kSimulated);
   }
   return latencies;
 }
@@ -202,7 +202,7 @@ void AddSpeed(Results& results, Json of, std::string_view against, const std::ve
   std::vector<double> speeds;
   for (std::size_t i = 0; i < std::min(reference.size(), seconds.size()); ++i) speeds.push_back(reference[i] / seconds[i]);
   of["variant"] = against;
-  results.Add(of, "speed", MedianOf(std::move(speeds)), Origin::kSimulated);
+  results.Add(of, "speed", speeds, Origin::kSimulated);
 }
 
 // Every partition under every scheme, and what `auto` takes.
@@ -252,7 +252,7 @@ void AddBoxes(ExperimentContext& context, const Balance& balance, const BenchCas
       std::vector<double> seconds;
       seconds.reserve(repeats.size());
       for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
-      results.Add(of, "box_time", MedianOf(std::move(seconds)), Origin::kMeasured);
+      results.Add(of, "box_time", seconds, Origin::kMeasured);
       results.Add(of, "estimated_box_time", estimator.Of(placement.box).seconds, Origin::kSimulated);
     }
     AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
@@ -300,11 +300,11 @@ std::vector<double> AddSequence(ExperimentContext& context, const ViewSequence& 
   of["view"] = sequence.motion->name;
   for (const Figure& figure : figures) {
     const Origin origin = figure.metric == std::string_view("latency") ? Origin::kSimulated : Origin::kMeasured;
-    results.Add(of, figure.metric, MedianOf(figure.means), origin);
+    results.Add(of, figure.metric, figure.means, origin);
     for (std::size_t step = 0; step < figure.values.size(); ++step) {
       Json at = of;
       at["step"] = step;
-      results.Add(at, figure.metric, MedianOf(figure.values[step]), origin);
+      results.Add(at, figure.metric, figure.values[step], origin);
     }
   }
   return figures.front().means;

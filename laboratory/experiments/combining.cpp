@@ -189,23 +189,21 @@ void RunCombining(ExperimentContext& context, Results& results) {
   for (const Combining& c : cases.measured) {
     Json of = ColumnsOf(c);
     of["part"] = of["variant"] = "operators";
-    results.Add(of, "run_time", EstimateOf(context.log(), OperatorsKey(c), "seconds"), Origin::kMeasured);
+    results.Add(of, "run_time", ValuesOf(context.log(), OperatorsKey(c), "seconds"), Origin::kMeasured);
     of["variant"] = "page faults";
     const std::vector<double> faults = ValuesOf(context.log(), OperatorsKey(c), "page_faults");
     results.Add(of, "count", std::accumulate(faults.begin(), faults.end(), 0.0), Origin::kMeasured);
   }
-  std::map<std::string, Estimate> simulated;  // parts share cases
+  std::map<std::string, std::vector<double>> simulated;  // parts share cases
   for (const auto& [part, c] : cases.simulated) {
     Json of = ColumnsOf(c);
     of["link"] = c.link;
     const auto [found, fresh] = simulated.try_emplace(of.dump());
     if (fresh) {
-      std::vector<double> seconds;
       for (MachineModel& machine : Clusters(context, Link(c.link))) {
         machine.plan_seconds = machine.message_seconds = machine.client_seconds = 0;
-        seconds.push_back(CombiningSeconds(c, seed, machine));
+        found->second.push_back(CombiningSeconds(c, seed, machine));
       }
-      found->second = MedianOf(std::move(seconds));
     }
     of["part"] = part;
     results.Add(of, "combine_time", found->second, Origin::kSimulated);

@@ -40,7 +40,7 @@ void AddFigures(Results& results, const Json& of, const std::vector<FrameFigures
     std::vector<double> values;
     values.reserve(repeats.size());
     for (const FrameFigures& repeat : repeats) values.push_back(repeat.*field.figure);
-    results.Add(of, field.metric, MedianOf(std::move(values)), Origin::kSimulated);
+    results.Add(of, field.metric, values, Origin::kSimulated);
   }
 }
 

@@ -92,7 +92,7 @@ void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& re
     Json columns = ColumnsOf(frame);
     columns.update(frames[i].names);
     for (const auto& [metric, number, factor] : kFields) {
-      results.Add(columns, metric, EstimateOf(context.log(), trials[i].key, number).Times(factor), Origin::kMeasured);
+      results.Add(columns, metric, ValuesOf(context.log(), trials[i].key, number, factor), Origin::kMeasured);
     }
   }
   std::vector<Json> workers;

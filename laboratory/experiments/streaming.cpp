@@ -76,8 +76,7 @@ void RunStreaming(ExperimentContext& context, Results& results) {
       const FrameCase two = streams.Frame(volume, 2, groups);
       Json of = ColumnsOf(two);
       of["link"] = "host";
-      results.Add(of, "latency", EstimateOf(context.log(), ServiceKey(context, two, kServiceFrames), "latency_ms").Times(1e-3),
-                  Origin::kMeasured);
+      results.Add(of, "latency", ValuesOf(context.log(), ServiceKey(context, two, kServiceFrames), "latency_ms", 1e-3), Origin::kMeasured);
     }
     const MeasuredFrame shown = Recall(context, streams.Frame(volume, streams.workers[1], streams.groups[2]));
     AttachTimeline(results, "timeline-" + volume.dataset, Simulate(shown, Cluster(context, Link(kLink)), 3, 3, true));

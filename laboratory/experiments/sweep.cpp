@@ -66,7 +66,7 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
     if (!c.served) continue;
     Json here = c.columns;
     here["link"] = "host";
-    results.Add(here, "latency", EstimateOf(context.log(), ServiceKey(context, c.frame, kServiceFrames), "latency_ms").Times(1e-3),
+    results.Add(here, "latency", ValuesOf(context.log(), ServiceKey(context, c.frame, kServiceFrames), "latency_ms", 1e-3),
                 Origin::kMeasured);
   }
 }

@@ -106,9 +106,9 @@ void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, 
   }
 }
 
-std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number) {
+std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number, double factor) {
   std::vector<double> values;
-  for (const Json* numbers : log.All(key)) values.push_back(Field(*numbers, number).get<double>());
+  for (const Json* numbers : log.All(key)) values.push_back(Field(*numbers, number).get<double>() * factor);
   CHECK(!values.empty()) << key.dump();
   return values;
 }

@@ -37,7 +37,8 @@ std::vector<Trial> Distinct(std::vector<Trial> trials);
 void RunTrials(const std::vector<Trial>& trials, const TrialSchedule& schedule, TrialLog& log);
 
 // All repeats of a number, given by name or, with a leading slash, by JSON pointer. CHECKs that the trial was run and has the number.
-std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number);
+// `factor`: into another unit.
+std::vector<double> ValuesOf(const TrialLog& log, const Json& key, const std::string& number, double factor = 1);
 inline Estimate EstimateOf(const TrialLog& log, const Json& key, const std::string& number) { return MedianOf(ValuesOf(log, key, number)); }
 // The same for a list of numbers, entry by entry, over `repeats`, which hold lists of one length.
 std::vector<Estimate> EstimatesOf(const std::vector<const Json*>& repeats, const std::string& list);

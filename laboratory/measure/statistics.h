@@ -17,9 +17,6 @@ struct Estimate {
   int count = 0;
   // The values fall into two heaps of at least two values: the gap between these is wider than a tenth of the median and twice each heap.
   bool two_modes = false;
-
-  // In another unit: factor > 0.
-  Estimate Times(double factor) const { return {median * factor, low * factor, high * factor, coverage, count, two_modes}; }
 };
 Estimate MedianOf(std::vector<double> values, double confidence = 0.95);  // no values: all zero
 

@@ -52,6 +52,7 @@ std::span<const Column> ValueColumns() {
       {"origin", "measured, simulated or paper"},
       {"commit", "of the program; '-dirty' if its sources were changed"},
       {"machine", "processor, cores, instruction set"},
+      {"each", "the repeats in their order: repeat i of one case is compared with repeat i of another"},
   };
   return kColumns;
 }

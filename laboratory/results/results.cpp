@@ -14,9 +14,14 @@ namespace {
 
 constexpr double kWide = 1.25;  // high over low
 
-// RFC 4180.
+// RFC 4180. A list becomes a text with spaces.
 std::string Field(const Json& value) {
   if (value.is_null()) return "";
+  if (value.is_array()) {
+    std::string text;
+    for (const Json& entry : value) text += (text.empty() ? "" : " ") + entry.dump();
+    return text;
+  }
   if (!value.is_string()) return value.dump();
   const auto& text = value.get_ref<const std::string&>();
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
@@ -54,7 +59,7 @@ std::string_view ToString(Origin origin) {
   return kNames.at(std::size_t(origin));
 }
 
-void Results::Add(const Json& of, std::string_view metric, const Estimate& value, Origin origin) {
+void Results::Add(const Json& of, std::string_view metric, const Estimate& value, Origin origin, const std::vector<double>& each) {
   if (!std::isfinite(value.median)) return;
   const auto found = std::ranges::find(Metrics(), metric, &Metric::name);
   CHECK(found != Metrics().end()) << metric;
@@ -75,6 +80,7 @@ void Results::Add(const Json& of, std::string_view metric, const Estimate& value
                   {"origin", ToString(origin)},
                   {"commit", by_.commit},
                   {"machine", by_.machine}});
+  if (!each.empty()) row["each"] = each;
 }
 
 Status Results::Write(const std::string& folder) const {

@@ -30,7 +30,11 @@ class Results {
 
   // `of`: an object whose names are in CaseColumns(). `metric`: a name of Metrics(), and the value in its unit. CHECKs both, and that no
   // value was added before for the same case, metric and origin. A value that is not finite is left out.
-  void Add(const Json& of, std::string_view metric, const Estimate& value, Origin origin);
+  // `each`: the repeats in their order; none, if they cannot be told.
+  void Add(const Json& of, std::string_view metric, const Estimate& value, Origin origin, const std::vector<double>& each = {});
+  void Add(const Json& of, std::string_view metric, const std::vector<double>& each, Origin origin) {
+    Add(of, metric, MedianOf(each), origin, each);
+  }
   void Add(const Json& of, std::string_view metric, double value, Origin origin) {
     Add(of, metric, Estimate{value, value, value, 1, 0}, origin);
   }

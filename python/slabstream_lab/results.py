@@ -47,7 +47,7 @@ class Run:
         """The only value of a case, or None if there is none. ResultsError if there are several."""
         rows = self.select(metric=metric, **columns)
         if len(rows) > 1:
-            distinct = [name for name in rows if name not in ("value", "low", "high") and rows[name].nunique(dropna=False) > 1]
+            distinct = [name for name in rows if name not in ("value", "low", "high", "each") and rows[name].nunique(dropna=False) > 1]
             raise ResultsError(f"{len(rows)} values of {metric} for {columns}; they differ in {', '.join(distinct)}")
         return None if rows.empty else value_of(rows.iloc[0])
 

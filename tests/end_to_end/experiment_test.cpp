@@ -33,6 +33,8 @@ class ExperimentTest : public EndToEndTest {
     EXPECT_NE(run["commit"], "");
     EXPECT_THAT(run["command"].get<std::string>(), HasSubstr("experiment "));
     EXPECT_GE(run["machine"]["cores"], 1);
+    for (const char* told : {"cpu", "simd", "flags", "kernel", "governor", "compiler", "load"})
+      EXPECT_TRUE(run["machine"].contains(told)) << told;
     const std::vector<json> rows = RowsOf(folder);
     EXPECT_FALSE(rows.empty());
     for (const json& row : rows) EXPECT_EQ(row["experiment"], experiment);

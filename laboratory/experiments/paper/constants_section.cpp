@@ -61,7 +61,7 @@ Trial CycleTrial() {
 std::vector<Trial> ConstantsTrials(const PaperSetup&) { return {CombiningTrial(Splatting()), CombiningTrial(ZBuffer()), CycleTrial()}; }
 
 void AddConstants(const PaperSetup& setup, Results& results) {
-  const auto seconds = [&](const Trial& trial) { return EstimateOf(setup.context().log(), trial.key, "seconds"); };
+  const auto seconds = [&](const Trial& trial) { return ValuesOf(setup.context().log(), trial.key, "seconds"); };
   results.Add({{"part", "clock-cycle"}}, "constant", seconds(CycleTrial()), Origin::kMeasured);
   for (const RendererKind* renderer : {Splatting(), ZBuffer()}) {
     results.Add({{"part", "combining-pixel"}, {"renderer", renderer->name()}, {"stage", "combine"}}, "constant",

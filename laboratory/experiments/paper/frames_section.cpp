@@ -67,11 +67,11 @@ void Add(const PaperSetup& setup, const Asked& asked, const std::vector<MachineM
   Json of = {{"part", "frames"}, {"variant", images == Images::kWhole ? "whole images" : "without empty pixels"}, {"link", "paper"}};
   of.update(ColumnsOf(frame));
   const Origin origin = frame.workers > 1 ? Origin::kSimulated : Origin::kMeasured;
-  for (auto& [metric, values] : figures) results.Add(of, metric, MedianOf(std::move(values)), origin);
+  for (const auto& [metric, values] : figures) results.Add(of, metric, values, origin);
   if (images != Images::kWhole || frame.policy.combine != FrameCase().policy.combine) return;  // the rest is that of any images and scheme
-  for (auto& [stage, values] : stages) {
+  for (const auto& [stage, values] : stages) {
     of["stage"] = stage;
-    results.Add(of, "stage_time", MedianOf(std::move(values)), Origin::kMeasured);
+    results.Add(of, "stage_time", values, Origin::kMeasured);
   }
   of.erase("stage");
   const auto voxels = double(repeats.front().plan.setup.description.geometry.bounds().voxel_count());

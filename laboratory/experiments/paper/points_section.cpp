@@ -56,12 +56,12 @@ std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& o
 }
 
 // Transform and Z-buffer without shading, which is all that the points do.
-Estimate SecondsOfFaces(const PaperSetup& setup, const PointsCase& of) {
+std::vector<double> SecondsOfFaces(const PaperSetup& setup, const PointsCase& of) {
   std::vector<double> seconds;
   for (const MeasuredFrame& repeat : RecallRepeats(setup.context(), of.frame)) {
     seconds.push_back(repeat.StageSeconds(Stage::kTransform) + repeat.StageSeconds(Stage::kZBuffer));
   }
-  return MedianOf(std::move(seconds));
+  return seconds;
 }
 
 }  // namespace
@@ -91,7 +91,7 @@ void AddPoints(const PaperSetup& setup, Results& results) {
       columns["variant"] = variant;
       results.Add(columns, metric, value, Origin::kMeasured);
     };
-    add("points", "run_time", EstimateOf(setup.context().log(), of.Key(), "seconds"));
+    add("points", "run_time", ValuesOf(setup.context().log(), of.Key(), "seconds"));
     add("faces", "run_time", SecondsOfFaces(setup, of));
     const PointZBuffer points = Draw(of, *setup.context().volumes().Get(of.frame.volume).volume);
     const PointZBuffer::Holes holes = points.HolesIn(DepthsOfFaces(setup.context(), of));

@@ -70,7 +70,7 @@ std::vector<Trial> TransformTrials(const PaperSetup& setup) {
 
 void AddTransform(const PaperSetup& setup, Results& results) {
   const auto add = [&](int size, int p, const TransformMethod& method) {
-    const auto of = [&](std::string_view number) { return EstimateOf(setup.context().log(), Key(size, p, method), std::string(number)); };
+    const auto of = [&](std::string_view number) { return ValuesOf(setup.context().log(), Key(size, p, method), std::string(number)); };
     Json columns = Columns(size, p, method.name);
     results.Add(columns, "run_time", of("seconds"), Origin::kMeasured);
     for (const TransformPass& pass : method.passes) {

@@ -30,7 +30,7 @@ void AddValidation(const PaperSetup& setup, Results& results) {
     of.update(ColumnsOf(frame));
     const Json key = ValidationKey(setup.context(), frame, kTurns);
     const auto add = [&](const char* number, Origin origin) {
-      results.Add(of, "latency", EstimateOf(setup.context().log(), key, number).Times(1e-3), origin);
+      results.Add(of, "latency", ValuesOf(setup.context().log(), key, number, 1e-3), origin);
     };
     add("measured_ms", Origin::kMeasured);
     add("simulated_ms", Origin::kSimulated);

@@ -116,6 +116,10 @@ TEST(BenchMachine, IsKnown) {
   const MachineInfo machine = DescribeMachine();
   EXPECT_GE(machine.cores, 1);
   EXPECT_NE(machine.simd, "");
+  EXPECT_THAT(machine.kernel, testing::StartsWith("Linux "));
+  EXPECT_THAT(machine.compiler, testing::AnyOf(HasSubstr("GCC "), HasSubstr("lang ")));
+  EXPECT_NE(machine.flags, "");
+  EXPECT_GE(machine.load, 0);
 }
 
 TEST(BenchMachine, PeakMemoryGrowsWithWhatIsTouched) {

@@ -18,13 +18,14 @@ Results Some() {
   Results results({"streaming", "c0ffee", "a machine, 2 cores"});
   results.Add({{"volume", "say \"ball\", twice"}, {"workers", 2}}, "latency", Estimate{0.5, 0.4, 0.7, 0.9, 3}, Origin::kMeasured);
   results.Add({{"volume", "ball"}}, "memory", 12.0, Origin::kPaper);
+  results.Add({{"volume", "ball"}}, "latency", std::vector{0.5, 0.25, 1.0}, Origin::kSimulated);
   results.Add({{"volume", "nothing"}}, "memory", std::numeric_limits<double>::quiet_NaN(), Origin::kMeasured);
   return results;
 }
 
 TEST(Results, RowsHoldCaseValueAndWhoFoundIt) {
   const Results results = Some();
-  ASSERT_EQ(results.rows().size(), 2U) << "what is not a number is left out";
+  ASSERT_EQ(results.rows().size(), 3U) << "what is not a number is left out";
   const Json& row = results.rows().front();
   EXPECT_EQ(row["experiment"], "streaming");
   EXPECT_EQ(row["workers"], 2);
@@ -32,7 +33,18 @@ TEST(Results, RowsHoldCaseValueAndWhoFoundIt) {
   EXPECT_EQ(row["repeats"], 3);
   EXPECT_EQ(row["noise"], "wide");
   EXPECT_EQ(row["origin"], "measured");
-  EXPECT_EQ(results.rows().back()["repeats"], 0);
+  EXPECT_FALSE(row.contains("each")) << "only the interval was given";
+  EXPECT_EQ(results.rows()[1]["repeats"], 0);
+  EXPECT_FALSE(results.rows()[1].contains("each"));
+}
+
+TEST(Results, RepeatsStandInTheirOrderBesideTheirMedian) {
+  const Json row = Some().rows().back();
+  EXPECT_EQ(row["value"], 0.5);
+  EXPECT_EQ(row["low"], 0.25);
+  EXPECT_EQ(row["high"], 1.0);
+  EXPECT_EQ(row["repeats"], 3);
+  EXPECT_EQ(row["each"], Json({0.5, 0.25, 1.0})) << "repeat i of two cases is a pair";
 }
 
 TEST(Results, FilesHoldTheSameRows) {
@@ -42,8 +54,9 @@ TEST(Results, FilesHoldTheSameRows) {
   ASSERT_TRUE(results.Write(folder.path()).ok());
   const std::string csv = ReadTextFile(folder.path() + "/results.csv", 1 << 20).value();
   EXPECT_THAT(csv, HasSubstr("1,streaming,,\"say \"\"ball\"\", twice\","));
-  EXPECT_THAT(csv, HasSubstr("latency,s,0.5,0.4,0.7,3,wide,measured,c0ffee,\"a machine, 2 cores\"\n"));
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 3);
+  EXPECT_THAT(csv, HasSubstr("latency,s,0.5,0.4,0.7,3,wide,measured,c0ffee,\"a machine, 2 cores\",\n"));
+  EXPECT_THAT(csv, HasSubstr("simulated,c0ffee,\"a machine, 2 cores\",0.5 0.25 1.0\n"));
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 4);
   const std::string lines = ReadTextFile(folder.path() + "/results.jsonl", 1 << 20).value();
   EXPECT_EQ(Json::parse(lines.substr(0, lines.find('\n'))), results.rows().front());
   EXPECT_EQ(ReadTextFile(folder.path() + "/boxes.csv", 1 << 20).value(), "box,seconds\n1,0.5\n");
