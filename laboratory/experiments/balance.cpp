@@ -178,31 +178,16 @@ void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredF
   results.Add(of, "memory", repeats.front().MostVoxelBytes(), Origin::kMeasured);
 }
 
-// Latencies of one frame, by link and repeat.
-using Latencies = std::vector<std::vector<double>>;
-
-Latencies AddLatency(ExperimentContext& context, Results& results, std::string_view part, const FrameCase& frame,
-                     std::span<const std::string_view> links) {
+void AddLatency(ExperimentContext& context, Results& results, std::string_view part, const FrameCase& frame,
+                std::span<const std::string_view> links) {
   const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
-  Latencies latencies;
   for (const std::string_view link : links) {
     const std::vector<MachineModel> machines = Clusters(context, Link(link));
-    std::vector<double>& seconds = latencies.emplace_back();
+    std::vector<double> seconds;
     for (std::size_t i = 0; i < std::min(repeats.size(), machines.size()); ++i)
       seconds.push_back(Simulate(repeats[i], machines[i]).frames.front().latency());
     results.Add(CaseOf(part, frame, link), "latency", seconds, Origin::kSimulated);
   }
-  return latencies;
-}
-
-// Compared repeat by repeat, because the repeats of both were simulated on the same machines: what differs from machine to machine affects
-// both.
-void AddSpeed(Results& results, Json of, std::string_view against, const std::vector<double>& reference,
-              const std::vector<double>& seconds) {
-  std::vector<double> speeds;
-  for (std::size_t i = 0; i < std::min(reference.size(), seconds.size()); ++i) speeds.push_back(reference[i] / seconds[i]);
-  of["variant"] = against;
-  results.Add(of, "speed", speeds, Origin::kSimulated);
 }
 
 // Every partition under every scheme, and what `auto` takes.
@@ -211,28 +196,18 @@ void AddPolicies(ExperimentContext& context, const Balance& balance, const Bench
   AddBoxFigures(results, CaseOf("partition", whole), RecallRepeats(context, whole));
   AddLatency(context, results, "policy", whole, kLinks);
   for (const int p : balance.workers) {
-    std::array<std::vector<double>, kLinks.size()> best;  // latencies of the policy whose median is least
-    const auto consider = [&best](std::size_t link, const std::vector<double>& seconds) {
-      if (best[link].empty() || MedianOf(seconds).median < MedianOf(best[link]).median) best[link] = seconds;
-    };
+    if (p == 1) continue;
     for (const NamedPolicy& named : AllPartitions()) {
-      if (p == 1) break;
       const FrameCase boxes = balance.Frame(volume, Combined(named.policy, kCombine), p);
       AddBoxFigures(results, CaseOf("partition", boxes), RecallRepeats(context, boxes));
       for (const int groups : kGroups) {
-        for (const std::string_view scheme : kSchemes) {
-          const FrameCase frame = balance.Frame(volume, Combined(named.policy, scheme, groups), p);
-          const Latencies latencies = AddLatency(context, results, "policy", frame, kLinks);
-          for (std::size_t link = 0; link < kLinks.size(); ++link) consider(link, latencies[link]);
-        }
+        for (const std::string_view scheme : kSchemes)
+          AddLatency(context, results, "policy", balance.Frame(volume, Combined(named.policy, scheme, groups), p), kLinks);
       }
     }
-    for (std::size_t link = 0; link < kLinks.size(); ++link) {
-      if (p == 1) break;
-      const FrameCase chosen = WithChosenPolicy(context, balance.Frame(volume, Automatic(), p), Link(kLinks[link]));
-      const std::vector<double> seconds = AddLatency(context, results, "auto", chosen, std::span(&kLinks[link], 1)).front();
-      consider(link, seconds);
-      AddSpeed(results, CaseOf("auto", chosen, kLinks[link]), "best policy", best[link], seconds);
+    for (const std::string_view& link : kLinks) {
+      const FrameCase chosen = WithChosenPolicy(context, balance.Frame(volume, Automatic(), p), Link(link));
+      AddLatency(context, results, "auto", chosen, std::span(&link, 1));
     }
   }
 }
@@ -270,8 +245,8 @@ void AddAssignments(ExperimentContext& context, const Balance& balance, const Be
   }
 }
 
-// Each step, and without `step` the mean over the steps. Returns the mean latencies by repeat.
-std::vector<double> AddSequence(ExperimentContext& context, const ViewSequence& sequence, std::string_view part, Results& results) {
+// Each step, and without `step` the mean over the steps.
+void AddSequence(ExperimentContext& context, const ViewSequence& sequence, std::string_view part, Results& results) {
   struct Figure {
     const char* metric;
     std::vector<std::vector<double>> values;  // by step and repeat
@@ -307,24 +282,13 @@ std::vector<double> AddSequence(ExperimentContext& context, const ViewSequence& 
       results.Add(at, figure.metric, figure.values[step], origin);
     }
   }
-  return figures.front().means;
 }
 
-// Every method under the same views. The first one is equal slabs with static balance, and each dynamic one follows its static one.
+// Every method under the same views.
 void AddSequences(ExperimentContext& context, const Balance& balance, const BenchCase& volume, int p, const ViewMotion& motion, bool slowed,
                   Results& results) {
   const std::string_view part = slowed ? "slowed" : "sequence";
-  std::vector<double> slabs, before;
-  for (const Policy& policy : balance.moving) {
-    const ViewSequence sequence = balance.Sequence(volume, policy, p, motion, slowed);
-    std::vector<double> seconds = AddSequence(context, sequence, part, results);
-    if (slabs.empty()) slabs = seconds;
-    Json of = CaseOf(part, sequence.frame, kLinks.front());
-    of["view"] = motion.name;
-    AddSpeed(results, of, "equal slabs", slabs, seconds);
-    if (IsDynamic(sequence.frame)) AddSpeed(results, of, "static", before, seconds);
-    before = std::move(seconds);
-  }
+  for (const Policy& policy : balance.moving) AddSequence(context, balance.Sequence(volume, policy, p, motion, slowed), part, results);
 }
 
 }  // namespace

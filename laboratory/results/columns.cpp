@@ -79,7 +79,6 @@ std::span<const Metric> Metrics() {
       {"offset", "1", "largest distance of a computed coordinate from the exact one, in pixels"},
       {"additions", "1", "floating-point additions, counted"},
       {"products", "1", "floating-point multiplications, counted"},
-      {"speed", "1", "time of a reference over time of the case: above 1 is faster"},
       {"constant", "s", "time a unit of work, as the paper's tables 3 and 4 name it"},
       {"grain", "1", "(N^3/p)/I^2: voxels of a worker over pixels of an image that it sends"},
       {"count", "1", "how many of what `variant` names"},

@@ -7,8 +7,8 @@
 
 docs/reference/results.md defines the columns and metrics.
 """
-from .ranking import Ranking, ranking
+from .ranking import Ranking, decide, ranking, rankings
 from .results import ResultsError, Run, read
 from .value import Value
 
-__all__ = ["Ranking", "ResultsError", "Run", "Value", "ranking", "read"]
+__all__ = ["Ranking", "ResultsError", "Run", "Value", "decide", "ranking", "rankings", "read"]

@@ -9,6 +9,7 @@ from typing import Any, Sequence, Union
 
 import jinja2
 
+from .ranking import LEVEL, MODEL_ERROR, least_repeats
 from .results import Run
 from .value import Value, scale_of
 
@@ -84,10 +85,8 @@ def doubts(run: Run) -> list[str]:
     noisy = run.results["noise"].fillna("").ne("").sum()
     if noisy > 0.1 * len(run.results):
         found.append(f"{noisy} of {len(run.results)} values are noisy: their intervals are wide, or their repeats fall into two heaps.")
-    if run.info["repeats"] == 1:
-        found.append("Everything was measured once: nothing is ranked.")
-    elif run.info["repeats"] == 2:
-        found.append("Everything was measured twice: an interval goes from one value to the other.")
+    if run.info["repeats"] < least_repeats(1):
+        found.append(f"Repeats: {run.info['repeats']}. Nothing is ranked by fewer than {least_repeats(1)}.")
     if str(run.info["commit"]).endswith("-dirty"):
         found.append("The sources of the program were changed after their commit.")
     return found
@@ -105,7 +104,7 @@ def write(page: Page, run: Run, folder: pathlib.Path) -> pathlib.Path:
     environment.tests["value"] = lambda cell: isinstance(cell, Value)
     kinds = {Table: "table", Figure: "figure", Photo: "photo"}
     environment.filters["kind"] = lambda block: kinds[type(block)]
-    html = environment.get_template("page.html").render(page=page, info=run.info, doubts=doubts(run))
+    html = environment.get_template("page.html").render(page=page, info=run.info, doubts=doubts(run), level=LEVEL, model_error=MODEL_ERROR)
     (folder / "plots").mkdir(parents=True, exist_ok=True)
     for section in page.sections:
         for block in section.blocks:

@@ -154,7 +154,9 @@ def stacked(name: str, title: str, bars_: Mapping[str, Mapping[str, float]], y: 
 
 
 def timeline(name: str, title: str, spans: pandas.DataFrame, caption: str = "", workers: int = 8) -> Figure:
-    """What each worker does when, from a table of spans (docs/reference/results.md)."""
+    """What each worker does when, from a table of spans (docs/reference/results.md). The first `workers` of them; the title says so."""
+    if (most := spans["worker"].max()) > workers:
+        title += f": workers 1 to {workers} of {most}"
     spans = spans[spans["worker"] <= workers]
     kinds = ["render", "combine", "encode", "resolve", "transfer"]
     lanes = [

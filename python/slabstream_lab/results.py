@@ -79,7 +79,8 @@ class Run:
 
 def value_of(row: pandas.Series) -> Value:
     noise = row["noise"] if isinstance(row["noise"], str) else ""
-    return Value(row["value"], row["low"], row["high"], int(row["repeats"]), row["unit"], row["origin"], noise)
+    each = tuple(row["each"]) if isinstance(row["each"], list) else ()
+    return Value(row["value"], row["low"], row["high"], int(row["repeats"]), row["unit"], row["origin"], noise, each)
 
 
 def read(folder: str | pathlib.Path) -> Run:
@@ -89,7 +90,7 @@ def read(folder: str | pathlib.Path) -> Run:
         results = pandas.read_json(folder / "results.jsonl", lines=True, dtype=False)
     except (OSError, ValueError) as error:
         raise ResultsError(f"'{folder}' has no results of an experiment: {error}") from None
-    for name in TEXTS + NUMBERS:
+    for name in [*TEXTS, *NUMBERS, "each"]:
         if name not in results:
             results[name] = None
     for name in NUMBERS:

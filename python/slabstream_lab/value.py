@@ -3,6 +3,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import statistics
+from typing import Sequence
 
 # What a unit of the results is called on a page, from the factor upwards.
 _SCALES = {
@@ -15,7 +17,10 @@ _SCALES = {
 
 @dataclasses.dataclass(frozen=True)
 class Value:
-    """The median of some repeats with the interval of the median (results.md). repeats = 0: printed in the paper, or counted."""
+    """The median of some repeats with the interval of the median (results.md). repeats = 0: printed in the paper, or counted.
+
+    `each`: the repeats in their order, so that those of two values are pairs; empty if they are not known.
+    """
 
     value: float
     low: float
@@ -24,37 +29,32 @@ class Value:
     unit: str = "1"
     origin: str = "measured"
     noise: str = ""
+    each: tuple[float, ...] = ()
 
     @staticmethod
     def exact(value: float, unit: str = "1", origin: str = "measured") -> "Value":
         return Value(value, value, value, 0, unit, origin)
 
-    def _with(self, other: "Value", value: float, low: float, high: float, unit: str) -> "Value":
-        counted = [v.repeats for v in (self, other) if v.repeats > 0]
+    def over(self, other: "Value") -> "Value":
+        """This value over another: repeat by repeat where both have as many, else with the widest interval that both intervals allow."""
+        unit = "1" if self.unit == other.unit else f"{self.unit}/{other.unit}"
         origins = {v.origin for v in (self, other)}
         origin = "simulated" if "simulated" in origins else min(origins)
-        return Value(value, low, high, min(counted, default=0), unit, origin, self.noise or other.noise)
-
-    def over(self, other: "Value") -> "Value":
-        """This value over another, with the widest interval that both intervals allow."""
-        unit = "1" if self.unit == other.unit else f"{self.unit}/{other.unit}"
-        return self._with(other, self.value / other.value, self.low / other.high, self.high / other.low, unit)
+        noise = self.noise or other.noise
+        count = max(len(self.each), len(other.each))
+        mine, theirs = ((v.value,) * count if v.repeats == 0 else v.each for v in (self, other))
+        if count > 0 and len(mine) == len(theirs):
+            each = tuple(a / b for a, b in zip(mine, theirs))
+            return Value(statistics.median(each), *interval_of(each), count, unit, origin, noise, each)
+        repeats = min((v.repeats for v in (self, other) if v.repeats > 0), default=0)
+        return Value(self.value / other.value, self.low / other.high, self.high / other.low, repeats, unit, origin, noise)
 
     def times(self, factor: float, unit: str | None = None) -> "Value":
-        return dataclasses.replace(
-            self, value=self.value * factor, low=self.low * factor, high=self.high * factor, unit=unit or self.unit
-        )
+        low, high, each = self.low * factor, self.high * factor, tuple(x * factor for x in self.each)
+        return dataclasses.replace(self, value=self.value * factor, low=low, high=high, unit=unit or self.unit, each=each)
 
     def percent(self) -> "Value":
         return self.times(100, "%")
-
-    def overlaps(self, other: "Value") -> bool:
-        return self.low <= other.high and other.low <= self.high
-
-    @property
-    def ranks(self) -> bool:
-        """Whether it may be ranked: one repeat has no interval, and two heaps have no middle."""
-        return self.repeats != 1 and self.noise != "two modes"
 
     @property
     def digits(self) -> int:
@@ -95,22 +95,21 @@ def number_text(number: float, digits: int) -> str:
     return f"{round(number, decimals):.{max(decimals, 0)}f}"
 
 
-def outcome(ratio: Value) -> str:
-    """What a speed, time of a reference over time of a case, says of the case: "faster", "slower", "tie", or "open" if it is not ranked."""
-    if not ratio.ranks:
-        return "open"
-    return "tie" if ratio.low <= 1 <= ratio.high else "faster" if ratio.value > 1 else "slower"
+def interval_of(repeats: Sequence[float]) -> tuple[float, float]:
+    """Of the median, as results have it (results.md): 95 % confidence from six repeats on, below that the smallest and largest one."""
+    ordered, count, k = sorted(repeats), len(repeats), 1
+    while k < (count + 1) // 2 and sum(math.comb(count, i) for i in range(k + 1)) <= 0.025 * 2**count:
+        k += 1
+    return ordered[k - 1], ordered[-k]
 
 
-def speed_text(ratio: Value, of: str = "") -> str:
-    """How a case compares with `of`, from time of `of` over time of the case: "2.1 times as fast", "as fast", or that it is open."""
+def speed_text(ratio: Value, outcome: str, of: str = "") -> str:
+    """How a case compares with `of`, from time of `of` over time of the case and what `decide` found of it."""
     than = f" as {of}" if of else ""
-    found = outcome(ratio)
-    if found == "open":
+    if outcome == "open":
         return f"not ranked against {of or 'it'}"
-    if found == "tie":
+    if outcome == "tie":
         return f"as fast{than} (a tie)"
-    if found == "faster":
+    if outcome == "faster":
         return f"{ratio.text()} times as fast{than}"
-    inverse = Value(1 / ratio.value, 1 / ratio.high, 1 / ratio.low, ratio.repeats, "1", ratio.origin, ratio.noise)
-    return f"{inverse.text()} times as slow{than}"
+    return f"{Value.exact(1).over(ratio).text()} times as slow{than}"

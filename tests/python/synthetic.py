@@ -4,19 +4,36 @@ from __future__ import annotations
 import itertools
 import json
 import pathlib
+import random
+import sys
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
+from slabstream_lab.value import interval_of  # noqa: E402
+
+REPEATS = 16
 UNITS = {"imbalance": "1", "idle_share": "1", "image_bytes": "B", "memory": "B", "count": "1", "other_load": "1", "drift": "1"}
 FIGURES = ("latency", "preview", "period", "imbalance", "idle_share", "image_bytes")
 
 
-def row(metric: str, value: float, spread: float = 0.01, repeats: int = 3, origin: str = "simulated", noise: str = "", **of) -> dict:
-    """`spread`: half the interval's width over the value."""
-    interval = {"low": value * (1 - spread), "high": value * (1 + spread)}
-    found = {"metric": metric, "unit": UNITS.get(metric, "s"), "value": value, **interval, "repeats": repeats, "noise": noise}
-    return {"version": 1, "experiment": "synthetic", **of, **found, "origin": origin, "commit": "abc", "machine": "one core"}
+def repeats_round(value: float, spread: float, repeats: int, case: str) -> list[float]:
+    """With this median, in an order that the case decides: half of them below, half above, by up to `spread`."""
+    draw = random.Random(case)
+    above = [draw.uniform(0.2, 1) * spread for _ in range(repeats // 2)]
+    errors = above + [-error for error in above] + [0.0] * (repeats % 2)
+    draw.shuffle(errors)
+    return [value * (1 + error) for error in errors]
 
 
-def figures(seconds: float, repeats: int = 3, **of) -> list[dict]:
+def row(metric: str, value: float, spread: float = 0.01, repeats: int = REPEATS, origin: str = "simulated", noise: str = "", **of) -> dict:
+    """`spread`: how far repeats are from the value, over it. `repeats` 0: counted."""
+    each = repeats_round(value, spread, repeats, f"{metric} {origin} {of}")
+    low, high = interval_of(each) if each else (value, value)
+    found = {"metric": metric, "unit": UNITS.get(metric, "s"), "value": value, "low": low, "high": high, "repeats": repeats, "noise": noise}
+    found |= {"origin": origin, "commit": "abc", "machine": "one core"} | ({"each": each} if each else {})
+    return {"version": 1, "experiment": "synthetic", **of, **found}
+
+
+def figures(seconds: float, repeats: int = REPEATS, **of) -> list[dict]:
     """The figures of a frame whose latency is this; its period is half of it."""
     values = {"latency": seconds, "preview": seconds / 2, "period": seconds / 2, "imbalance": 1.1, "idle_share": 0.2, "image_bytes": 1e6}
     return [row(metric, values[metric], repeats=repeats, **of) for metric in FIGURES]
@@ -24,20 +41,20 @@ def figures(seconds: float, repeats: int = 3, **of) -> list[dict]:
 
 def write(folder: pathlib.Path, rows: list[dict], experiment: str = "streaming", **info) -> pathlib.Path:
     folder.mkdir(parents=True, exist_ok=True)
-    machine = {"cpu": "one", "cores": 1, "simd": "none"}
+    machine = {"cpu": "one", "cores": 1, "simd": "none", "kernel": "Linux", "governor": "", "compiler": "GCC"}
     run = {"experiment": experiment, "version": "0", "commit": "abc", "command": "slabstream <x> & y", "machine": machine}
-    run |= {"seed": 1, "repeats": 3, "quick": True, "scale": 0.15, "date": "today"} | info
+    run |= {"seed": 1, "repeats": REPEATS, "quick": True, "scale": 0.15, "date": "today"} | info
     (folder / "run.json").write_text(json.dumps(run))
     (folder / "results.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
     return folder
 
 
-def streaming(folder: pathlib.Path, repeats: int = 3) -> pathlib.Path:
+def streaming(folder: pathlib.Path, repeats: int = REPEATS) -> pathlib.Path:
     rows = []
     for p, g in [(1, 1), *itertools.product((2, 8), (1, 2, 4))]:
         of = {"volume": "class1-20", "workers": p, "groups": g, "pixels": 77}
         rows += figures(1 / p, repeats, link="10gbit", **of)
-        rows.append(row("memory", 1e6 / g, origin="measured", link="10gbit", **of))
+        rows.append(row("memory", 1e6 / g, repeats=0, origin="measured", link="10gbit", **of))
         if p == 2:
             rows.append(row("latency", 1.0, origin="measured", link="host", **of))
     write(folder, rows, "streaming", repeats=repeats)
@@ -46,7 +63,7 @@ def streaming(folder: pathlib.Path, repeats: int = 3) -> pathlib.Path:
     return folder
 
 
-def combining(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None = None, faults: int = 0) -> pathlib.Path:
+def combining(folder: pathlib.Path, repeats: int = REPEATS, times: dict[str, float] | None = None, faults: int = 0) -> pathlib.Path:
     """`times`: seconds of each scheme on 8 full images of one size; they grow with workers, size and active pixels."""
     times = times or {"fan-in": 2e-3, "chain": 3e-3, "radix-k": 1e-3}
     rows = []
@@ -60,7 +77,7 @@ def combining(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | 
         for p, share in itertools.product((2, 8), (1.0, 0.2)):
             case = {"part": "operators", "workers": p, "pixels": 100, "active": share, **of}
             rows.append(row("run_time", seconds * p / 8 * share, repeats=repeats, origin="measured", variant="operators", **case))
-            rows.append(row("count", faults, 0, 1, "measured", variant="page faults", **case))
+            rows.append(row("count", faults, 0, 0, "measured", variant="page faults", **case))
             add("over workers", p, 100, share, "10gbit")
         for side in (50, 100):
             add("over sizes", 16, side, 1.0, "10gbit")
@@ -71,7 +88,7 @@ def combining(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | 
     return write(folder, rows, "combining", repeats=repeats)
 
 
-def scaling(folder: pathlib.Path, repeats: int = 3, ideal: bool = True) -> pathlib.Path:
+def scaling(folder: pathlib.Path, repeats: int = REPEATS, ideal: bool = True) -> pathlib.Path:
     """Ideal speed-up, or none at all."""
     rows = []
     for part, renderer, variant, p in itertools.product(("strong", "weak"), ("splat", "zbuffer"), ("slab", "kd-tree"), (1, 8)):
@@ -82,7 +99,7 @@ def scaling(folder: pathlib.Path, repeats: int = 3, ideal: bool = True) -> pathl
     return write(folder, rows, "scaling", repeats=repeats)
 
 
-def sweep(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None = None) -> pathlib.Path:
+def sweep(folder: pathlib.Path, repeats: int = REPEATS, times: dict[str, float] | None = None) -> pathlib.Path:
     """`times`: latency of each policy with one worker."""
     rows = []
     for (variant, seconds), p, link in itertools.product((times or {"a & b": 1.0, "c": 2.0}).items(), (1, 4), ("10gbit", "1gbit")):
@@ -97,7 +114,7 @@ def sweep(folder: pathlib.Path, repeats: int = 3, times: dict[str, float] | None
     return folder
 
 
-def cluster(folder: pathlib.Path, repeats: int = 3, ideal: bool = True, error: float = 0.0, drift: float = 0.0) -> pathlib.Path:
+def cluster(folder: pathlib.Path, repeats: int = REPEATS, ideal: bool = True, error: float = 0.0, drift: float = 0.0) -> pathlib.Path:
     """`error`: of simulated times; `drift`: of times at half the share."""
     rows = []
     for p, (share, off) in itertools.product((1, 8, 16), ((0.5, 0.0), (0.25, drift))):

@@ -3,15 +3,15 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter
-from typing import Any
+from typing import Any, Mapping, Sequence
 
 import pandas
 
 from .. import plots
 from ..page import Page, Section, Table
-from ..ranking import ranking
+from ..ranking import Ranking, decide, rankings, ties_text
 from ..results import Run, value_of
-from ..value import Value, number_text, outcome, speed_text
+from ..value import Value, number_text, speed_text
 
 LINK, SCHEME = "10gbit", "radix-k"
 SLABS = "slab by voxels, static"  # what other methods are compared with
@@ -78,41 +78,42 @@ def _latencies(run: Run, subject: Subject, p: int) -> dict[str, Value]:
     return _by(run.select(workers=p, groups=1, combine=SCHEME, link=LINK, **of), _partition)
 
 
-def _relative(rows: pandas.DataFrame) -> dict[str, Value]:
-    """Time over the time of the reference, from speeds."""
-    return {name: Value.exact(1).over(speed) for name, speed in _by(rows, _method).items()}
+def _ahead_text(ranked: Sequence[Ranking], least: str) -> str:
+    """In how many cases one method alone has the least of something, and which."""
+    winners = Counter(found.ordered[0] for found in ranked if found.decided and len(found.best) == 1)
+    undecided = sum(not found.decided for found in ranked)
+    text = f"One method alone {least} in {_of(winners.total(), len(ranked), 'case')}"
+    text += " (" + ", ".join(f"{name}: {count}" for name, count in winners.most_common()) + ")" if winners else ""
+    return text + f"; several tie in {len(ranked) - winners.total() - undecided}; the repeats do not decide {undecided}."
 
 
 def _winners(run: Run, subjects: list[Subject]) -> Section:
-    rows, winners, undecided = [], Counter(), 0
+    cases: dict[tuple, dict[str, Value]] = {}
     for volume, renderer in subjects:
         for p in _shared(run, "sequence", (volume, renderer)):
             for view in run.distinct("view", part="sequence"):
-                of = {"part": "sequence", "volume": volume, "renderer": renderer, "workers": p, "view": view}
-                latencies = _by(run.select(metric="latency", step=None, **of), _method)
-                speeds = _by(run.select(metric="speed", variant="equal slabs", **of), _method)
-                ranked = ranking(_relative(run.select(metric="speed", variant="equal slabs", **of)))
-                first = ranked.ordered[0]
-                if not ranked.decided:
-                    undecided += 1
-                elif len(ranked.best) == 1:
-                    winners[first] += 1
-                than = speed_text(speeds[first], "equal slabs") if first != SLABS else "equal slabs themselves"
-                rows.append([volume, renderer, p, view, latencies[SLABS], ranked.sentence(), latencies[first], than])
-    ties = len(rows) - winners.total() - undecided
-    answer = f"One method alone is fastest in {_of(winners.total(), len(rows), 'case')}"
-    answer += " (" + ", ".join(f"{name}: {count}" for name, count in winners.most_common()) + ")" if winners else ""
-    answer += f"; several tie in {ties}; the repeats do not decide {undecided}."
+                for metric in ("latency", "imbalance"):
+                    of = {"part": "sequence", "volume": volume, "renderer": renderer, "workers": p, "view": view}
+                    cases[metric, volume, renderer, p, view] = _by(run.select(metric=metric, step=None, **of), _method)
+    ranked = rankings(cases)
+    rows = []
+    for (metric, *case), found in ranked.items():
+        if metric == "latency":
+            first, values, than = found.ordered[0], found.values, "equal slabs themselves"
+            if first != SLABS:
+                than = speed_text(values[SLABS].over(values[first]), found.outcome(first, SLABS), "equal slabs")
+            rows.append([*case, values[SLABS], found.sentence(), values[first], than, ranked["imbalance", *case].sentence()])
+    fastest, most_even = ([found for (metric, *_), found in ranked.items() if metric == wanted] for wanted in ("latency", "imbalance"))
     return Section(
         "Which method wins where",
         "Which partition, with static or dynamic balance, shows a moving view soonest?",
-        _moving_method(run) + " Methods are ranked by the mean latency of the steps over that of static slabs of equal voxels, in "
-        "parentheses. The two are compared repeat by repeat, on the same simulated machine.",
-        answer if rows else "",
+        _moving_method(run) + " Methods are ranked by the mean latency of the steps, in parentheses, which is simulated, and by their mean "
+        "imbalance, which is measured.",
+        f"{_ahead_text(fastest, 'is fastest')} {_ahead_text(most_even, 'has the least imbalance')} {ties_text(ranked)}." if rows else "",
         [
             Table(
-                "Least latency",
-                ["volume", "renderer", "p", "views", "equal slabs", "fastest", "latency of the first", "the first is"],
+                "Least latency and least imbalance",
+                ["volume", "renderer", "p", "views", "equal slabs", "fastest", "latency of the first", "the first is", "most even"],
                 rows,
             )
         ],
@@ -135,7 +136,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         [],
     )
     blocks: list[Any] = []
-    sentences = []
+    most: dict[tuple[str, str], dict[str, Value]] = {}  # imbalances at the greatest p
     for volume, renderer in subjects:
         of = {"volume": volume, "renderer": renderer}
         name = _slug(run, (volume, renderer))
@@ -170,7 +171,7 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
                     ]
                 )
             if p == shared[-1]:
-                sentences.append(f"{volume} ({renderer}): {ranking(columns['imbalance']).sentence()}")
+                most[volume, renderer] = columns["imbalance"]
         for split in ("voxels", "occupied"):
             blocks.append(
                 plots.lines(
@@ -210,14 +211,19 @@ def _efficiency(run: Run, subjects: list[Subject]) -> Section:
         "Which partition gives workers equal work, and what is lost to imbalance, to extra work and to combining?",
         f"One view (azimuth/elevation {view}), {pixels} x {pixels} pixels, one box a worker. Every box is rendered alone on one thread. "
         "Imbalance is the longest of the workers' render times over their mean. Efficiency is the latency of one worker, T(1), over p "
-        f"times that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. Its three factors multiply exactly, "
-        "except for rounding: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over the "
-        "sum of the boxes' render times; combining is the rest: the share of the frame in which the slowest worker renders, over the same "
-        "share with one worker. A factor above 100 % is a gain. All are made from medians, so balance may differ in the last digit from "
-        "one over imbalance. The voxels of a worker include the halo and are those of the fullest.",
-        f"Least imbalance at p = {shared[-1]}: " + "; ".join(sentences) + "." if sentences else "",
+        f"times that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. In each repeat its three factors "
+        "multiply exactly: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over "
+        "the sum of the boxes' render times; combining is the rest: the share of the frame in which the slowest worker renders, over the "
+        "same share with one worker. A factor above 100 % is a gain. The table has medians over the repeats, whose product may differ a "
+        "little. The voxels of a worker include the halo and are those of the fullest.",
+        _least_imbalance(f"Least imbalance at p = {shared[-1]}", most) if most else "",
         blocks + [table],
     )
+
+
+def _least_imbalance(what: str, cases: dict[tuple[str, str], dict[str, Value]]) -> str:
+    ranked = rankings(cases)
+    return f"{what}: " + "; ".join(f"{volume} ({renderer}): {found.sentence()}" for (volume, renderer), found in ranked.items()) + "."
 
 
 def _automatic(run: Run, subjects: list[Subject]) -> Section:
@@ -230,16 +236,16 @@ def _automatic(run: Run, subjects: list[Subject]) -> Section:
                 tried = _by(run.select(part="policy", metric="latency", **of), _policy)
                 best = min(tried, key=lambda name: tried[name].value)
                 own = tried[best].value >= chosen["value"]
-                ratio = Value.exact(1).over(run.value("speed", part="auto", variant="best policy", **of))
-                ratios.append(ratio.value)
                 least = value_of(chosen) if own else tried[best]
+                ratio = value_of(chosen).over(least)
+                ratios.append(ratio.value)
                 rows.append([volume, renderer, p, link, _policy(chosen), value_of(chosen), "its own" if own else best, least, ratio])
     answer = ""
     if rows:
         median, worst = statistics.median(ratios), max(range(len(ratios)), key=ratios.__getitem__)
         answer = (
-            f"The latency of auto is {number_text(median, 3)} times that of the best policy in the median of {len(ratios)} cases: "
-            f"{'within' if median <= 1.1 else 'not within'} 10 %. It is {number_text(ratios[worst], 3)} times in the worst case: "
+            f"By the simulation, the latency of auto is {number_text(median, 3)} times that of the best policy in the median of "
+            f"{len(ratios)} cases: {'within' if median <= 1.1 else 'not within'} 10 %. It is {number_text(ratios[worst], 3)} times in the worst case: "
             f"{rows[worst][0]}, {rows[worst][1]}, p = {rows[worst][2]}, {rows[worst][3]}."
         )
     return Section(
@@ -268,20 +274,24 @@ def _policy(row: pandas.Series) -> str:
 def _sequence(run: Run, subject: Subject) -> Section:
     volume, renderer = subject
     of = {"part": "sequence", "volume": volume, "renderer": renderer, "link": LINK}
-    rows, outcomes, blocks = [], Counter(), []
+    rows, blocks = [], []
     workers = _shared(run, "sequence", subject)
+    speeds: dict[tuple, Value] = {}  # of dynamic balance against static, and the same of imbalance, which is measured
+    for view in run.distinct("view", **of):
+        for p in workers:
+            for metric in ("latency", "imbalance"):
+                values = _by(run.select(metric=metric, view=view, workers=p, step=None, **of), _method)
+                speeds |= {(metric, view, p, method): speed for method, speed in _dynamic_over_static(values).items()}
+    outcomes = decide(speeds)
     for view in run.distinct("view", **of):
         for p in workers:
             values = {
                 metric: _by(run.select(metric=metric, view=view, workers=p, step=None, **of), _method)
                 for metric in ("latency", "imbalance", "voxel_bytes")
             }
-            against = _by(run.select(metric="speed", variant="static", view=view, workers=p, **of), _method)
             for method, latency in values["latency"].items():
-                speed = ""
-                if method in against:
-                    speed = speed_text(against[method], "static")
-                    outcomes[outcome(against[method])] += 1
+                case = ("latency", view, p, method)
+                speed = speed_text(speeds[case], outcomes[case], "static") if case in speeds else ""
                 rows.append([view, p, method, latency, values["imbalance"][method], values["voxel_bytes"][method], speed])
         if not workers:
             continue
@@ -299,7 +309,7 @@ def _sequence(run: Run, subject: Subject) -> Section:
         "Does dynamic balance keep workers even while the view changes, and what does it move?",
         _moving_method(run) + " Latency, imbalance and the voxels that workers fetch for a frame are means over the steps; these "
         "include the first steps, in which dynamic balance has nothing to go by yet.",
-        f"Dynamic balance is {_counted(outcomes)}." if outcomes else "",
+        _dynamic_text(outcomes) if outcomes else "",
         blocks
         + [
             Table(
@@ -311,33 +321,49 @@ def _sequence(run: Run, subject: Subject) -> Section:
     )
 
 
-def _counted(outcomes: Counter) -> str:
-    counted = f"faster than static in {_of(outcomes['faster'], outcomes.total(), 'case')}, slower in {outcomes['slower']}"
-    counted += f", as fast in {outcomes['tie']}"
-    return counted + (f"; {outcomes['open']} are not ranked" if outcomes["open"] else "")
+def _dynamic_over_static(values: Mapping[str, Value]) -> dict[str, Value]:
+    """By dynamic method: how much less it takes than the same method with static balance, as a speed."""
+    dynamic = {method: value for method, value in values.items() if method.endswith("dynamic")}
+    return {method: values[method.replace("dynamic", "static")].over(value) for method, value in dynamic.items()}
+
+
+def _dynamic_text(outcomes: Mapping[tuple, str]) -> str:
+    """From the outcomes of dynamic balance against static balance: the first of a key says of what."""
+    texts = []
+    words = {"latency": ("faster than static", "slower", "as fast"), "imbalance": ("more even", "less even", "as even")}
+    for metric, (more, less, same) in words.items():
+        counts = Counter(outcome for key, outcome in outcomes.items() if key[0] == metric)
+        text = f"{more} in {_of(counts['faster'], counts.total(), 'case')}, {less} in {counts['slower']}, {same} (ties) in {counts['tie']}"
+        texts.append(text + (f"; {counts['open']} are not ranked" if counts["open"] else ""))
+    return f"Dynamic balance is {'. By imbalance it is '.join(texts)}."
 
 
 def _slowed(run: Run, subjects: list[Subject]) -> Section:
-    rows, outcomes = [], Counter()
+    speeds: dict[tuple, Value] = {}
+    latencies = []
     for volume, renderer in subjects:
         of = {"volume": volume, "renderer": renderer, "link": LINK}
         for p in _shared(run, "slowed", (volume, renderer)):
             view = run.distinct("view", part="slowed")[0]
-            alike = _by(run.select(part="sequence", metric="latency", view=view, workers=p, step=None, **of), _method)
-            slow = _by(run.select(part="slowed", metric="latency", view=view, workers=p, step=None, **of), _method)
-            against = _by(run.select(part="slowed", metric="speed", variant="static", view=view, workers=p, **of), _method)
-            for method, latency in slow.items():
-                speed = ""
-                if method in against:
-                    speed = speed_text(against[method], "static")
-                    outcomes[outcome(against[method])] += 1
-                rows.append([volume, renderer, p, view, method, alike[method], latency, latency.over(alike[method]), speed])
+            at = {"view": view, "workers": p, **of}
+            alike = _by(run.select(part="sequence", metric="latency", step=None, **at), _method)
+            slow = _by(run.select(part="slowed", metric="latency", step=None, **at), _method)
+            imbalances = _by(run.select(part="slowed", metric="imbalance", step=None, **at), _method)
+            for metric, values in (("latency", slow), ("imbalance", imbalances)):
+                speeds |= {(metric, volume, renderer, p, method): speed for method, speed in _dynamic_over_static(values).items()}
+            latencies += [(volume, renderer, p, view, method, alike[method], slow[method]) for method in slow]
+    outcomes = decide(speeds)
+    rows = []
+    for volume, renderer, p, view, method, alike_, slow_ in latencies:
+        case = ("latency", volume, renderer, p, method)
+        text = speed_text(speeds[case], outcomes[case], "static") if case in speeds else ""
+        rows.append([volume, renderer, p, view, method, alike_, slow_, slow_.over(alike_), text])
     return Section(
         "A worker at half speed",
         "One worker takes twice as long for every box. Does dynamic balance give it less to do?",
         "As under moving views, but the render times of worker 1 are doubled, before they are learnt as well. Both latencies are means "
         "over the steps of the same views.",
-        f"With a worker at half speed, dynamic balance is {_counted(outcomes)}." if outcomes else "",
+        _dynamic_text(outcomes) if outcomes else "",
         [Table("Latency", ["volume", "renderer", "p", "views", "method", "all alike", "one slow", "slow / alike", "dynamic is"], rows)],
     )
 
@@ -376,19 +402,19 @@ def _prediction(run: Run, subjects: list[Subject]) -> Section:
 
 
 def _assignments(run: Run, subjects: list[Subject]) -> Section:
-    rows, sentences = [], []
+    rows, cases = [], {}
     for volume, renderer in subjects:
         found = run.select(part="assignment", metric="imbalance", volume=volume, renderer=renderer)
         values = _by(found, lambda row: f"{_partition(row)}, {row['assignment']}")
         names = run.distinct("assignment", part="assignment")
         for partition in dict.fromkeys(found.apply(_partition, axis=1)):
             rows.append([volume, renderer, partition, *[values[f"{partition}, {name}"] for name in names]])
-        sentences.append(f"{volume} ({renderer}): {ranking(values).sentence()}")
+        cases[volume, renderer] = values
     p, groups = _workers_of(run, "assignment"), run.distinct("groups", part="assignment")[0]
     return Section(
         "Assignments",
         f"With {groups} boxes a worker, who should own which?",
         f"p = {p}, {groups} groups. Imbalance as above, from the workers' sums over their boxes.",
-        "Least imbalance: " + "; ".join(sentences) + ".",
+        _least_imbalance("Least imbalance", cases),
         [Table("Imbalance by assignment", ["volume", "renderer", "partition", *run.distinct("assignment", part="assignment")], rows)],
     )

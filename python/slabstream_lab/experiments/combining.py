@@ -3,10 +3,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Sequence
 
 from .. import plots
 from ..page import Figure, Page, Section, Table
-from ..ranking import ranking
+from ..ranking import Ranking, rankings, ties_text
 from ..results import ResultsError, Run
 from ..value import Value, speed_text
 
@@ -35,14 +36,15 @@ def _by_scheme(run: Run, **case) -> dict[str, Value]:
     return {scheme: run.value(metric, combine=scheme, **case) for scheme in run.distinct("combine", metric=metric, **case)}
 
 
-def _least(run: Run, **case) -> str:
-    return ranking(_by_scheme(run, **case)).sentence()
+def _fan_in(run: Run, metric: str, shares: Sequence[float], **case) -> dict[str, Value]:
+    """The times of fan-in, by active pixels."""
+    return {f"fan-in with {_percent(share)}": run.value(metric, combine="fan-in", active=share, **case) for share in shares}
 
 
-def _gain(run: Run, metric: str, few: float, many: float, **case) -> str:
-    """What images with few active pixels gain over those with many, with fan-in."""
-    ratio = run.value(metric, combine="fan-in", active=many, **case).over(run.value(metric, combine="fan-in", active=few, **case))
-    return f"Fan-in with {_percent(few)} active is {speed_text(ratio, f'fan-in with {_percent(many)}')}."
+def _gain(found: Ranking) -> str:
+    """What images with few active pixels gain over those with many, from a ranking of _fan_in."""
+    few, many = found.values
+    return f"F{few[1:]} active is {speed_text(found.values[many].over(found.values[few]), found.outcome(few, many), many)}."
 
 
 def _sorted(run: Run, column: str, part: str) -> list:
@@ -86,15 +88,18 @@ def _operators(run: Run) -> Section:
         for scheme, value in _by_scheme(run, part=part, variant=part, workers=q, active=share).items()
     ]
     disturbed = sum(row[-1].value > 0 for row in rows)
+    least = rankings(
+        {share: _by_scheme(run, part=part, variant=part, workers=p, active=share) for share in (full, sparse)}
+        | {"fan-in": _fan_in(run, "run_time", (sparse, full), part=part, workers=p)}
+    )
     return Section(
         "What combining computes",
         "Images without a link between them: what do the operators alone take, along each schedule's critical path?",
         "Every step of a schedule on real images in this process, in processor time of one thread. The time of a round is that of its "
         "busiest worker. Encoding belongs to who sends, combining to who receives. As in a worker, memory is kept from run to run: in each "
         "repeat the first run is not timed, and the median of the others counts. The last column counts page faults in all timed runs.",
-        f"Least time at p = {p}, {_percent(full)} active: {_least(run, part=part, variant=part, workers=p, active=full)}; "
-        f"{_percent(sparse)} active: {_least(run, part=part, variant=part, workers=p, active=sparse)}. "
-        f"{_gain(run, 'run_time', sparse, full, part=part, workers=p)} "
+        f"Least time at p = {p}, {_percent(full)} active: {least[full].sentence()}; {_percent(sparse)} active: {least[sparse].sentence()}. "
+        f"{_gain(least['fan-in'])} "
         + (f"Page faults fell into timed runs of {disturbed} of {len(rows)} cases." if disturbed else "No page fault was timed."),
         [
             _over(
@@ -118,14 +123,18 @@ def _over_workers(run: Run) -> Section:
     part = "over workers"
     workers, shares = _sorted(run, "workers", part), _sorted(run, "active", part)[::-1]
     pixels, link = run.only("pixels", part=part), run.only("link", part=part)
-    least = {(share, p): _least(run, part=part, workers=p, active=share) for share in shares for p in workers}
+    least = rankings({(share, p): _by_scheme(run, part=part, workers=p, active=share) for share in shares for p in workers})
     return Section(
         "Over workers",
         "Which scheme suits how many workers?",
         SIMULATED + f"Link {link}, {pixels} x {pixels} pixels.",
         "Least time: "
-        + "; ".join(f"p = {p}, {_percent(share)} active: {text}" for (share, p), text in least.items() if p in (workers[0], workers[-1]))
-        + ".",
+        + "; ".join(
+            f"p = {p}, {_percent(share)} active: {found.sentence()}"
+            for (share, p), found in least.items()
+            if p in (workers[0], workers[-1])
+        )
+        + f". Over all numbers of workers {ties_text(least)}.",
         [
             _over(
                 run,
@@ -140,7 +149,11 @@ def _over_workers(run: Run) -> Section:
             for name, share in zip(("full", "sparse"), shares)
         ]
         + [
-            Table("Least time over workers", ["active", "p", "scheme"], [[_percent(share), p, text] for (share, p), text in least.items()]),
+            Table(
+                "Least time over workers",
+                ["active", "p", "scheme"],
+                [[_percent(share), p, found.sentence()] for (share, p), found in least.items()],
+            ),
             _table(run, "Combining over workers", part),
         ],
     )
@@ -150,8 +163,13 @@ def _over_pictures(run: Run) -> Section:
     sizes, shares = _sorted(run, "pixels", "over sizes"), _sorted(run, "active", "over active pixels")
     p, link = run.only("workers", part="over sizes"), run.only("link", part="over sizes")
     pixels = run.only("pixels", part="over active pixels")
-    by_size = {side: _least(run, part="over sizes", pixels=side) for side in sizes}
-    by_share = {share: _least(run, part="over active pixels", active=share) for share in shares}
+    least = rankings(
+        {("side", side): _by_scheme(run, part="over sizes", pixels=side) for side in sizes}
+        | {("share", share): _by_scheme(run, part="over active pixels", active=share) for share in shares}
+        | {"fan-in": _fan_in(run, "combine_time", (shares[0], shares[-1]), part="over active pixels")}
+    )
+    by_size = {side: least["side", side].sentence() for side in sizes}
+    by_share = {share: least["share", share].sentence() for share in shares}
     return Section(
         "Over pictures",
         "How does combining grow with the picture and with what images fill of it?",
@@ -159,7 +177,7 @@ def _over_pictures(run: Run) -> Section:
         "Least time: "
         + "; ".join(f"{side} x {side} pixels: {by_size[side]}" for side in (sizes[0], sizes[-1]))
         + f"; {_percent(shares[0])} of {pixels} x {pixels} pixels active: {by_share[shares[0]]}. "
-        + _gain(run, "combine_time", shares[0], shares[-1], part="over active pixels"),
+        + _gain(least["fan-in"]),
         [
             _over(
                 run,
@@ -205,7 +223,7 @@ def _over_links(run: Run) -> Section:
     part = "over links"
     workers, links, pixels = _sorted(run, "workers", part), run.distinct("link", part=part), run.only("pixels", part=part)
     times = {p: {link: _by_scheme(run, part=part, workers=p, link=link) for link in links} for p in workers}
-    least = {(p, link): ranking(times[p][link]) for p in workers for link in links}
+    least = rankings({(p, link): times[p][link] for p in workers for link in links})
 
     def relative(p: int, link: str) -> dict[str, Value]:
         of = times[p][link]

@@ -3,12 +3,13 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Iterable, Mapping, Sequence
+from typing import Any, Iterable, Mapping, Sequence
 
 from .. import plots
 from ..page import Photo, Section, Table
+from ..ranking import decide
 from ..results import Run
-from ..value import Value, number_text, outcome, speed_text
+from ..value import Value, number_text, speed_text
 
 Points = Sequence[tuple[float, Value]]
 
@@ -36,22 +37,33 @@ def power_text(points: Points, x: str) -> str:
     return f"{'grows' if power > 0 else 'falls'} as {x} to the power of {number_text(power, 2)} {over}"
 
 
-def compared_text(ratios: Mapping[str, Value], of: str) -> str:
-    """How a method compares with another one over several cases, from time of the other over its own."""
-    counts = Counter(outcome(ratio) for ratio in ratios.values())
-    if counts["open"] == len(ratios):
+def compared_text(found: Sequence[tuple[Value, str]], of: str) -> str:
+    """How a method compares with another one over several cases, from time of the other over its own and what `decide` found of it."""
+    if len(found) == 1:
+        return speed_text(*found[0], of)
+    counts = Counter(outcome for _, outcome in found)
+    if counts["open"] == len(found):
         return f"not ranked against {of}"
-    faster, slower = (sorted(r.value for r in ratios.values() if outcome(r) == which) for which in ("faster", "slower"))
+    faster, slower = (sorted(ratio.value for ratio, outcome in found if outcome == which) for which in ("faster", "slower"))
     parts = []
-    for found, word in ((faster, "fast"), ([1 / value for value in reversed(slower)], "slow")):
-        if found:
-            ends = list(dict.fromkeys(number_text(value, 2) for value in (found[0], found[-1])))
-            parts.append(f"{' to '.join(ends)} times as {word} as {of} in {len(found)} of {len(ratios)} cases")
+    for values, word in ((faster, "fast"), ([1 / value for value in reversed(slower)], "slow")):
+        if values:
+            ends = list(dict.fromkeys(number_text(value, 2) for value in (values[0], values[-1])))
+            parts.append(f"{' to '.join(ends)} times as {word} as {of} in {len(values)} of {len(found)} cases")
     if counts["tie"]:
-        parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {counts['tie']} of {len(ratios)}{'' if parts else ' cases'}")
+        parts.append(f"as fast{'' if parts else f' as {of}'} (a tie) in {counts['tie']} of {len(found)}{'' if parts else ' cases'}")
     if counts["open"]:
-        parts.append(f"not ranked in {counts['open']} of {len(ratios)}")
+        parts.append(f"not ranked in {counts['open']} of {len(found)}")
     return ", ".join(parts)
+
+
+def compared_texts(ratios: Mapping[str, Mapping[Any, Value]], of: Mapping[str, str]) -> dict[str, str]:
+    """compared_text of each method, all of them decided together. `of`: what each is compared with."""
+    outcomes = decide({(method, case): ratio for method, cases in ratios.items() for case, ratio in cases.items()})
+    return {
+        method: compared_text([(ratio, outcomes[method, case]) for case, ratio in cases.items()], of[method])
+        for method, cases in ratios.items()
+    }
 
 
 def _transform(run: Run) -> Section:
@@ -67,8 +79,8 @@ def _transform(run: Run) -> Section:
     def printed(method: str, p: int) -> Value | None:
         return run.find("run_time", part="transform", origin="paper", variant=method, n=printed_n, workers=p)
 
-    def ratios(method: str, of: str) -> dict[str, Value]:
-        return {str(p): get(of, table_n, p).over(get(method, table_n, p)) for p in workers}
+    def ratios(method: str, of: str) -> dict[int, Value]:
+        return {p: get(of, table_n, p).over(get(method, table_n, p)) for p in workers}
 
     paper = {p: (printed("product", p), printed("phases", p)) for p in workers}
     paper_gains = [product.over(phases).value for product, phases in paper.values() if product and phases]
@@ -92,12 +104,14 @@ def _transform(run: Run) -> Section:
     ]
     p = 15 if 15 in workers else workers[len(workers) // 2]
     growth = power_text([(n, get("phases", n, p)) for n in sizes], "N")
+    compared = compared_texts(
+        {how: ratios(*pair) for how, pair in _LIKE_WITH_LIKE.items()} | {"running beams": ratios("running beams", "phases")},
+        {how: "a product a voxel" for how in _LIKE_WITH_LIKE} | {"running beams": "the phases"},
+    )
     texts = [
-        f"At N = {table_n} and p = {workers[0]} to {workers[-1]}, {how} the four phases are "
-        f"{compared_text(ratios(method, of), 'a product a voxel')}."
-        for how, (method, of) in _LIKE_WITH_LIKE.items()
+        f"At N = {table_n} and p = {workers[0]} to {workers[-1]}, {how} the four phases are {compared[how]}." for how in _LIKE_WITH_LIKE
     ]
-    texts.append(f"In vectors, running beams are {compared_text(ratios('running beams', 'phases'), 'the phases')}.")
+    texts.append(f"In vectors, running beams are {compared['running beams']}.")
     if paper_gains:
         texts.append(
             f"The paper's vectorised phases are {number_text(min(paper_gains), 2)} to {number_text(max(paper_gains), 2)} times as fast as "
@@ -228,13 +242,13 @@ def _splatting(run: Run) -> Section:
     growths = [f"The time of a filled slice, splatted {'; '.join(texts)} (the paper, not in vectors: quadratic)."] if texts else []
     over = f"k = {widths[0]}" + (f" to {widths[-1]}" if len(widths) > 1 else "")
     pairs = [("phases", "plain, no vectors", "the plain loop without vectors"), ("kernels", "phases", "the phases")]
-    compared = [
-        f"For {over} on a filled slice, {loop} are "
-        f"{compared_text({str(k): slice_time(of, k).over(slice_time(loop, k)) for k in widths}, name)}."
-        for loop, of, name in pairs
-    ]
-    sparse = speed_text(sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0])), "the plain loop")
-    compared.append(f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {sparse}.")
+    ratios = {loop: {k: slice_time(of, k).over(slice_time(loop, k)) for k in widths} for loop, of, _ in pairs}
+    ratios["sparse"] = {5: sparse_time("plain, no vectors", shares[0]).over(sparse_time("phases", shares[0]))}
+    outcomes = compared_texts(ratios, {loop: name for loop, _, name in pairs} | {"sparse": "the plain loop"})
+    compared = [f"For {over} on a filled slice, {loop} are {outcomes[loop]}." for loop, _, _ in pairs]
+    compared.append(
+        f"With {shares[0] * 100:g} % of the voxels occupied and k = 5, phases, which splat empty voxels too, are {outcomes['sparse']}."
+    )
     return Section(
         "Splatting: figures 8a and 8b",
         "How does splatting grow with the workers and with the width of the footprint, and what do the phases gain that "
@@ -313,7 +327,7 @@ def _points(run: Run) -> Section:
 
     n = sizes[-1]
     shares = [f"{holes(n, view).value:.1f} % at {scale[view]:g}" for view in views]
-    ratios = {f"{size}, {view}": time("points", size, view).over(time("faces", size, view)) for size in sizes for view in views}
+    ratios = {(size, view): time("points", size, view).over(time("faces", size, view)) for size in sizes for view in views}
     return Section(
         "Holes: Z-buffering of voxel points",
         "How many holes does the paper's Z-buffer leave, and what do faces cost, which leave none?",
@@ -323,7 +337,7 @@ def _points(run: Run) -> Section:
         "face covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the "
         "face. A magnified sphere is cut off by the picture's border.",
         f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes. Drawing faces is "
-        f"{compared_text(ratios, 'drawing points')}.",
+        f"{compared_texts({'faces': ratios}, {'faces': 'drawing points'})['faces']}.",
         [
             Table(
                 "Points and faces",

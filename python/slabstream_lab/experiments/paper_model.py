@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import math
-from typing import Callable
+from typing import Callable, Mapping
 
 from .. import plots
 from ..page import Section, Table
@@ -172,12 +172,11 @@ def _equations(run: Run, frames: Frames) -> Section:
         title = f"Eq. {equation}, {TITLES[renderer]}: error in % of the slowest slab's time, from the constants of N = {n}, p = 1"
         rows = [[size, *(f"{100 * errors[size, p]:+.0f}" for p in frames.workers)] for size in frames.sizes]
         tables.append(Table(title, ["N", *(f"p = {p}" for p in frames.workers)], rows))
-        worst = max(errors, key=lambda case: abs(errors[case]))
-        same = max(abs(error) for (size, _), error in errors.items() if size == n)
-        texts.append(
-            f"{TITLES[renderer][0].upper()}{TITLES[renderer][1:]} (Eq. {equation}): errors up to {100 * same:.0f} % at N = {n}, and up to "
-            f"{100 * abs(errors[worst]):.0f} % (N = {worst[0]}, p = {worst[1]}) elsewhere."
-        )
+        text = f"{TITLES[renderer][0].upper()}{TITLES[renderer][1:]} (Eq. {equation}): errors up to "
+        text += _worst_text({case: error for case, error in errors.items() if case[0] == n})
+        if other := {case: error for case, error in errors.items() if case[0] != n}:
+            text += f", and with other N up to {_worst_text(other)}"
+        texts.append(text + ".")
         printed = [(run.find("constant", part="printed", variant=bounds, stage=symbol.replace("_", "")), units) for symbol, _, units in terms]
         seconds = sum(constant.value * units(200, 1, 200**2) for constant, units in printed if constant)
         whole = frames.printed("frame_time", times, 1)
@@ -195,6 +194,11 @@ def _equations(run: Run, frames: Frames) -> Section:
         " ".join(texts),
         tables,
     )
+
+
+def _worst_text(errors: Mapping[tuple[int, int], float]) -> str:
+    n, p = max(errors, key=lambda case: abs(errors[case]))
+    return f"{100 * abs(errors[n, p]):.0f} % (N = {n}, p = {p})"
 
 
 def _terms(renderer: str) -> list[tuple[str, str, str, str, Units]]:

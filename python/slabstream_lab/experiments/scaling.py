@@ -6,7 +6,7 @@ from typing import Collection
 
 from .. import plots
 from ..page import Page, Section, Table
-from ..ranking import ranking
+from ..ranking import rankings
 from ..results import Run
 from ..value import Value
 
@@ -82,8 +82,7 @@ def _section(run: Run, part: str, renderer: str) -> Section:
     # Not all series go as far as others.
     common = max(set.intersection(*({x.workers for x in points} for points in series.values())))
     last = {label: next(x for x in points if x.workers == common) for label, points in series.items()}
-    least_period = ranking({label: x.period for label, x in last.items()}).sentence()
-    least_latency = ranking({label: x.latency for label, x in last.items()}).sentence()
+    least = rankings({metric: {label: getattr(x, metric) for label, x in last.items()} for metric in ("period", "latency")})
     reaches: dict[str, list[str]] = {}
     for label, points in by_period.items():
         reaches.setdefault(_reach(points), []).append(label)
@@ -105,8 +104,8 @@ def _section(run: Run, part: str, renderer: str) -> Section:
             else ". In series with teams, teams of workers take frames in turn, each with all voxels; else all workers share every frame."
         ),
         f"Efficiency from picture to picture, medians: {'; '.join(f'{reach}: {_all_of(of, series)}' for reach, of in reaches.items())}. "
-        f"At p = {common}, the greatest that all series have, least time from picture to picture: {least_period}; least latency: "
-        f"{least_latency}.",
+        f"At p = {common}, the greatest that all series have, least time from picture to picture: "
+        f"{least['period'].sentence()}; least latency: {least['latency'].sentence()}.",
         [
             plots.lines(
                 f"{name}-period",

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 from .. import plots
 from ..page import Page, Section, Table
+from ..ranking import decide
 from ..results import Run
 from ..value import Value, speed_text
 
@@ -48,11 +49,13 @@ def _section(run: Run, volume: str) -> Section:
         ],
     )
     p, few, many = shared[-1], groups[0], groups[-1]
-    period = get("period", p, few).over(get("period", p, many))
+    gains = {metric: get(metric, p, few).over(get(metric, p, many)) for metric in ("preview", "latency", "period")}
+    outcomes, of = decide(gains), f"that with {few} group{'' if few == 1 else 's'}"
+    preview, latency, period = (speed_text(gain, outcomes[metric], of) for metric, gain in gains.items())
     answer = (
-        f"At p = {p}, {many} groups instead of {few} show a first preview after {get('preview', p, many).text()} instead of "
-        f"{get('preview', p, few).text()}, and a worker must hold {get('memory', p, many, 'measured').text()} of voxels instead of "
-        f"{get('memory', p, few, 'measured').text()}. From picture to picture the service is {speed_text(period)}."
+        f"At p = {p}, with {many} groups instead of {few}, a worker must hold {get('memory', p, many, 'measured').text()} of voxels instead "
+        f"of {get('memory', p, few, 'measured').text()}. The first preview is {preview}; a frame alone is {latency}; a frame of many is "
+        f"{period}."
     )
     name = volume.replace(".", "-")
     return Section(

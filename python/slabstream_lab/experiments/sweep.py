@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from .. import plots
 from ..page import Page, Section, Table
-from ..ranking import ranking
+from ..ranking import rankings
 from ..results import Run
 from ..value import Value
 
@@ -37,15 +37,15 @@ def _service_page(run: Run) -> Page:
 def _service_section(run: Run, part: str, name: str) -> Section:
     policies = run.distinct("variant", part=part)
 
-    def times(metric: str) -> str:
-        return ranking({policy: run.value(metric, part=part, variant=policy) for policy in policies}).sentence()
-
+    least = rankings(
+        {metric: {policy: run.value(metric, part=part, variant=policy) for policy in policies} for metric in ("latency", "period")}
+    )
     metrics = ("latency", "period", "render_time", "longest_render_time", "imbalance")
     return Section(
         part,
         "Which policy is quickest at this service?",
         "Latency: one frame in flight. Period: from picture to picture, with more frames requested ahead than the service has under way.",
-        f"Least times: latency, {times('latency')}; from picture to picture, {times('period')}.",
+        f"Least times: latency, {least['latency'].sentence()}; from picture to picture, {least['period'].sentence()}.",
         [
             plots.bars(
                 name,
@@ -113,9 +113,15 @@ def _section(run: Run, part: str, name: str) -> Section:
         ],
     )
     p = workers[-1]
+    ranked = rankings(
+        {
+            (link, metric): {policy: get(metric, policy, p, link) for policy in policies}
+            for link in links
+            for metric in ("latency", "period")
+        }
+    )
     least = [
-        f"{link}: latency, {ranking({policy: get('latency', policy, p, link) for policy in policies}).sentence()}; from picture to picture, "
-        f"{ranking({policy: get('period', policy, p, link) for policy in policies}).sentence()}"
+        f"{link}: latency, {ranked[link, 'latency'].sentence()}; from picture to picture, {ranked[link, 'period'].sentence()}"
         for link in links
     ]
     return Section(
