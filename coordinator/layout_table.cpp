@@ -5,7 +5,6 @@
 #include <optional>
 #include <utility>
 
-#include "common/planning/balance.h"
 #include "common/planning/clipped_cells.h"
 #include "coordinator/learning_table.h"
 
@@ -49,6 +48,7 @@ LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
 
 std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
+  const BalanceEntry& balance = *policy.balance;
   const Key key = KeyOf(request, request.occupied != nullptr);
   std::unique_lock lock(mutex_);
   if (request.occupied != nullptr && FindLearnt(key.volume) == nullptr) {
@@ -75,8 +75,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   int frames_seen = 0;
   if (const auto found = std::ranges::find(entries_, key, &Entry::key); found != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, found);
-    const bool rebalance = known && policy.dynamic_balance && found->frames_seen >= std::clamp(found->changes, 1, kMostPatience);
-    const bool remake = known && !policy.dynamic_balance && !found->by_cost && policy.balance_by == BalanceBy::kCost;
+    const bool rebalance = known && balance.change != nullptr && found->frames_seen >= std::clamp(found->changes, 1, balance.most_patience);
+    const bool remake = known && balance.change == nullptr && !found->by_cost && policy.balance_by == BalanceBy::kCost;
     if (!rebalance && !remake) return found->layout;
     present = found->layout;
     seconds = found->seconds;
@@ -98,8 +98,8 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
                            .coarser = request.coarser,
                            .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
                            .stop = request.stop};
-  const bool rebalance = present != nullptr && policy.dynamic_balance;
-  std::optional<Layout> made = rebalance ? Rebalance(*present, seconds, make, frames_seen) : MakeLayout(make);
+  const bool rebalance = present != nullptr && balance.change != nullptr;
+  std::optional<Layout> made = rebalance ? balance.change({present.get(), seconds, &make, frames_seen}) : MakeLayout(make);
   if (request.stop.stop_requested()) return nullptr;
 
   lock.lock();
@@ -133,7 +133,7 @@ bool LayoutTable::HasMade(const Request& request) {
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const ResolvedPolicy& policy = *request.policy;
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock || policy.dynamic_balance) return nullptr;
+  if (!lock || policy.balance->change != nullptr) return nullptr;
   const auto found = std::ranges::find(entries_, KeyOf(request, true), &Entry::key);
   if (found == entries_.end()) return nullptr;
   if (policy.balance_by == BalanceBy::kCost && !found->by_cost) return nullptr;

@@ -1,9 +1,9 @@
 // LayoutTable: the layouts that frames are planned with, and the costs learnt from their render times.
 //
 // A layout is made once for a volume, transfer function, renderer, policy and number of slots, and stays for all views. Two things
-// change it. If boxes are split by cost, it is made anew once, when costs are first known. With dynamic balance, it changes between frames
-// when Rebalance says so. Another number of slots (a worker has joined, a vacancy was given up) has another layout; learnt costs hold for
-// all of them.
+// change it. If boxes are split by cost, it is made anew once, when costs are first known. And it changes between frames when the policy's
+// balance says so (common/planning/balances.h). Another number of slots (a worker has joined, a vacancy was given up) has another layout;
+// learnt costs hold for all of them.
 //
 // The last few layouts and costs are kept. The least recently used go first.
 //
@@ -32,10 +32,6 @@ class LayoutTable {
   static constexpr std::size_t kMaxKept = 16;   // layouts
   static constexpr std::size_t kMaxLearnt = 4;  // costs: two thirds of an OccupancyGrid each
   static constexpr double kLeastWeight = 0.2;   // of a frame, however many came before it: older ones fade by a fifth a frame
-
-  // Before its n-th change, a layout must have been measured for n - 1 frames, 1 at least and at most this many. So noise seldom moves
-  // voxels, and a view that moves is still followed.
-  static constexpr int kMostPatience = 8;
 
   struct Request {
     const ResolvedPolicy* policy = nullptr;
@@ -81,7 +77,7 @@ class LayoutTable {
     Key key;
     std::shared_ptr<const Layout> layout;
     bool by_cost = false;         // made when costs were known
-    int changes = 0;              // by dynamic balance
+    int changes = 0;              // by the balance
     int frames_seen = 0;          // of this layout
     std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
   };

@@ -51,7 +51,7 @@ Choices ChoicesOf(const std::string& list) {
   if (list == "decompositions") add_all(Decompositions());
   if (list == "assignments") add_all(Assignments());
   if (list == "loads") add_all(BalanceByChoices());
-  if (list == "balance modes") add_all(BalanceModes());
+  if (list == "balances") add_all(Balances());
   if (list == "presets") add_all(TransferPresets());
   if (list == "renderers") {
     choices.Add(kAutomatic,

@@ -42,7 +42,7 @@ struct Policy {
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
   std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
-  std::string balance = "static";     // of BalanceModes(): whether boxes change between frames
+  std::string balance = "static";     // of Balances(): whether boxes change between frames
   std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
   // How much a channel of the picture may change because workers send colours in fewer bits: [0, kMaxPixelError]; 0: not at all.
   double pixel_error = 0;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <numeric>
 #include <queue>
+#include <random>
 #include <tuple>
 #include <utility>
 
@@ -15,6 +16,18 @@ namespace {
 std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request) {
   std::vector<std::uint32_t> slots(request.costs.size());
   for (std::size_t box = 0; box < slots.size(); ++box) slots[box] = std::uint32_t(box % request.slots);
+  return slots;
+}
+
+// AssignCyclic of the boxes in a shuffled order, the same every time: chance, for others to be compared with.
+std::vector<std::uint32_t> AssignRandom(const AssignmentRequest& request) {
+  const std::vector<std::uint32_t> cyclic = AssignCyclic(request);
+  std::vector<std::size_t> order(cyclic.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::minstd_rand random;  // its numbers are the same everywhere, and so is this shuffle (Fisher and Yates, 1938)
+  for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random() % i]);
+  std::vector<std::uint32_t> slots(cyclic.size());
+  for (std::size_t i = 0; i < order.size(); ++i) slots[order[i]] = cyclic[i];
   return slots;
 }
 
@@ -51,6 +64,7 @@ const std::vector<AssignmentEntry>& Assignments() {
   static const std::vector<AssignmentEntry> entries = {
       {"cyclic", "boxes to workers in turn", AssignCyclic},
       {"contiguous", "neighbouring boxes to the same worker", AssignContiguous},
+      {"random", "boxes to workers as if by chance, the same every time; to compare with", AssignRandom},
       {"greedy", "the costliest remaining box to the worker with the least work", AssignGreedy, true},
   };
   return entries;

@@ -79,11 +79,13 @@ Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const doubl
   return changed;
 }
 
-std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen) {
+std::optional<Layout> Rebalance(const BalanceRequest& asked) {
+  const Layout& now = *asked.now;
+  const LayoutRequest& request = *asked.make;
   CHECK(request.known.cost != nullptr);
-  CHECK_GE(frames_seen, 1);
+  CHECK_GE(asked.frames_seen, 1);
   const double voxel_seconds = double(request.summary->types().bytes_per_voxel()) / calibration::service::kVoxelRate;
-  const double least_gain = kLeastGain * (1 + 1.0 / frames_seen);
+  const double least_gain = kLeastGain * (1 + 1.0 / asked.frames_seen);
   std::optional<Layout> chosen;
   double most_won = 0;
   const auto weigh = [&](Layout candidate, double before, double after) {
@@ -93,9 +95,9 @@ std::optional<Layout> Rebalance(const Layout& now, std::span<const double> secon
     chosen = std::move(candidate);
   };
 
-  Layout reassigned = Reassign(now, request.slots, seconds);
-  const double after_reassigning = FrameSeconds(reassigned, request.slots, seconds);
-  weigh(std::move(reassigned), FrameSeconds(now, request.slots, seconds), after_reassigning);
+  Layout reassigned = Reassign(now, request.slots, asked.seconds);
+  const double after_reassigning = FrameSeconds(reassigned, request.slots, asked.seconds);
+  weigh(std::move(reassigned), FrameSeconds(now, request.slots, asked.seconds), after_reassigning);
 
   ResolvedPolicy by_cost = *request.policy;
   by_cost.balance_by = BalanceBy::kCost;

@@ -1,4 +1,4 @@
-// Dynamic balance: whether a layout should change between two frames, given the cost of each part of the volume. Pure.
+// Dynamic balance (balances.h): whether a layout should change between two frames, given the cost of each part of the volume. Pure.
 //
 // Rebalance weighs three changes: hand boxes over from busy slots to others; resize the boxes to equal measured cost; or cut the volume
 // anew if that is predicted to be much better, since measured costs say little about quite different boxes. A change moves voxels: a slot
@@ -7,10 +7,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "common/planning/balances.h"
 #include "common/planning/layout.h"
 
 namespace slabstream {
@@ -28,9 +28,8 @@ std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 // Keeps the boxes. Moves one after the other from the busiest slot to the least busy one, as long as that helps. `seconds` by box.
 Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
-// The layout to change to, if any. `request` is what `now` was made for, with known.cost; `seconds` are the times of the boxes of `now` in
-// `frames_seen` >= 1 frames. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to cut
-// anew, because cells resolve boxes no more finely than they are large.
-std::optional<Layout> Rebalance(const Layout& now, std::span<const double> seconds, const LayoutRequest& request, int frames_seen);
+// The layout to change to, if any. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to
+// cut anew, because cells resolve boxes no more finely than they are large.
+std::optional<Layout> Rebalance(const BalanceRequest& request);
 
 }  // namespace slabstream

@@ -23,12 +23,4 @@ std::optional<BalanceBy> FindBalanceBy(std::string_view name) {
 
 std::string_view NameOf(BalanceBy metric) { return BalanceByChoices()[std::size_t(metric) + 1].name; }
 
-const std::vector<NamedChoice>& BalanceModes() {
-  static const std::vector<NamedChoice> choices = {
-      {kStaticBalance, "boxes do not change"},
-      {kDynamicBalance, "box boundaries move between frames if that saves more time than moving the voxels costs"},
-  };
-  return choices;
-}
-
 }  // namespace slabstream

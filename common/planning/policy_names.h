@@ -1,4 +1,4 @@
-// The names that a Policy may hold besides those of Decompositions(), Assignments() and CombiningSchemes().
+// The names that a Policy may hold besides those of Decompositions(), Assignments(), Balances() and CombiningSchemes().
 //
 // kAutomatic leaves the choice of decomposition, assignment and combine to ChoosePolicy (coordinator/tuning). As a load metric it means the
 // one that suits the decomposition; if the decomposition is open, both are chosen together.
@@ -27,9 +27,5 @@ enum class BalanceBy { kVoxels, kOccupied, kCost };
 const std::vector<NamedChoice>& BalanceByChoices();             // kAutomatic first, then by BalanceBy
 std::optional<BalanceBy> FindBalanceBy(std::string_view name);  // none: kAutomatic, or no such name
 std::string_view NameOf(BalanceBy metric);
-
-// --balance: whether boxes change between frames.
-const std::vector<NamedChoice>& BalanceModes();  // "static", "dynamic"
-inline constexpr std::string_view kStaticBalance = "static", kDynamicBalance = "dynamic";
 
 }  // namespace slabstream

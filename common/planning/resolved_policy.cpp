@@ -24,7 +24,7 @@ Status CheckNames(const Policy& policy) {
   if (Status s = CheckName("policy.decomposition", policy.decomposition, Decompositions(), true); !s.ok()) return s;
   if (Status s = CheckName("policy.balance_by", policy.balance_by, BalanceByChoices()); !s.ok()) return s;
   if (Status s = CheckName("policy.assignment", policy.assignment, Assignments(), true); !s.ok()) return s;
-  if (Status s = CheckName("policy.balance", policy.balance, BalanceModes()); !s.ok()) return s;
+  if (Status s = CheckName("policy.balance", policy.balance, Balances()); !s.ok()) return s;
   if (policy.combine == kAutomatic) return Status::Ok();
   if (const auto scheme = ParseCombining(policy.combine); !scheme.ok()) {
     return Status::InvalidArgument("policy.combine " + scheme.status().message());
@@ -46,7 +46,7 @@ ResolvedPolicy ResolvePolicy(const Policy& policy, const VolumeGeometry& geometr
           .axis = SlabAxis(policy.axis, *decomposition, geometry.size),
           .groups = policy.groups,
           .assignment = FindNamed(Assignments(), policy.assignment),
-          .dynamic_balance = policy.balance == kDynamicBalance,
+          .balance = FindNamed(Balances(), policy.balance),
           .combine = policy.combine,
           .pixel_error = policy.pixel_error,
           .teams = policy.teams};
@@ -58,7 +58,7 @@ Policy AskFor(const ResolvedPolicy& policy) {
           .axis = AxisChoice(policy.axis),
           .groups = policy.groups,
           .assignment = std::string(policy.assignment->name),
-          .balance = std::string(policy.dynamic_balance ? kDynamicBalance : kStaticBalance),
+          .balance = std::string(policy.balance->name),
           .combine = policy.combine,
           .pixel_error = policy.pixel_error,
           .teams = policy.teams};
@@ -84,7 +84,7 @@ std::string_view BalanceByOf(const Policy& policy) {
 bool NeedsOccupancy(const Policy& policy) {
   if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
   return FindBalanceBy(BalanceByOf(policy)) != BalanceBy::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
-         policy.balance == kDynamicBalance;
+         FindNamed(Balances(), policy.balance)->change != nullptr;
 }
 
 }  // namespace slabstream

@@ -9,6 +9,7 @@
 #include "common/decomposition/decomposition.h"
 #include "common/frame/frame_request.h"
 #include "common/planning/assignment.h"
+#include "common/planning/balances.h"
 #include "common/planning/policy_names.h"
 #include "common/volume/volume.h"
 
@@ -20,7 +21,7 @@ struct ResolvedPolicy {
   Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
   const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
-  bool dynamic_balance = false;                 // boxes may change between frames
+  const BalanceEntry* balance = nullptr;        // of Balances(), never null
   std::string combine;                          // ParseCombining takes it
   double pixel_error = 0;                       // as in Policy
   int teams = 1;                                // as in Policy

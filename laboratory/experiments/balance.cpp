@@ -99,7 +99,7 @@ Balance BalanceOf(const ExperimentContext& context) {
   balance.motions = MotionsOf(context.options());
   if (!own.transfers.empty()) balance.later = own.transfers.back();
   for (const NamedPolicy& named : {EqualSlabs(), BalancedSlabs(), BalancedTree()}) {
-    for (const NamedChoice& mode : BalanceModes()) {
+    for (const BalanceEntry& mode : Balances()) {
       balance.moving.push_back(Combined(named.policy, kCombine));
       balance.moving.back().balance = mode.name;
     }

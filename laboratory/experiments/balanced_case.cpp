@@ -1,6 +1,7 @@
 #include "laboratory/experiments/balanced_case.h"
 
-#include "common/planning/policy_names.h"
+#include "common/base/find_named.h"
+#include "common/planning/balances.h"
 #include "laboratory/experiments/frame_keys.h"
 
 namespace slabstream {
@@ -30,7 +31,7 @@ Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
 
 Json BalancedKey(ExperimentContext& context, const FrameCase& frame) { return ForBalanced(context, frame).key; }
 
-bool IsDynamic(const FrameCase& frame) { return frame.policy.balance == kDynamicBalance; }
+bool IsDynamic(const FrameCase& frame) { return FindNamed(Balances(), frame.policy.balance)->change != nullptr; }
 
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame) {
   Trial boxes = BoxCostTrial(context, frame);

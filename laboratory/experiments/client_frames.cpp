@@ -4,7 +4,8 @@
 #include <utility>
 
 #include "client/report/frame_summary.h"
-#include "common/planning/policy_names.h"
+#include "common/base/find_named.h"
+#include "common/planning/balances.h"
 #include "laboratory/experiments/failure.h"
 #include "laboratory/measure/statistics.h"
 
@@ -20,7 +21,9 @@ double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
 
 }  // namespace
 
-int WarmUpFrames(const Policy& policy) { return policy.balance == kDynamicBalance ? kLearningFrames : kWarmUpFrames; }
+int WarmUpFrames(const Policy& policy) {
+  return FindNamed(Balances(), policy.balance)->change != nullptr ? kLearningFrames : kWarmUpFrames;
+}
 
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
   std::vector<double> latencies, renders, longest, imbalances, idle_shares, image_bytes;

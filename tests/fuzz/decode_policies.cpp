@@ -56,7 +56,7 @@ std::vector<FuzzBytes> PolicySeeds() {
       seed.Put(std::string(renderer->name()) + "\n" + parameter);
       const bool open = i == 0;
       seed.Put((open ? std::string(kAutomatic) : one_of(Decompositions())) + "\n" + one_of(BalanceByChoices()) + "\n");
-      seed.Put((open ? std::string(kAutomatic) : one_of(Assignments())) + "\n" + one_of(BalanceModes()) + "\n");
+      seed.Put((open ? std::string(kAutomatic) : one_of(Assignments())) + "\n" + one_of(Balances()) + "\n");
       seeds.push_back(seed.Put(open ? std::string(kAutomatic) : RandomCombining(random)).bytes());
     }
   }

@@ -72,7 +72,7 @@ SimulatedWorld RandomWorld(Random& random, const Faults& faults, const ModelCell
     world.policy.decomposition = one_of(Decompositions());
     world.policy.balance_by = one_of(BalanceByChoices());
     world.policy.assignment = one_of(Assignments());
-    world.policy.balance = one_of(BalanceModes());
+    world.policy.balance = one_of(Balances());
   }
   world.policy.combine = RandomCombining(random);
   if (random.Chance(0.1)) world.policy.decomposition = world.policy.assignment = world.policy.combine = kAutomatic;

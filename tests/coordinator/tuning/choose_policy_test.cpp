@@ -92,7 +92,7 @@ TEST_P(ChoosePolicyTest, MakesPlansOfAnyVolumeAndKeepsWhatIsFixed) {
       asked.combine = (left_open & 4) != 0 ? std::string(kAutomatic) : std::string("fan-in");
       asked.balance_by = one_of(BalanceByChoices());
       asked.groups = random.Integer(0, 3);
-      asked.balance = one_of(BalanceModes());
+      asked.balance = one_of(Balances());
       SCOPED_TRACE(testing::Message() << volume.name << ", p = " << GetParam() << ", " << asked.decomposition << ", " << asked.balance_by
                                       << ", " << asked.assignment << ", " << asked.combine << ", " << asked.groups << " groups");
       const PolicyChoice choice = question.Choose(asked);

@@ -1,0 +1,16 @@
+#include "common/planning/balances.h"
+
+#include "common/planning/balance.h"
+
+namespace slabstream {
+
+const std::vector<BalanceEntry>& Balances() {
+  static const std::vector<BalanceEntry> entries = {
+      {"static", "boxes do not change"},
+      {kDynamicBalance, "box boundaries move between frames if that saves more time than moving the voxels costs", Rebalance, 8},
+      {"planes", "box boundaries move after every frame to where both sides took as long; to compare with", MovePlanes},
+  };
+  return entries;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,41 @@
+// The ways in which boxes change from frame to frame. Each is one file and one line in Balances(). docs/adding.md says how to add one, and
+// how to compare it with the others.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace slabstream {
+
+struct Layout;
+struct LayoutRequest;
+
+// What is known when a layout may change.
+struct BalanceRequest {
+  const Layout* now = nullptr;          // the layout of the last frames
+  std::span<const double> seconds;      // measured render time of each box of `now`, newer frames count more; 0: not rendered
+  const LayoutRequest* make = nullptr;  // what `now` was made for, with known.cost
+  int frames_seen = 1;                  // of `now`, >= 1
+};
+
+struct BalanceEntry {
+  std::string_view name;     // what --balance takes
+  std::string_view purpose;  // one line for --help
+  // The layout to change to, if any. Pure: no picture may depend on it, and the same times give the same layout. Null: boxes never change.
+  std::optional<Layout> (*change)(const BalanceRequest&) = nullptr;
+  // Before its n-th change, a layout must have been measured for n - 1 frames, 1 at least and at most this many: so noise seldom moves
+  // voxels, and a view that moves is still followed.
+  int most_patience = 1;
+};
+
+// The only list; the standard one first.
+const std::vector<BalanceEntry>& Balances();
+inline constexpr std::string_view kDynamicBalance = "dynamic";
+
+// Planes of the partition move to where both sides took as long, each time, whatever that costs to move: after Marchesin, Mongenet and
+// Dischler, "Dynamic load balancing for parallel volume rendering", EGPGV 2006.
+std::optional<Layout> MovePlanes(const BalanceRequest& request);
+
+}  // namespace slabstream
