@@ -73,7 +73,7 @@ TEST_P(PoliciesTest, NeverChangeThePicture) {
           request.policy.decomposition = decomposition;
           request.policy.assignment = assignment;
           request.policy.balance_by = BalanceByChoices()[frame % BalanceByChoices().size()].name;
-          request.policy.balance = Balances()[frame / 3 % BalanceModes().size()].name;
+          request.policy.balance = Balances()[frame / 3 % Balances().size()].name;
           const std::vector<std::string_view> schemes = WithAutomatic(CombiningSchemes());
           request.policy.combine = schemes[frame % schemes.size()];
           request.policy.groups = 1 + int(frame % 3);
