@@ -83,10 +83,10 @@ void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
 // The options of all experiments, which may stand before or after the experiment's name.
 void AddCommonOptions(CLI::App& app, ExperimentOptions& options) {
   app.add_option("-o,--output", options.folder, "Folder for the results and all measurements; made if it does not exist")->type_name("DIR");
-  app.add_flag("--quick", options.quick, "Take a tenth of the time: fewer sizes, workers and repeats");
+  app.add_flag("--quick", options.quick, "Take less than a tenth of the time: fewer sizes and workers, one repeat");
   AddNumber(app, "--scale", options.scale, {kMinScale, 1}, "Scale the sides of spheres and pictures, to try things out");
   AddInteger(app, "--repeats", options.repeats, 1, kMaxRepeats, "Number of times that everything is measured")
-      ->default_str("the experiment's own");
+      ->default_str(fmt::format("{}; with --quick 1", kRankingRepeats));
   AddParsed(
       app, "--seed", options.seed,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, std::numeric_limits<int>::max()); },

@@ -337,7 +337,7 @@ void CheckBalance(const ExperimentOptions& options) {
 
 void RunBalance(ExperimentContext& context, Results& results) {
   const Balance balance = BalanceOf(context);
-  context.Run(TrialsOf(context, balance), {.full = 3, .quick = 1});
+  context.Run(TrialsOf(context, balance));
   for (const BenchCase& volume : balance.volumes) {
     AddPolicies(context, balance, volume, results);
     AddBoxes(context, balance, volume, results);

@@ -184,7 +184,7 @@ void RunCombining(ExperimentContext& context, Results& results) {
   const std::uint64_t seed = context.options().seed;
   std::vector<Trial> trials = {HostTrial()};
   for (const Combining& c : cases.measured) trials.push_back(OperatorsTrial(c, seed));
-  context.Run(std::move(trials), {.full = 7, .quick = 2});
+  context.Run(std::move(trials));
 
   for (const Combining& c : cases.measured) {
     Json of = ColumnsOf(c);

@@ -37,10 +37,10 @@ struct ExperimentOptions {
   std::string name;
   std::string sweep_file;  // of `sweep`; else empty
   std::string folder;
-  bool quick = false;  // a tenth of the time: fewer sizes and repeats
+  bool quick = false;  // less than a tenth of the time: fewer sizes, one repeat
   double scale = 1;    // [kMinScale, 1]: of the sides of spheres and pictures
   std::uint64_t seed = 1;
-  int repeats = 0;  // [1, kMaxRepeats]; 0: the experiment's own number
+  int repeats = 0;  // [1, kMaxRepeats]; 0: kRankingRepeats, of a quick run 1
   Resume resume = Resume::kSame;
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
@@ -48,6 +48,9 @@ struct ExperimentOptions {
   OwnOptions own;
 };
 inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
+// Enough to rank 1638 comparisons of a section of a page: 2 * 2^-16 <= 0.05 / 1638 (python/slabstream_lab/ranking.py). By default no
+// section has more.
+inline constexpr int kRankingRepeats = 16;
 inline constexpr double kMinScale = 0.05;
 
 // The environment of an experiment.
@@ -60,11 +63,8 @@ class ExperimentContext {
   int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
   VolumeCache& volumes() { return volumes_; }
 
-  // Runs the trials that the log does not hold yet, each once (Distinct). `repeats` applies if the user gave no number.
-  struct Repeats {
-    int full = 1, quick = 1;  // quick: of a quick run
-  };
-  void Run(std::vector<Trial> trials, const Repeats& repeats);
+  // Runs the trials that the log does not hold yet, each once (Distinct), and repeats them.
+  void Run(std::vector<Trial> trials);
   const TrialLog& log() const { return log_; }
   int repeats() const { return repeats_; }  // of the last Run
   bool interrupted() const { return interrupted_ && interrupted_(); }

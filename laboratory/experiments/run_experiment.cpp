@@ -136,8 +136,8 @@ ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, st
 
 int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(std::lround(side * options_.scale))); }
 
-void ExperimentContext::Run(std::vector<Trial> trials, const Repeats& repeats) {
-  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? repeats.quick : repeats.full;
+void ExperimentContext::Run(std::vector<Trial> trials) {
+  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? 1 : kRankingRepeats;
   trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
   // Before and after: a machine that became slower shows.

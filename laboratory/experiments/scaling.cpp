@@ -93,7 +93,7 @@ void RunScaling(ExperimentContext& context, Results& results) {
       }
     }
   }
-  context.Run(std::move(trials), {.full = 3, .quick = 1});
+  context.Run(std::move(trials));
 
   for (const auto& [part, all] : parts) {
     for (const Series& series : all) {

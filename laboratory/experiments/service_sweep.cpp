@@ -77,7 +77,7 @@ void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& re
   std::vector<Trial> trials;
   trials.reserve(frames.size());
   for (const SweepFrame& asked : frames) trials.push_back(FramesTrial(connection.client(), begin, asked.frame));
-  context.Run(trials, {.full = 3, .quick = 1});
+  context.Run(trials);
 
   constexpr struct {
     const char *metric, *number;

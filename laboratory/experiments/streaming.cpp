@@ -61,7 +61,7 @@ void RunStreaming(ExperimentContext& context, Results& results) {
       trials.push_back(ServiceTrial(context, streams.Frame(volume, 2, groups), kServiceFrames));
     }
   }
-  context.Run(std::move(trials), {.full = 5, .quick = 1});
+  context.Run(std::move(trials));
 
   const auto add = [&](const FrameCase& frame) {
     Json of = ColumnsOf(frame);

@@ -59,7 +59,7 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
     trials.push_back(FinishTrial(context, c.team));
     if (c.served) trials.push_back(ServiceTrial(context, c.frame, kServiceFrames));
   }
-  context.Run(std::move(trials), {.full = 3, .quick = 1});
+  context.Run(std::move(trials));
 
   for (const SweepCase& c : cases) {
     AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams, sweep.host));

@@ -21,7 +21,7 @@ void RunPaper(ExperimentContext& context, Results& results) {
                      ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
-  context.Run(std::move(trials), {.full = 5, .quick = 1});
+  context.Run(std::move(trials));
   for (auto* add : {AddTransform, AddFootprint, AddPoints, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved, AddClaims,
                     AddValidation, AddPictures}) {
     add(setup, results);
