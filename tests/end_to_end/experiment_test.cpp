@@ -68,7 +68,7 @@ TEST_F(ExperimentTest, SweepOfAUsersOwn) {
   std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.nrrd", "transfer": "opaque"}], "size": 48,
     "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"},
                  {"name": "open", "decomposition": "auto", "balance_by": "auto", "assignment": "auto", "combine": "auto"}], "workers": [1, 3]})";
-  MustRun({"experiment", "sweep", "sweep.json", "-o", "out"});
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--repeats", "2"});
   ExpectResults("out", "sweep");
   ExpectPage("out");
   const std::vector<json> rows = RowsOf("out");
