@@ -6,6 +6,7 @@
 
 #include "client/picture_codec/picture_codec.h"
 #include "client/report/frame_json.h"
+#include "client/report/frame_spans.h"
 #include "client/report/frame_summary.h"
 #include "client/request/picture_record.h"
 #include "client/request/slice_request.h"
@@ -19,15 +20,13 @@ double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
 
 Json TimelineJson(const FrameStatistics& statistics) {
   Json entries = Json::array();
-  for (const RankReport& report : statistics.reports) {
-    for (const Span& span : report.spans) {
-      if (entries.size() == kMaxTimelineEntries) return entries;
-      entries.push_back({{"worker", report.worker},
-                         {"group", report.group},
-                         {"stage", ToString(span.stage)},
-                         {"begin_ms", Milliseconds(span.begin_ns - statistics.begin_ns)},
-                         {"end_ms", Milliseconds(span.end_ns - statistics.begin_ns)}});
-    }
+  for (const StageSpan& span : StageSpans(statistics)) {
+    if (entries.size() == kMaxTimelineEntries) break;
+    entries.push_back({{"worker", span.worker},
+                       {"group", span.group},
+                       {"stage", ToString(span.stage)},
+                       {"begin_ms", Milliseconds(span.begin_ns - statistics.begin_ns)},
+                       {"end_ms", Milliseconds(span.end_ns - statistics.begin_ns)}});
   }
   return entries;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/cli/recording.h"
+#include "client/report/frame_spans.h"
 
 namespace slabstream {
 namespace {
@@ -59,13 +60,10 @@ std::string TraceJson(const std::vector<FrameRecord>& frames) {
     lanes[lane] = frame.end_ns;
     events.push_back(Complete("frame " + std::to_string(i), 0, std::uint32_t(lane + 1), frame.begin_ns - origin, frame.end_ns - origin,
                               {{"output", frames[i].output}, {"groups", frame.groups}, {"workers", frame.workers}}));
-    for (const RankReport& report : frame.reports) {
-      workers.insert(report.worker);
-      for (const Span& span : report.spans) {
-        events.push_back(Complete(std::string(ToString(span.stage)), report.worker, TrackOf(span.stage), span.begin_ns - origin,
-                                  span.end_ns - origin,
-                                  {{"frame", i}, {"group", report.group}, {"rank", report.rank}, {"box", report.box}}));
-      }
+    for (const RankReport& report : frame.reports) workers.insert(report.worker);
+    for (const StageSpan& span : StageSpans(frame)) {
+      events.push_back(Complete(std::string(ToString(span.stage)), span.worker, TrackOf(span.stage), span.begin_ns - origin,
+                                span.end_ns - origin, {{"frame", i}, {"group", span.group}, {"rank", span.rank}, {"box", span.box}}));
     }
   }
 
