@@ -87,6 +87,34 @@ Result<std::string> ParseOrigin(std::string_view option, std::string_view text) 
   return Status::InvalidArgument(fmt::format("{} '{}' is not an origin such as https://viewer.example.org", option, text));
 }
 
+Result<HttpUrl> ParseHttpUrl(std::string_view option, std::string_view text) {
+  const std::string lower = Lower(text.substr(0, text.find("://") + 1));
+  if (lower == "https:") {
+    return Status::InvalidArgument(fmt::format("{} '{}' asks for TLS, which is not spoken here: it takes http://HOST:PORT", option, text));
+  }
+  const auto printable = [](unsigned char c) { return c > ' ' && c < 0x7F && c != '#'; };
+  if (lower == "http:" && std::ranges::all_of(text, printable)) {
+    const std::string_view rest = AfterScheme(text);
+    const std::size_t end = std::min(rest.find_first_of("/?"), rest.size());
+    const std::string_view authority = rest.substr(0, end);
+    const std::optional<HostAndPort> parts = authority.find('@') == std::string_view::npos ? Divide(authority) : std::nullopt;
+    if (parts && parts->port != 0 && !authority.ends_with(':')) {
+      HttpUrl url{.host = parts->host, .port = parts->port.value_or(80)};
+      url.target = std::string(rest.substr(end));
+      if (!url.target.starts_with('/')) url.target.insert(0, "/");
+      return url;
+    }
+  }
+  return Status::InvalidArgument(fmt::format("{} '{}' is not an address such as http://127.0.0.1:4318", option, text));
+}
+
+std::string HostOf(const HttpUrl& url) {
+  const bool v6 = url.host.find(':') != std::string::npos;
+  return fmt::format("{}{}{}:{}", v6 ? "[" : "", url.host, v6 ? "]" : "", url.port);
+}
+
+std::string ToString(const HttpUrl& url) { return fmt::format("http://{}{}", HostOf(url), url.target); }
+
 OriginRules::OriginRules(ListenAddress listen, bool tls, std::string proxy_origin)
     : listen_(std::move(listen)), tls_(tls), proxy_origin_(std::move(proxy_origin)) {
   if (!proxy_origin_.empty()) proxy_host_ = AfterScheme(proxy_origin_);

@@ -1,5 +1,5 @@
 // Where an HTTP server listens, who may ask it by a token, and under which names it may be asked: the checks of Host and Origin that keep
-// foreign pages out.
+// foreign pages out. And the addresses of other servers.
 #pragma once
 
 #include <cstdint>
@@ -23,6 +23,19 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
 
 // "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
 Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
+
+// What a client asks, without TLS.
+struct HttpUrl {
+  std::string host;  // a name or a numeric address; IPv6 without brackets
+  std::uint16_t port = 80;
+  std::string target = "/";  // path and query
+};
+
+// "http://HOST[:PORT][/PATH]". InvalidArgument: https, a name and password, or no such address.
+Result<HttpUrl> ParseHttpUrl(std::string_view option, std::string_view text);
+// "HOST:PORT", as the header Host has it.
+std::string HostOf(const HttpUrl& url);
+std::string ToString(const HttpUrl& url);
 
 // Which requests are the server's own.
 class OriginRules {
