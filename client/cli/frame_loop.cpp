@@ -70,6 +70,7 @@ class FrameLoop {
   }
 
   Status Handle(ClientEvent event) {
+    const Time received = MonotonicNow();
     const auto found = open_.find(event.request);
     if (found == open_.end()) return Status::Ok();
     const std::size_t index = found->second;
@@ -91,7 +92,7 @@ class FrameLoop {
     if (!lowered.empty() && !std::exchange(told_lowered_, true)) PrintWarning(lowered);
     std::vector<RankReport> reports = std::exchange(picture.statistics.reports, {});  // many, which the sink does not need
     FrameRecord& record = records_[index];
-    record = {jobs_[index].output, picture.latency, picture.statistics, IsEmpty(picture.image)};
+    record = {jobs_[index].output, picture.latency, received, picture.statistics, IsEmpty(picture.image)};
     if (options_.keep_reports) record.statistics.reports = std::move(reports);
     if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
     return Status::Ok();

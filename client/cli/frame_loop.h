@@ -15,6 +15,7 @@ namespace slabstream {
 struct FrameRecord {
   std::string output;
   Duration latency{};          // request to last byte
+  Time received{};             // when the last byte was there
   FrameStatistics statistics;  // reports only if they were asked for
   bool empty = false;          // the picture shows nothing
 };

@@ -7,6 +7,8 @@
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
+#include "common/cli/add_option.h"
+#include "common/otlp/trace_sender.h"
 #include "common/volume/memory_budget.h"
 #include "common/wire/control_messages.h"
 #include "data/volume_io/read_options.h"
@@ -150,6 +152,9 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list
   app.add_option("--save-camera", options.camera_path, "Write the view to a file for --camera")->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
   app.add_option("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing")->type_name("FILE");
+  AddParsed(app, "--otlp", options.collector, ParseCollector,
+            "Send the timeline to an OpenTelemetry collector, by OTLP over HTTP without TLS; the path is /v1/traces unless given")
+      ->type_name("URL");
   app.add_flag("--progress", options.progress, "Show progress on stderr");
 }
 

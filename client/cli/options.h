@@ -12,6 +12,7 @@
 #include "client/service/service_choice.h"
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
+#include "common/http/address.h"
 #include "common/volume/sphere.h"
 #include "common/wire/client_messages.h"
 #include "data/layers/layer_reader.h"
@@ -44,6 +45,7 @@ struct FrameOptions {
   PictureFormat format;
   bool record = true;                               // pictures hold how they were made
   std::string stats_path, trace_path, camera_path;  // files to be written; empty: not wanted
+  std::optional<HttpUrl> collector;                 // of OpenTelemetry, which gets the spans; none: not wanted
   bool progress = false;
 };
 

@@ -18,12 +18,14 @@
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
+#include "client/cli/trace_spans.h"
 #include "client/cli/warn_of_picture.h"
 #include "client/movie/turntable.h"
 #include "client/request/request_options.h"
 #include "common/base/files.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
+#include "common/otlp/trace_sender.h"
 #include "common/wire/validate_request.h"
 #include "data/volume_io/read_options.h"
 
@@ -89,7 +91,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   FrameLoopOptions loop;
   loop.in_flight = in_flight;
   loop.pictures = pictures->get();
-  loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty();
+  loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty() || options.collector;
   loop.failures = failures;
   loop.progress = options.progress;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
@@ -106,6 +108,16 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
     if (Status status = WriteTextFile(options.trace_path, TraceJson(*frames)); !status.ok()) return status;
   }
   return frames;
+}
+
+// --otlp, when the pictures are there: a collector that does not take the spans takes nothing from the command.
+void Send(const FrameOptions& options, const std::string& command, Time begin, const std::vector<FrameRecord>& frames,
+          const std::vector<Status>& failures) {
+  if (!options.collector) return;
+  const std::vector<TraceSpan> spans = CommandSpans(
+      {.command = command, .source = options.source, .begin = begin, .end = MonotonicNow(), .parent = ParentOfProcess()}, frames, failures);
+  const Status status = SendSpans(*options.collector, ThisProcess("slabstream"), spans);
+  if (!status.ok()) PrintWarning("--otlp: " + status.message());
 }
 
 std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options, const PictureKey& key) {
@@ -192,6 +204,7 @@ Status RunRender(const RenderOptions& options) {
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
                            Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
+  Send(options.frame, "render", start, *frames, {});
   return Status::Ok();
 }
 
@@ -213,6 +226,7 @@ Status RunTurntable(const TurntableOptions& options) {
                                                          : fmt::format("into {}", options.output.movie);
   std::cout << fmt::format("rendered {} frames, {}, {}x{} in {:.0f} ms (first frame {:.0f} ms)\n", frames->size(), files, size.width,
                            size.height, Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
+  Send(options.frame, "turntable", start, *frames, failures);
   return ReportAll(who, failures);
 }
 
