@@ -25,6 +25,7 @@
 #include "gateway/question_requests.h"
 #include "gateway/reply.h"
 #include "gateway/request_fields.h"
+#include "gateway/request_trace.h"
 #include "gateway/service_link.h"
 #include "gateway/service_monitor.h"
 #include "gateway/target.h"
@@ -47,6 +48,7 @@ class Gateway::Impl : public HttpApplication {
         options_(std::move(options)),
         rules_(options_.listen, options_.tls.has_value(), options_.proxy_origin),
         work_(asio::make_work_guard(io_)),
+        traces_(options_.collector ? std::make_shared<TraceSender>(*options_.collector, ThisProcess("slabstream-gateway")) : nullptr),
         encoders_(std::max(2U, std::thread::hardware_concurrency())),
         movies_(std::make_unique<MovieRequests>(io_, context_, service_, metrics_)),
         routes_(Routes()) {}
@@ -126,7 +128,14 @@ class Gateway::Impl : public HttpApplication {
       answer.headers.emplace_back("Allow", route->second.takes_post ? "GET, HEAD, POST" : "GET, HEAD");
       return counted(std::move(answer));
     }
-    route->second.handle(request, *target, counted);
+    if (!route->second.traced) return route->second.handle(request, *target, counted, nullptr);
+    const auto trace = RequestTrace::Begin(traces_, request, options_.tls ? "https" : "http", route->first);
+    if (trace == nullptr) return route->second.handle(request, *target, counted, nullptr);
+    const auto traced = [counted, trace](HttpReply answer) {
+      trace->End(answer.status);
+      counted(std::move(answer));
+    };
+    route->second.handle(request, *target, traced, trace);
   }
 
   std::variant<HttpReply, WebSocketAccepted> Accept(const HttpRequest& request) override {
@@ -167,14 +176,17 @@ class Gateway::Impl : public HttpApplication {
   struct Route {
     bool open = false;  // needs no token
     bool takes_post = false;
-    std::function<void(const HttpRequest&, const Target&, ReplyFunction)> handle;
+    bool traced = false;
+    std::function<void(const HttpRequest&, const Target&, ReplyFunction, RequestTracePointer)> handle;
   };
 
   static std::string Shown(const std::string& text) { return text.substr(0, 128); }
 
   std::map<std::string, Route, std::less<>> Routes() {
     const auto answer = [](std::function<HttpReply()> make) {
-      return [make = std::move(make)](const HttpRequest&, const Target&, const ReplyFunction& reply) { reply(make()); };
+      return [make = std::move(make)](const HttpRequest&, const Target&, const ReplyFunction& reply, const RequestTracePointer&) {
+        reply(make());
+      };
     };
     std::map<std::string, Route, std::less<>> routes;
     routes["/livez"] = {.open = true, .handle = answer([] { return HttpReply{.type = "text/plain", .body = "ok\n"}; })};
@@ -182,8 +194,10 @@ class Gateway::Impl : public HttpApplication {
                                          if (news_->health == ServiceHealth::kReady) return HttpReply{.type = "text/plain", .body = "ok\n"};
                                          return Failure(503, news_->reason);
                                        })};
-    routes["/metrics"] = {.handle =
-                              answer([this] { return HttpReply{.type = "text/plain; version=0.0.4", .body = metrics_.Text(*news_)}; })};
+    routes["/metrics"] = {.handle = answer([this] {
+                            const TraceSender::Counts traces = traces_ != nullptr ? traces_->counts() : TraceSender::Counts();
+                            return HttpReply{.type = "text/plain; version=0.0.4", .body = metrics_.Text(*news_, traces)};
+                          })};
     routes["/api/v1/openapi.json"] = {.open = true, .handle = answer([] {
                                                       static const std::string text = JsonText(OpenApi());
                                                       return HttpReply{.body = text};
@@ -201,24 +215,31 @@ class Gateway::Impl : public HttpApplication {
                                     return JsonReply({{"datasets", std::move(datasets)}});
                                   })};
     const auto bind = [](auto& requests, auto method) {
-      return [&requests, method](const HttpRequest& request, const Target& target, ReplyFunction reply) {
+      return [&requests, method](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
         Result<PictureFields> fields = FieldsOf(target, request);
         if (!fields.ok()) return reply(Failure(fields.status()));
         std::invoke(method, *requests, *std::move(fields), std::move(reply), request.gone);
       };
     };
-    routes["/api/v1/render.png"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Render)};
-    routes["/api/v1/slice.png"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Slice)};
+    const auto picture = [this](auto method) {
+      return [this, method](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
+        Result<PictureFields> fields = FieldsOf(target, request);
+        if (!fields.ok()) return reply(Failure(fields.status()));
+        std::invoke(method, *pictures_, *std::move(fields), std::move(reply), request.gone, std::move(trace));
+      };
+    };
+    routes["/api/v1/render.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render)};
+    routes["/api/v1/slice.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice)};
     routes["/api/v1/command"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Command)};
     routes["/api/v1/turntable.mp4"] = {.takes_post = true, .handle = bind(movies_, &MovieRequests::Turntable)};
-    routes["/api/v1/histogram"] = {.handle = bind(questions_, &QuestionRequests::Histogram)};
-    routes["/api/v1/joint-histogram"] = {.handle = bind(questions_, &QuestionRequests::JointHistogram)};
-    routes["/api/v1/labels"] = {.handle = bind(questions_, &QuestionRequests::Labels)};
-    routes["/api/v1/value"] = {.handle = bind(questions_, &QuestionRequests::Value)};
-    routes["/api/v1/profile"] = {.handle = bind(questions_, &QuestionRequests::Profile)};
-    routes["/api/v1/statistics"] = {.handle = bind(questions_, &QuestionRequests::Statistics)};
-    routes["/api/v1/pick"] = {.takes_post = true, .handle = bind(questions_, &QuestionRequests::Pick)};
-    routes["/api/v1/transfer"] = {.handle = bind(questions_, &QuestionRequests::Transfer)};
+    routes["/api/v1/histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Histogram)};
+    routes["/api/v1/joint-histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::JointHistogram)};
+    routes["/api/v1/labels"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Labels)};
+    routes["/api/v1/value"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Value)};
+    routes["/api/v1/profile"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Profile)};
+    routes["/api/v1/statistics"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
+    routes["/api/v1/pick"] = {.takes_post = true, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
+    routes["/api/v1/transfer"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};
     return routes;
   }
@@ -289,6 +310,7 @@ class Gateway::Impl : public HttpApplication {
   Metrics metrics_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_;
+  const std::shared_ptr<TraceSender> traces_;  // null: nobody wants any
   asio::thread_pool encoders_;
   std::unique_ptr<HttpServer> server_;
   std::uint16_t port_ = 0;

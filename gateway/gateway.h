@@ -10,6 +10,7 @@
 //   ServiceMonitor        asks how the service is, once a second                     its own
 //   encoders              compress pictures                                          one a core
 //   makers                make movies (turntable_movie.h)                            one for each movie
+//   TraceSender           sends traces of requests (request_trace.h)                 its own
 //
 // Threads hand results over by posting them to the io thread, which alone changes the state of the gateway and its sessions.
 #pragma once
@@ -29,8 +30,9 @@ namespace slabstream {
 struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
-  std::string proxy_origin;  // of --behind-proxy, as ParseOrigin gives it; empty: none
-  std::string token;         // CheckToken
+  std::string proxy_origin;          // of --behind-proxy, as ParseOrigin gives it; empty: none
+  std::string token;                 // CheckToken
+  std::optional<HttpUrl> collector;  // of OpenTelemetry, which gets traces of requests; none: there are no traces
   HttpLimits limits;
   int max_sessions = 64;
   int max_renders = 16;  // pictures over HTTP under way

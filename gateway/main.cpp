@@ -11,6 +11,7 @@
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/http/address.h"
+#include "common/otlp/trace_sender.h"
 #include "common/transport/context.h"
 #include "gateway/gateway.h"
 
@@ -31,6 +32,11 @@ Status Serve(Options options) {
   Result<std::string> token = options.token_file.empty() ? MakeToken() : ReadToken("--token-file", options.token_file);
   if (!token.ok()) return token.status();
   options.gateway.token = *std::move(token);
+  if (!options.gateway.collector) {
+    Result<std::optional<HttpUrl>> collector = CollectorOfProcess();
+    if (!collector.ok()) return collector.status();
+    options.gateway.collector = *std::move(collector);
+  }
   if (!options.tls.certificate.empty()) options.gateway.tls = options.tls;
   Context context;
   const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
@@ -65,6 +71,12 @@ int Run(int argc, char** argv) {
   app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
       ->type_name("FILE")
       ->default_str("a new random one at each start");
+  AddParsed(
+      app, "--otlp", options.gateway.collector, ParseCollector,
+      "Send a trace of each picture and question to an OpenTelemetry collector, by OTLP over HTTP without TLS; the path is /v1/traces "
+      "unless given")
+      ->type_name("URL")
+      ->default_str("$OTEL_EXPORTER_OTLP_ENDPOINT, or no traces");
   return RunService(app, argc, argv, "gateway", [&] { return Serve(std::move(options)); });
 }
 

@@ -65,7 +65,7 @@ void Metrics::CountSession(int change) {
   sessions_ += change;
 }
 
-std::string Metrics::Text(const ServiceNews& news) const {
+std::string Metrics::Text(const ServiceNews& news, const TraceSender::Counts& traces) const {
   const std::lock_guard lock(mutex_);
   Exposition out;
   out.Single("gateway_frames_total", MetricType::kCounter, "Frames that the service made for this gateway.", frames_);
@@ -84,6 +84,9 @@ std::string Metrics::Text(const ServiceNews& news) const {
   for (const auto& [status, count] : responses_) out.Value(count, {{"status", std::to_string(status)}});
   out.Family("gateway_refusals_total", MetricType::kCounter, "Requests and sessions that the gateway refused or dropped.");
   for (const auto& [reason, count] : refusals_) out.Value(count, {{"reason", reason}});
+  out.Family("gateway_traces_total", MetricType::kCounter, "Traces of requests: that a collector took, or that were dropped.");
+  out.Value(traces.sent, {{"result", "sent"}});
+  out.Value(traces.dropped, {{"result", "dropped"}});
   out.Single("gateway_sessions", MetricType::kGauge, "Views that are open.", std::uint64_t(sessions_));
 
   const StatusReply& status = news.status;

@@ -9,6 +9,7 @@
 
 #include "common/base/time.h"
 #include "common/metrics/exposition.h"
+#include "common/otlp/trace_sender.h"
 #include "common/wire/client_messages.h"
 #include "gateway/service_monitor.h"
 
@@ -30,8 +31,8 @@ class Metrics {
   void CountRefusal(std::string_view reason);
   void CountSession(int change);  // +1, -1
 
-  // In the text format of Prometheus, with what the service says of itself.
-  std::string Text(const ServiceNews& news) const;
+  // In the text format of Prometheus, with what the service says of itself, and how many traces went to a collector.
+  std::string Text(const ServiceNews& news, const TraceSender::Counts& traces) const;
 
  private:
   void Observe(std::string_view stage, std::int64_t ns);  // with the mutex held

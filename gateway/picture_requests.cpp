@@ -22,19 +22,25 @@ HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
 }  // namespace
 
 void PictureRequests::MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
-                              const Gone& gone) {
+                              const Gone& gone, RequestTracePointer trace) {
   if (const Status status = CheckCanDraw(annotations); !status.ok()) return reply(Failure(status));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
-    const auto done = [this, encode = std::move(encode), finish](Result<ServiceLink::Rendered> rendered) {
-      if (!rendered.ok()) return finish([status = rendered.status()] { return Failure(status); });
+    const auto done = [this, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
+                       asked = MonotonicNow()](Result<ServiceLink::Rendered> rendered) {
+      if (!rendered.ok()) {
+        if (trace != nullptr) trace->AddFailure(dataset, asked, rendered.status());
+        return finish([status = rendered.status()] { return Failure(status); });
+      }
+      if (trace != nullptr) trace->AddFrames(dataset, rendered->pictures);
       const Picture& first = rendered->pictures.front();
       metrics_.CountFrame(first.statistics, first.latency);
       // Handlers of asio are copied nowhere, but std::function would copy the pictures.
       auto held = std::make_shared<ServiceLink::Rendered>(*std::move(rendered));
-      boost::asio::post(encoders_, [this, encode, finish, held] {
+      boost::asio::post(encoders_, [this, encode, finish, held, trace] {
         const Time begin = MonotonicNow();
         auto png = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
         if (png->ok()) metrics_.CountPicture("file", (*png)->size(), MonotonicNow() - begin);
+        if (trace != nullptr) trace->AddEncoding(begin);
         finish([png] { return PngReply(*png); });
       });
     };
@@ -42,7 +48,7 @@ void PictureRequests::MakePng(std::vector<FrameRequest> frames, const Annotation
   });
 }
 
-void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
+void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return reply(Failure(render.status()));
   const auto encode = [request = *render](const ServiceLink::Rendered& rendered) {
@@ -53,10 +59,10 @@ void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, c
                              .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return PngFile(picture.image, picture.size, request.format, notes);
   };
-  MakePng({render->frame}, render->format.annotations, encode, std::move(reply), gone);
+  MakePng({render->frame}, render->format.annotations, encode, std::move(reply), gone, std::move(trace));
 }
 
-void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone) {
+void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
   Result<SliceRequest> slice = ParseSliceFields(fields);
   if (!slice.ok()) return reply(Failure(slice.status()));
   Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
@@ -70,7 +76,7 @@ void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, co
     }
     return PngFile(SideBySide(images, request.frame.size), request.size(), request.format, notes);
   };
-  MakePng(*std::move(frames), slice->format.annotations, encode, std::move(reply), gone);
+  MakePng(*std::move(frames), slice->format.annotations, encode, std::move(reply), gone, std::move(trace));
 }
 
 void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "client/request/picture_fields.h"
+#include "gateway/request_trace.h"
 #include "gateway/requests_under_way.h"
 
 namespace boost::asio {
@@ -16,15 +17,16 @@ class PictureRequests {
   PictureRequests(boost::asio::io_context& io, boost::asio::thread_pool& encoders, Metrics& metrics, ServiceLink& link, int most)
       : encoders_(encoders), metrics_(metrics), link_(link), under_way_(io, metrics, link, "pictures", most) {}
 
-  void Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
-  void Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone);
+  // `trace` may be null.
+  void Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
+  void Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
   void Command(const PictureFields& fields, const ReplyFunction& reply, const Gone& gone);
 
  private:
   // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.
   using EncodeFunction = std::function<Result<std::vector<std::byte>>(ServiceLink::Rendered)>;
   void MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
-               const Gone& gone);
+               const Gone& gone, RequestTracePointer trace);
 
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;

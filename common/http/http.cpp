@@ -94,6 +94,7 @@ HttpRequest RequestOf(const http::request<http::string_body>& message) {
   request.origin = optional(http::field::origin);
   request.authorization = optional(http::field::authorization);
   request.accept_encoding = View(message[http::field::accept_encoding]);
+  request.traceparent = View(message["traceparent"]);
   request.subprotocols = Items(View(message[http::field::sec_websocket_protocol]));
   return request;
 }

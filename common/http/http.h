@@ -39,6 +39,7 @@ struct HttpRequest {
   std::string host;  // empty: there is none
   std::optional<std::string> origin, authorization;
   std::string accept_encoding;            // empty: there is none
+  std::string traceparent;                // empty: there is none
   std::vector<std::string> subprotocols;  // that a WebSocket offers
   std::string body;
   // Never null. An application that works on the reply for long may put a function there: it is called, on the io thread, if the

@@ -122,8 +122,8 @@ class MeasuredService:
         assert found is not True, log.read_text()
         return child, self.address_in(found[1])
 
-    def start_gateway(self):
-        child, log = self.start("slabstream-gateway", "--endpoint", self.endpoint, "--token-file", self.token_file)
+    def start_gateway(self, *arguments):
+        child, log = self.start("slabstream-gateway", "--endpoint", self.endpoint, "--token-file", self.token_file, *arguments)
         line = child.stdout.readline().split()
         assert line and line[0] == "ready", log.read_text()
         self.gateway = line[1].split("/#")[0].split("//")[1]
