@@ -84,8 +84,11 @@ Status SaveState(const ServiceState& state) {
 void ForgetState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return;
+  const std::string file = FileFor(*directory, state.endpoint);
+  const std::optional<ServiceState> kept = Load(file);
+  if (kept && kept->coordinator != state.coordinator) return;  // of another service, which has the endpoint now
   std::error_code ignored;
-  std::filesystem::remove(FileFor(*directory, state.endpoint), ignored);
+  std::filesystem::remove(file, ignored);
 }
 
 void RemoveState(const ServiceState& state) {

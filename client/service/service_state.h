@@ -34,7 +34,7 @@ struct ServiceState {
 Result<std::string> StateDirectory();
 
 Status SaveState(const ServiceState& state);
-void ForgetState(const ServiceState& state);  // keeps its logs
+void ForgetState(const ServiceState& state);  // keeps its logs, and what another service has saved for its endpoint since
 void RemoveState(const ServiceState& state);  // and its logs
 
 // The state of the service at `endpoint`, or of the last one started if `endpoint` is empty. nullopt: none whose coordinator runs.

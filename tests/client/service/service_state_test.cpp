@@ -80,6 +80,15 @@ TEST_F(ServiceStateTest, AServiceWhoseCoordinatorIsGoneLeavesRemains) {
   EXPECT_EQ(FindRemains(""), std::nullopt);
 }
 
+TEST_F(ServiceStateTest, WhoEndsLateForgetsNoOtherServiceAtItsEndpoint) {
+  const ServiceState ended{"tcp://127.0.0.1:5000", 100, ::getpid() + 1, {1, 2}, "", ""};
+  const ServiceState next{"tcp://127.0.0.1:5000", 101, ::getpid(), {3}, "", ""};
+  ASSERT_EQ(SaveState(ended), Status::Ok());
+  ASSERT_EQ(SaveState(next), Status::Ok());
+  ForgetState(ended);
+  EXPECT_EQ(FindRemains(""), next);
+}
+
 TEST_F(ServiceStateTest, DamagedFilesAreNoServices) {
   for (const char* text : {"", "{", "[]", "{\"endpoint\": 3}", "null"}) {
     std::ofstream(*StateDirectory() + "/x.json") << text;
