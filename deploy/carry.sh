@@ -69,5 +69,5 @@ describe_packages() {
   mkdir -p "$root/usr/share/doc/slabstream"
   cp "$repository/LICENSE" "$root/usr/share/doc/slabstream/copyright"
   cp -r /usr/share/common-licenses "$root/usr/share/"
-  SOURCE_DATE_EPOCH="$(epoch)" "$repository/deploy/sbom" "$root" "$name" > "$root/usr/share/doc/slabstream/slabstream.spdx.json"
+  SOURCE_DATE_EPOCH="$(epoch)" "$repository/deploy/sbom" "$root" "$name" "$(version)" > "$root/usr/share/doc/slabstream/slabstream.spdx.json"
 }

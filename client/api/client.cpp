@@ -49,7 +49,8 @@ Progress ProgressOf(const FrameProgress& progress) {
           .workers = int(progress.workers)};
 }
 
-// Puts the rows of `values`, of the pixels in `bounds` with `channels` each, where they belong in those of the whole picture.
+// Copies `values`, those of the pixels in `bounds`, to their places in `whole`, a picture that is `width` pixels wide. A pixel has
+// `channels` values.
 void PutRows(std::span<const float> values, const PixelBounds& bounds, int width, int channels, std::vector<float>& whole) {
   const std::size_t row = std::size_t(channels) * std::size_t(bounds.width());
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) {

@@ -128,7 +128,8 @@ bool OriginRules::IsOwnHost(std::string_view host) const {
   if (parts->host == "localhost" || IsLoopback(parts->host)) return true;
   // With TLS, whoever reaches the gateway under a name had its certificate checked for it.
   if (tls_ || parts->host == listen_.host) return true;
-  // At every address, it is asked under any of them. A page whose name was made to point here asks under that name, never under a number.
+  // A server that listens at every address may be asked under each. A foreign page whose name was made to point here asks under its name,
+  // never under a number.
   return listen_.any && IsNumeric(parts->host);
 }
 
