@@ -79,6 +79,15 @@ Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const doubl
   return changed;
 }
 
+Layout CutByCost(const LayoutRequest& request, const Partition* resized) {
+  ResolvedPolicy by_cost = *request.policy;
+  by_cost.balance_by = BalanceBy::kCost;
+  LayoutRequest cut = request;
+  cut.policy = &by_cost;
+  cut.resized = resized;
+  return MakeLayout(cut);
+}
+
 std::optional<Layout> Rebalance(const BalanceRequest& asked) {
   const Layout& now = *asked.now;
   const LayoutRequest& request = *asked.make;
@@ -99,18 +108,13 @@ std::optional<Layout> Rebalance(const BalanceRequest& asked) {
   const double after_reassigning = FrameSeconds(reassigned, request.slots, asked.seconds);
   weigh(std::move(reassigned), FrameSeconds(now, request.slots, asked.seconds), after_reassigning);
 
-  ResolvedPolicy by_cost = *request.policy;
-  by_cost.balance_by = BalanceBy::kCost;
-  LayoutRequest other_boxes = request;
-  other_boxes.policy = &by_cost;
   const auto predicted = [&](const Layout& layout) {
     return FrameSeconds(layout, request.slots, PredictedSeconds(layout, *request.known.cost));
   };
   const double before = predicted(now);
-  Layout cut_anew = MakeLayout(other_boxes);
+  Layout cut_anew = CutByCost(request, nullptr);
   const double after_cut = predicted(cut_anew);
-  other_boxes.resized = &now.partition;
-  Layout resized = MakeLayout(other_boxes);
+  Layout resized = CutByCost(request, &now.partition);
   const double after_resizing = predicted(resized);
   weigh(std::move(resized), before, after_resizing);
   if (after_cut < (1 - kLeastGainOfNewBoxes) * after_resizing) weigh(std::move(cut_anew), before, after_cut);

@@ -28,6 +28,9 @@ std::int64_t MovedVoxels(const Layout& from, const Layout& to);
 // Keeps the boxes. Moves one after the other from the busiest slot to the least busy one, as long as that helps. `seconds` by box.
 Layout Reassign(const Layout& layout, std::uint32_t slots, std::span<const double> seconds);
 
+// Boxes of equal cost, whatever the policy balances by. `resized`: whose planes move to that end; null: cut anew.
+Layout CutByCost(const LayoutRequest& request, const Partition* resized);
+
 // The layout to change to, if any. Comparisons use one kind of time on both sides: measured times of boxes to hand over, costs of cells to
 // cut anew, because cells resolve boxes no more finely than they are large.
 std::optional<Layout> Rebalance(const BalanceRequest& request);

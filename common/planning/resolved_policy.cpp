@@ -81,10 +81,12 @@ std::string_view BalanceByOf(const Policy& policy) {
   return FindNamed(Decompositions(), policy.decomposition)->balance_by;
 }
 
+bool IsDynamic(const Policy& policy) { return FindNamed(Balances(), policy.balance)->change != nullptr; }
+
 bool NeedsOccupancy(const Policy& policy) {
   if (policy.decomposition == kAutomatic || policy.assignment == kAutomatic) return true;
   return FindBalanceBy(BalanceByOf(policy)) != BalanceBy::kVoxels || FindNamed(Assignments(), policy.assignment)->by_cost ||
-         FindNamed(Balances(), policy.balance)->change != nullptr;
+         IsDynamic(policy);
 }
 
 }  // namespace slabstream

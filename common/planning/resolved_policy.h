@@ -48,6 +48,9 @@ Axis SlabAxis(AxisChoice choice, const DecompositionEntry& decomposition, const 
 // known.
 std::string_view BalanceByOf(const Policy& policy);
 
+// Whether boxes may change between frames (Balances). The policy's names must be known.
+bool IsDynamic(const Policy& policy);
+
 // Whether an exact OccupancyGrid improves the policy's layout, or the choice of it. The policy's names must be known.
 bool NeedsOccupancy(const Policy& policy);
 

@@ -1,7 +1,6 @@
 #include "laboratory/experiments/balanced_case.h"
 
-#include "common/base/find_named.h"
-#include "common/planning/balances.h"
+#include "common/planning/resolved_policy.h"
 #include "laboratory/experiments/frame_keys.h"
 
 namespace slabstream {
@@ -31,11 +30,9 @@ Json MeasureBalanced(ExperimentContext& context, const FrameCase& frame) {
 
 Json BalancedKey(ExperimentContext& context, const FrameCase& frame) { return ForBalanced(context, frame).key; }
 
-bool IsDynamic(const FrameCase& frame) { return FindNamed(Balances(), frame.policy.balance)->change != nullptr; }
-
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame) {
   Trial boxes = BoxCostTrial(context, frame);
-  if (!IsDynamic(frame)) return boxes;
+  if (!IsDynamic(frame.policy)) return boxes;
   const KeyedFrame keyed = ForBalanced(context, frame);
   const auto run = [&context, frame = keyed.frame] { return MeasureBalanced(context, frame); };
   return keyed.MakeTrial(context, run, (kBalancedFrames + 1) * boxes.effort);
@@ -54,7 +51,7 @@ std::vector<MeasuredFrame> RecallBalanced(ExperimentContext& context, const Fram
 }
 
 std::vector<MeasuredFrame> RecallCosts(ExperimentContext& context, const FrameCase& frame) {
-  return IsDynamic(frame) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);
+  return IsDynamic(frame.policy) ? RecallBalanced(context, frame) : RecallRepeats(context, frame);
 }
 
 }  // namespace slabstream

@@ -8,8 +8,6 @@ namespace slabstream {
 
 inline constexpr int kBalancedFrames = 6;  // to learn from, with each box measured once
 
-bool IsDynamic(const FrameCase& frame);
-
 // The trial that measures the frame's boxes: BoxCostTrial, or this one of a frame with dynamic balance.
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame);
 // The key of the latter.

@@ -4,8 +4,7 @@
 #include <utility>
 
 #include "client/report/frame_summary.h"
-#include "common/base/find_named.h"
-#include "common/planning/balances.h"
+#include "common/planning/resolved_policy.h"
 #include "laboratory/experiments/failure.h"
 #include "laboratory/measure/statistics.h"
 
@@ -21,9 +20,7 @@ double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
 
 }  // namespace
 
-int WarmUpFrames(const Policy& policy) {
-  return FindNamed(Balances(), policy.balance)->change != nullptr ? kLearningFrames : kWarmUpFrames;
-}
+int WarmUpFrames(const Policy& policy) { return IsDynamic(policy) ? kLearningFrames : kWarmUpFrames; }
 
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
   std::vector<double> latencies, renders, longest, imbalances, idle_shares, image_bytes;

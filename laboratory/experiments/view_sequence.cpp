@@ -17,7 +17,7 @@ constexpr std::uint32_t kSlowWorker = 1;
 
 ViewParameters Turntable(double part) { return {.azimuth_degrees = 180 * part, .elevation_degrees = kBenchElevationDegrees}; }
 
-bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame) || BalanceByOf(frame.policy) == NameOf(BalanceBy::kCost); }
+bool LearnsTimes(const FrameCase& frame) { return IsDynamic(frame.policy) || BalanceByOf(frame.policy) == NameOf(BalanceBy::kCost); }
 
 KeyedFrame ForSequence(ExperimentContext& context, const ViewSequence& sequence) {
   Json views = Json::array();
