@@ -91,8 +91,7 @@ BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count
       voxels_(voxels),
       answers_(kAnswersAtOnce) {}
 
-std::vector<CoordinatorEvent> BackgroundActions::TakeEvents() {
-  std::vector<CoordinatorEvent> events;
+void BackgroundActions::HandleEvents(const std::function<void(CoordinatorEvent)>& handle) {
   for (News& news : inbox_->TakeAll()) {
     if (news.samples.any()) voxels_.Publish(news.dataset, std::move(news.samples));
     if (news.upload != nullptr) {
@@ -100,9 +99,8 @@ std::vector<CoordinatorEvent> BackgroundActions::TakeEvents() {
       if (open != uploads_.end()) open->second = std::move(news.upload);
     }
     if (const auto* planned = std::get_if<Planned>(&news.event)) plans_.erase(planned->plan);
-    events.push_back(std::move(news.event));
+    handle(std::move(news.event));
   }
-  return events;
 }
 
 BackgroundActions::AtOnce BackgroundActions::Post(auto&& tasks, const char* what, auto make, auto failed) {

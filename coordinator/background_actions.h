@@ -13,7 +13,6 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
-#include <vector>
 
 #include "common/base/background_tasks.h"
 #include "common/base/fair_tasks.h"
@@ -64,8 +63,9 @@ class BackgroundActions {
   AtOnce Perform(ClientLeft& action);
   AtOnce Perform(FrameMeasured& action);
 
-  // What has ended since the last call. Voxels of loaded datasets are served from then on: before the machine can send anybody for them.
-  std::vector<CoordinatorEvent> TakeEvents();
+  // Hands over what has ended since the last call, one event after the other. Voxels of a loaded dataset are served from just before its
+  // event: before the machine can send anybody for them, and after whatever earlier events did to voxels of the same id.
+  void HandleEvents(const std::function<void(CoordinatorEvent)>& handle);
   // Notified when there is something to take.
   Wakeup& wakeup() { return inbox_->wakeup(); }
 

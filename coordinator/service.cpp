@@ -153,7 +153,7 @@ void CoordinatorService::Impl::Loop() {
   while (!stop_now && MonotonicNow() < stop_deadline) {
     Wait(sockets, &background.wakeup(),
          std::clamp(std::min(frames.NextWake(), datasets.NextWake()) - MonotonicNow(), Duration::zero(), kLongestWait));
-    for (CoordinatorEvent& event : background.TakeEvents()) HandleEvent(std::move(event));
+    background.HandleEvents([this](CoordinatorEvent event) { HandleEvent(std::move(event)); });
     if (metrics.now.wanted()) metrics.now.Set({frames.counts(), datasets.counts()});
     ReceiveFromWorkers();
     ReceiveFromClients();

@@ -87,7 +87,7 @@ class VoxelServer {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread; once for each id. They are served until they are withdrawn. So is the light volume of samples that are held
+  // From any thread. The same id means the same voxels. They are served until they are withdrawn. So is the light volume of samples that are held
   // (LightVolumeOf), which is made when it is first asked for.
   void Publish(DatasetId dataset, Samples samples);
   void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
