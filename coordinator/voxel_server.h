@@ -87,8 +87,8 @@ class VoxelServer {
 
   const std::string& endpoint() const { return endpoint_; }
 
-  // From any thread. The same id means the same voxels. They are served until they are withdrawn. So is the light volume of samples that are held
-  // (LightVolumeOf), which is made when it is first asked for.
+  // From any thread. The same id means the same voxels. They are served until they are withdrawn. So is the light volume of samples that
+  // are held (LightVolumeOf), which is made when it is first asked for.
   void Publish(DatasetId dataset, Samples samples);
   void Withdraw(DatasetId dataset);  // from any thread; requests for it are refused from now on
   Samples Find(DatasetId dataset);   // from any thread; neither: not published
