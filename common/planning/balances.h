@@ -28,6 +28,7 @@ struct BalanceEntry {
   // Before its n-th change, a layout must have been measured for n - 1 frames, 1 at least and at most this many: so noise seldom moves
   // voxels, and a view that moves is still followed.
   int most_patience = 1;
+  bool hands_over = false;  // it changes who owns a box and never the boxes, so it needs several boxes a worker (--groups)
 };
 
 // The only list; the standard one first.
@@ -37,5 +38,10 @@ inline constexpr std::string_view kDynamicBalance = "dynamic";
 // Planes of the partition move to where both sides took as long, each time, whatever that costs to move: after Marchesin, Mongenet and
 // Dischler, "Dynamic load balancing for parallel volume rendering", EGPGV 2006.
 std::optional<Layout> MovePlanes(const BalanceRequest& request);
+
+// Busy workers hand boxes over to those that have least to do, each time, so that a worker's boxes need not touch: a simple form of what
+// Walldén, Markidis, Okita and Ino do in two layers of groups, "Memory efficient load balancing for distributed large-scale volume
+// rendering using a two-layered group structure", IEICE Transactions E102-D, 2019.
+std::optional<Layout> HandOver(const BalanceRequest& request);
 
 }  // namespace slabstream

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
+#include <regex>
 #include <utility>
 
 #include "client/cli/input_volume.h"
@@ -24,6 +26,16 @@ TransferFunction SphereTransfer(double opacity) {
   return {{{0, kWarm}, {128, kWarm}, {255, kCool}}, {{0, 0}, {64, opacity}, {255, opacity}}};
 }
 
+}  // namespace
+
+TransferFunction HalfShown(double opacity) {
+  TransferFunction transfer = SphereTransfer(opacity);
+  transfer.opacities = {{0, 0}, {191, 0}, {192, opacity}, {255, opacity}};
+  return transfer;
+}
+
+namespace {
+
 // A soft surface that is solid within a few voxels, in the colours of tissue.
 TransferFunction BrainTransfer() {
   return {{{0, {0.30F, 0.16F, 0.12F}}, {60, {0.62F, 0.38F, 0.30F}}, {120, {0.86F, 0.68F, 0.58F}}, {255, {1, 0.97F, 0.92F}}},
@@ -36,6 +48,15 @@ double StandardOccupancy(SphereClass sphere_class) { return sphere_class == Sphe
 std::string SphereName(const SphereRequest& sphere) {
   const std::string name = fmt::format("class{}-{}", int(sphere.sphere_class), sphere.size);
   return sphere.occupancy == StandardOccupancy(sphere.sphere_class) ? name : fmt::format("{}-{:g}", name, sphere.occupancy);
+}
+
+std::string ClusterName(const ClusterRequest& clusters) {
+  const ClusterRequest standard{.size = clusters.size};
+  std::string name = fmt::format("clusters-{}", clusters.size);
+  if (clusters.occupancy != standard.occupancy) name += fmt::format("-{:g}", clusters.occupancy);
+  if (clusters.balls != standard.balls) name += fmt::format("-of-{}", clusters.balls);
+  if (clusters.seed != standard.seed) name += fmt::format("-seed-{}", clusters.seed);
+  return clusters.time == standard.time ? name : name + fmt::format("-at-{:g}", clusters.time);
 }
 
 // "volumes/head.nii.gz" is "head", as in the catalogue of a service.
@@ -70,18 +91,38 @@ ParameterTexts StandardParameters(const RendererKind& renderer) {
 
 }  // namespace
 
-BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
-  const bool hollow = sphere.sphere_class == SphereClass::kHollow, points = HasDepth(renderer->format());
-  const std::string dataset = SphereName(sphere);
+namespace {
+
+BenchCase MadeHere(const RendererKind* renderer, std::variant<SphereRequest, ClusterRequest, std::string> volume,
+                   const std::string& dataset, const std::string& what, double opacity) {
+  const bool points = HasDepth(renderer->format());
   return {.name = CaseName(*renderer, dataset) + (opacity == kOpaqueSphere && !points ? "-opaque" : ""),
-          .purpose = fmt::format("{} sphere, {} voxels a side, {:g} % occupied, opacity {:g} a voxel, {}", hollow ? "hollow" : "filled",
-                                 sphere.size, sphere.occupancy * 100, opacity, renderer->title()),
+          .purpose = fmt::format("{}, opacity {:g} a voxel, {}", what, opacity, renderer->title()),
           .dataset = dataset,
-          .volume = sphere,
+          .volume = std::move(volume),
           .renderer = renderer,
           .transfer = {SphereTransfer(opacity)},
           .opacity = opacity,
           .parameters = StandardParameters(*renderer)};
+}
+
+}  // namespace
+
+BenchCase SphereCase(const SphereRequest& sphere, double opacity, const RendererKind* renderer) {
+  const bool hollow = sphere.sphere_class == SphereClass::kHollow;
+  const std::string what =
+      fmt::format("{} sphere, {} voxels a side, {:g} % occupied", hollow ? "hollow" : "filled", sphere.size, sphere.occupancy * 100);
+  return MadeHere(renderer, sphere, SphereName(sphere), what, opacity);
+}
+
+BenchCase ClusterCase(const ClusterRequest& clusters, double opacity, const RendererKind* renderer) {
+  const std::string what =
+      fmt::format("{} balls, {} voxels a side, {:g} % occupied", clusters.balls, clusters.size, clusters.occupancy * 100);
+  return MadeHere(renderer, clusters, ClusterName(clusters), what, opacity);
+}
+
+BenchCase StandardClusters(int size, const RendererKind* renderer) {
+  return ClusterCase({.size = size}, HasDepth(renderer->format()) ? kOpaqueSphere : kTranslucentSphere, renderer);
 }
 
 BenchCase BrainCase(const RendererKind* renderer) {
@@ -116,10 +157,30 @@ const std::vector<BenchCase>& StandardBenchCases() {
   return cases;
 }
 
+namespace {
+
+// "class1-300", "clusters-512-0.02". Nothing: the text is no such name.
+std::optional<BenchCase> ParseMadeHere(const std::string& text) {
+  static const std::regex kName("(class1|class2|clusters)-([0-9]{1,5})(-(0\\.[0-9]{1,6}))?");
+  std::smatch parts;
+  if (!std::regex_match(text, parts, kName)) return std::nullopt;
+  const int size = std::stoi(parts[2]);
+  if (parts[1] == "clusters") {
+    ClusterRequest clusters{.size = size};
+    if (parts[4].matched) clusters.occupancy = std::stod(parts[4]);
+    return ClusterCase(clusters, kTranslucentSphere);
+  }
+  const SphereClass sphere_class = parts[1] == "class1" ? SphereClass::kHollow : SphereClass::kFilled;
+  return SphereCase({sphere_class, size, parts[4].matched ? std::stod(parts[4]) : StandardOccupancy(sphere_class)}, kTranslucentSphere);
+}
+
+}  // namespace
+
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   for (const BenchCase& standard : StandardBenchCases()) {
     if (standard.name == text) return standard;
   }
+  if (std::optional<BenchCase> made = ParseMadeHere(text)) return *std::move(made);
   Result<VolumeArgument> argument = ParseVolumeArgument("CASE", text, !at_service);
   if (!argument.ok()) return argument.status();
   BenchCase bench_case;
@@ -140,15 +201,22 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
   return bench_case;
 }
 
+std::optional<int> SideOf(const BenchCase& bench_case) {
+  if (const auto* sphere = std::get_if<SphereRequest>(&bench_case.volume)) return sphere->size;
+  if (const auto* clusters = std::get_if<ClusterRequest>(&bench_case.volume)) return clusters->size;
+  return std::nullopt;
+}
+
 Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_case) {
   if (const auto* path = std::get_if<std::string>(&bench_case.volume)) {
     Result<LoadedVolume> loaded = ReadInputVolume(*path);
     if (!loaded.ok()) return loaded.status();
     return std::move(loaded->volume);
   }
-  Result<Volume> sphere = MakeSphere(std::get<SphereRequest>(bench_case.volume));
-  if (!sphere.ok()) return sphere.status();
-  return std::make_shared<const Volume>(*std::move(sphere));
+  const auto* const sphere = std::get_if<SphereRequest>(&bench_case.volume);
+  Result<Volume> made = sphere != nullptr ? MakeSphere(*sphere) : MakeClusters(std::get<ClusterRequest>(bench_case.volume));
+  if (!made.ok()) return made.status();
+  return std::make_shared<const Volume>(*std::move(made));
 }
 
 ViewParameters BenchView(Projection projection, int index, int frames) {

@@ -9,21 +9,24 @@
 
 #include "common/frame/frame_request.h"
 #include "common/renderers/registry.h"
+#include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {
 
 struct BenchCase {
-  std::string name;                                 // in the table; fit for a file's name
-  std::string purpose;                              // one line for --list
-  std::string dataset;                              // the volume's name: cases of one volume share it, and at a service it is the dataset's
-  std::variant<SphereRequest, std::string> volume;  // made here, or a file's path (unused at a service)
+  std::string name;     // in the table; fit for a file's name
+  std::string purpose;  // one line for --list
+  std::string dataset;  // the volume's name: cases of one volume share it, and at a service it is the dataset's
+  std::variant<SphereRequest, ClusterRequest, std::string> volume;  // made here, or a file's path (unused at a service)
   const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
   ParameterTexts parameters;      // of the renderer; standard cases: one sample a voxel length, as other programs take by default
 };
+
+std::optional<int> SideOf(const BenchCase& bench_case);  // voxels, of a volume that is made here
 
 const std::vector<BenchCase>& StandardBenchCases();
 
@@ -32,11 +35,18 @@ BenchCase SphereCase(const SphereRequest& sphere, double opacity, const Renderer
 // With the occupancy of its class, 5 or 40 %. A renderer that shows surfaces gets an opaque one.
 BenchCase StandardSphere(SphereClass sphere_class, int size, const RendererKind* renderer = &DefaultRenderer());
 inline constexpr double kTranslucentSphere = 0.05, kOpaqueSphere = 0.9;
+// Sparse balls whose occupied voxels have this opacity.
+BenchCase ClusterCase(const ClusterRequest& clusters, double opacity, const RendererKind* renderer = &DefaultRenderer());
+// Surfaces for a renderer that shows them, else translucent.
+BenchCase StandardClusters(int size, const RendererKind* renderer = &DefaultRenderer());
+// Of spheres and clusters, but with only those values shown that occupied voxels have in the half of the volume where x is large.
+TransferFunction HalfShown(double opacity);
 // The MRI brain of Debian's package mricron-data.
 BenchCase BrainCase(const RendererKind* renderer = &DefaultRenderer());
 
-// A standard case's name, or FILE[:TRANSFER] of a volume file (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer.
-// NotFound, InvalidArgument: naming the text.
+// A standard case's name; class1-SIZE, class2-SIZE or clusters-SIZE, with -OCCUPANCY behind it or without; or FILE[:TRANSFER] of a volume
+// file
+// (`at_service`: NAME[:TRANSFER] of a dataset), with TRANSFER as in --transfer. NotFound, InvalidArgument: naming the text.
 Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service);
 
 // Makes or reads its volume. Never gets it from a service.

@@ -51,10 +51,11 @@ Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, in
               {"image_bytes", MedianOf(std::move(image_bytes)).median}};
 }
 
-double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight) {
-  const int measured = std::max(in_flight, kLeastMeasured), frames = measured + 2 * in_flight;
+double MeasurePeriod(Client& client, std::span<const FrameRequest> requests, int in_flight) {
+  const int frames = std::max(int(requests.size()), std::max(in_flight, kLeastMeasured) + 2 * in_flight), measured = frames - 2 * in_flight;
   int submitted = 0;
-  for (; submitted < in_flight; ++submitted) client.Submit(request);
+  const auto submit = [&] { client.Submit(requests[std::size_t(submitted++) % requests.size()]); };
+  while (submitted < in_flight) submit();
   std::vector<Time> received;
   while (int(received.size()) < frames) {
     const std::optional<ClientEvent> event = client.Next(kPatience);
@@ -63,7 +64,7 @@ double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight)
     const auto* picture = std::get_if<Picture>(&event->what);
     if (picture == nullptr || !picture->final) continue;
     received.push_back(MonotonicNow());
-    if (submitted < frames) client.Submit(request), ++submitted;
+    if (submitted < frames) submit();
   }
   const Duration middle = received[std::size_t(in_flight + measured) - 1] - received[std::size_t(in_flight) - 1];
   return Milliseconds(middle.count()) / measured;

@@ -1,6 +1,7 @@
-// Frames of a service, measured by its client: the same request over and over.
+// Frames of a service, measured by its client.
 #pragma once
 
+#include <span>
 #include "client/client.h"
 #include "laboratory/experiments/trial_log.h"
 
@@ -14,8 +15,9 @@ int WarmUpFrames(const Policy& policy);
 // Failure with the frame's.
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames);
 
-// Milliseconds from picture to picture, with `in_flight` frames requested ahead: over some frames in the middle, when the pipeline is full
-// and the last frames do not yet leave workers idle. Throws Failure with a frame's.
-double MeasurePeriod(Client& client, const FrameRequest& request, int in_flight);
+// Milliseconds from picture to picture, with `in_flight` frames requested ahead: over frames in the middle, when the pipeline is full and
+// the last frames do not yet leave workers idle. The requests come in their order, over and over if there are too few. Throws Failure with
+// a frame's.
+double MeasurePeriod(Client& client, std::span<const FrameRequest> requests, int in_flight);
 
 }  // namespace slabstream

@@ -26,9 +26,10 @@ struct OwnOptions {
   std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
   std::vector<int> workers;        // numbers of workers
   std::vector<const RendererKind*> renderers;
-  std::vector<std::string> views;         // sequences of views
+  std::vector<std::string> paths;         // of walks
+  std::vector<std::string> methods;       // of balance, by name
   std::vector<int> footprints;            // diameters of footprints, pixels
-  std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a sequence
+  std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a path
   ServiceChoice service;                  // a running service whose frames are measured, instead of this machine
   bool at_service() const { return !service.endpoint.empty() || !service.file.empty(); }
 };
@@ -92,6 +93,9 @@ const std::vector<Experiment>& Experiments();
 
 void RunPaper(ExperimentContext& context, Results& results);
 void DeclarePaper(CLI::App& app, OwnOptions& options);
+void RunPartitions(ExperimentContext& context, Results& results);
+void CheckPartitions(const ExperimentOptions& options);
+void DeclarePartitions(CLI::App& app, OwnOptions& options);
 void RunBalance(ExperimentContext& context, Results& results);
 void CheckBalance(const ExperimentOptions& options);
 void DeclareBalance(CLI::App& app, OwnOptions& options);

@@ -5,8 +5,10 @@ namespace slabstream {
 const std::vector<Experiment>& Experiments() {
   static const std::vector<Experiment> experiments = {
       {"paper", "every table and figure of Yagel and Machiraju, the paper's beside ours", RunPaper, DeclarePaper},
-      {"balance", "load balance of sparse volumes: partitions, views that move, a slow worker, and how good `auto` is", RunBalance,
-       DeclareBalance, CheckBalance},
+      {"partitions", "ways to divide sparse volumes, for one view, and how good `auto` is", RunPartitions, DeclarePartitions,
+       CheckPartitions},
+      {"balance", "ways to keep workers evenly loaded while a view, a look, a volume or a worker changes", RunBalance, DeclareBalance,
+       CheckBalance},
       {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", RunScaling},

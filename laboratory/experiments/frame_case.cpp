@@ -27,7 +27,6 @@ namespace {
 
 constexpr int kRenderings = 2;  // rounds of box costs
 constexpr int kFinishes = 3;
-constexpr DatasetId kPlannedDataset = 1;
 
 // Counts of non-empty pixels, tile by tile, in the smallest rectangle of tiles that holds all: [x, y, width, height, count, ...].
 Json CoverageJson(const CoverageMap& coverage) {
@@ -164,18 +163,24 @@ Json MeasureService(ExperimentContext& context, const FrameCase& frame, int fram
 
 // Relative to other frames: rendering grows with voxels and halos of boxes, and with pixels.
 double ExpectedEffort(const FrameCase& frame) {
-  const auto* sphere = std::get_if<SphereRequest>(&frame.volume.volume);
-  const double side = sphere != nullptr ? sphere->size : 200;
+  const double side = SideOf(frame.volume).value_or(200);
   const double halo = 2.0 * kHalo * std::cbrt(double(frame.workers) * std::max(1, frame.policy.groups));
   return side * side * (side + 3 * halo) * 1e-6 + double(frame.size.width) * frame.size.height * 2e-6 + 0.1;
 }
 
 }  // namespace
 
+namespace {
+
+// Two volumes are two datasets, as at a service, so that nothing is known of one from the other.
+DatasetId IdOf(const Json& identity) { return std::max<DatasetId>(1, std::stoull(DigestText(identity.dump()), nullptr, 16)); }
+
+}  // namespace
+
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame) {
   const FrameRequest request = RequestOf(frame);
   OrThrow(Validate(request));
-  return OrThrow(ResolveRequest(request, kPlannedDataset, context.volumes().Get(frame.volume).summary));
+  return OrThrow(ResolveRequest(request, IdOf(context.volumes().Identity(frame.volume)), context.volumes().Get(frame.volume).summary));
 }
 
 namespace {

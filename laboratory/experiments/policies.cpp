@@ -4,6 +4,7 @@
 
 #include "common/combining/schemes.h"
 #include "common/decomposition/decomposition.h"
+#include "common/planning/balances.h"
 
 namespace slabstream {
 
@@ -31,6 +32,30 @@ std::vector<NamedPolicy> PartitionsAlongTheView() {
                         {.decomposition = decomposition, .balance_by = "occupied", .axis = AxisChoice::kView, .groups = 1}});
   }
   return policies;
+}
+
+Policy Combined(Policy policy, std::string_view combine, int groups, std::string_view assignment) {
+  policy.combine = combine;
+  policy.groups = groups;
+  policy.assignment = assignment;
+  return policy;
+}
+
+std::vector<NamedPolicy> BalanceMethods() {
+  const Policy tree = BalancedTree().policy;
+  Policy equal = tree;
+  equal.balance_by = "voxels";
+  std::vector<NamedPolicy> methods = {{"slabs", EqualSlabs().policy},
+                                      {"equal", equal},
+                                      {"random", Combined(equal, equal.combine, kBoxesAWorker, "random")},
+                                      {"rebuilt", tree}};
+  for (const BalanceEntry& entry : Balances()) {
+    if (entry.change == nullptr) continue;
+    NamedPolicy& method =
+        methods.emplace_back(std::string(entry.name), entry.hands_over ? Combined(equal, equal.combine, kBoxesAWorker) : tree);
+    method.policy.balance = entry.name;
+  }
+  return methods;
 }
 
 std::vector<std::string> AllSchemes() {

@@ -1,7 +1,8 @@
-// Policies to compare, made from the planner's lists, so that a new partition or scheme is included automatically.
+// Policies to compare, made from the planner's lists, so that a new partition, balance or scheme is included automatically.
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/frame/frame_request.h"
@@ -9,7 +10,7 @@
 namespace slabstream {
 
 struct NamedPolicy {
-  std::string name;  // "kd-tree by occupied"
+  std::string name;  // "kd-tree by occupied", or of a method
   Policy policy;     // one group
 };
 
@@ -22,6 +23,14 @@ NamedPolicy BalancedTree();
 // Boxes cut along the traversal axis of the view, by occupied voxels: the least work at borders, but the most voxels to move when another
 // axis becomes the traversal axis.
 std::vector<NamedPolicy> PartitionsAlongTheView();
+// Ways to keep workers evenly loaded while a view moves. First those that never look at a time: "slabs", the paper's; "equal", boxes of
+// equal volume; "random", four of them a worker, with owners that are drawn; "rebuilt", BalancedTree(), cut anew when the transfer function
+// changes. Then that tree with every balance that changes boxes, by its name; those that hand over whole boxes get four of equal volume a
+// worker.
+std::vector<NamedPolicy> BalanceMethods();
+inline constexpr int kBoxesAWorker = 4;  // where a worker has several: with one box each there is no choice
+// The same policy, combined by `combine`.
+Policy Combined(Policy policy, std::string_view combine, int groups = 1, std::string_view assignment = "cyclic");
 // Every scheme, with its own arguments.
 std::vector<std::string> AllSchemes();
 // Schemes worth trying with each partition: a tree, a swap.

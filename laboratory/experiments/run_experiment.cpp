@@ -16,7 +16,8 @@
 #include "common/transport/socket.h"
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
-#include "laboratory/experiments/service_sweep.h"
+#include "laboratory/experiments/service_roster.h"
+#include "laboratory/experiments/subjects.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "laboratory/measure/other_load.h"
 
@@ -25,22 +26,27 @@ namespace {
 
 Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
+std::vector<BenchCase> ServedVolumes(const ExperimentOptions& options) {
+  if (options.sweep_file.empty()) return SubjectsAtService(options);
+  return OrThrow(ReadSweep(options.sweep_file, SweepPlace::kAtService)).volumes;
+}
+
 // Everything that decides the set of trials.
-Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
+Json Parameters(const ExperimentOptions& options, VolumeCache& cache) {
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
     parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
   }
-  const auto& [cases, workers, renderers, views, footprints, transfers, service] = options.own;
-  parameters["own"] = {{"cases", cases}, {"workers", workers},       {"renderers", Json::array()},
-                       {"views", views}, {"footprints", footprints}, {"transfers", Json::array()}};
+  const auto& [cases, workers, renderers, paths, methods, footprints, transfers, service] = options.own;
+  parameters["own"] = {{"cases", cases},     {"workers", workers},       {"renderers", Json::array()}, {"paths", paths},
+                       {"methods", methods}, {"footprints", footprints}, {"transfers", Json::array()}};
   for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
   for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
   if (options.own.at_service()) {
-    const Sweep sweep = OrThrow(ReadSweep(options.sweep_file, SweepPlace::kAtService));
-    parameters["service"] = DescribeService(service, sweep);
-    for (const BenchCase& volume : sweep.volumes) parameters["contents"].push_back(TransferJson(volume.transfer));
+    const std::vector<BenchCase> volumes = ServedVolumes(options);
+    parameters["service"] = DescribeService(service, volumes);
+    for (const BenchCase& volume : volumes) parameters["contents"].push_back(TransferJson(volume.transfer));
     return parameters;
   }
   // Texts that name files do not say what is in them.
@@ -48,7 +54,7 @@ Json Parameters(const ExperimentOptions& options, VolumeCache& volumes) {
   std::ranges::move(NamedVolumes("VOLUME", cases), std::back_inserter(named));
   parameters["contents"] = Json::array();
   for (const BenchCase& volume : named) {
-    parameters["contents"].push_back({{"volume", volumes.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
+    parameters["contents"].push_back({{"volume", cache.Identity(volume)}, {"transfer", TransferJson(volume.transfer)}});
   }
   return parameters;
 }

@@ -6,11 +6,6 @@
 
 namespace slabstream {
 
-// What decides the numbers of a sweep at the service beside the file: its roster, as [{"host", "threads"}, ...] in the order of hosts, and
-// its datasets that the sweep names. Throws Failure: those of ServiceConnection::OpenService and Client::QueryStatus; Unavailable: no
-// workers; NotFound: a dataset that the service does not have.
-Json DescribeService(const ServiceChoice& service, const Sweep& sweep);
-
 // Adds measured latency, period, render_time, longest_render_time, imbalance, idle_share and image_bytes of each frame, and attaches the
 // roster: its workers with host and threads. Throws Failure, also if the roster changes meanwhile.
 void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& results);

@@ -23,6 +23,18 @@ Json SphereJson(const SphereRequest& sphere) {
   return {{"class", int(sphere_class)}, {"size", size}, {"occupancy", occupancy}};
 }
 
+Json ClusterJson(const ClusterRequest& clusters) {
+  const auto& [size, occupancy, balls, seed, time] = clusters;
+  return {{"clusters", balls}, {"size", size}, {"occupancy", occupancy}, {"seed", seed}, {"time", time}};
+}
+
+// What is made here; null: the volume is read from a file.
+Json MadeJson(const BenchCase& volume) {
+  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) return SphereJson(*sphere);
+  if (const auto* clusters = std::get_if<ClusterRequest>(&volume.volume)) return ClusterJson(*clusters);
+  return {};
+}
+
 // `source`: a path, with options for reading it or without.
 std::string CanonicalSource(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
@@ -54,7 +66,7 @@ Json FileJson(const std::string& path, const Volume& volume) {
 // What a case's volume is made or read from: cases of one source have one volume.
 std::string SourceOf(const BenchCase& volume) {
   const auto* path = std::get_if<std::string>(&volume.volume);
-  return path != nullptr ? CanonicalSource(*path) : SphereJson(std::get<SphereRequest>(volume.volume)).dump();
+  return path != nullptr ? CanonicalSource(*path) : MadeJson(volume).dump();
 }
 
 }  // namespace
@@ -85,7 +97,7 @@ VolumeInUse VolumeCache::Get(const BenchCase& volume) {
 }
 
 Json VolumeCache::Identity(const BenchCase& volume) {
-  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) return SphereJson(*sphere);
+  if (Json made = MadeJson(volume); !made.is_null()) return made;
   const std::string source = SourceOf(volume);
   if (!read_.contains(source)) (void)Get(volume);
   return read_.at(source);
@@ -104,16 +116,14 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
 
 Json ColumnsOf(const BenchCase& volume) {
   Json columns = {{"volume", volume.dataset}};
-  if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) {
-    columns.update(Json{{"n", sphere->size}, {"occupancy", sphere->occupancy}});
-  }
+  if (const Json made = MadeJson(volume); !made.is_null()) columns.update(Json{{"n", made["size"]}, {"occupancy", made["occupancy"]}});
   return columns;
 }
 
-std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named) {
+std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named, bool at_service) {
   std::vector<BenchCase> volumes;
   for (const std::string& text : named) {
-    Result<BenchCase> parsed = ParseBenchCase(text, false);
+    Result<BenchCase> parsed = ParseBenchCase(text, at_service);
     if (!parsed.ok()) throw Failure(Status(parsed.status().code(), option + ": " + parsed.status().message()));
     volumes.push_back(*std::move(parsed));
     BenchCase& volume = volumes.back();

@@ -49,9 +49,9 @@ class VolumeCache {
 // The columns of results that a volume fills: volume; n and occupancy of spheres.
 Json ColumnsOf(const BenchCase& volume);
 
-// The volumes that a user named after `option`. Errors of ParseBenchCase. Their datasets differ, because tables and figures are called
-// after them: of two files v.nrrd the second is "v-2".
-std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named);
+// The volumes that a user named after `option`; `at_service`: datasets. Errors of ParseBenchCase. Their datasets differ, because tables and
+// figures are called after them: of two files v.nrrd the second is "v-2".
+std::vector<BenchCase> NamedVolumes(const std::string& option, const std::vector<std::string>& named, bool at_service = false);
 
 // NamedVolumes, or if there are none the installed real volumes, such as the brain, beside the spheres.
 std::vector<BenchCase> RealVolumes(const std::vector<std::string>& named);

@@ -3,6 +3,7 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <set>
 #include <utility>
 
 #include "common/base/time.h"
@@ -35,6 +36,12 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
     rendering.seconds = double((MonotonicNow() - begin).count()) * 1e-9;
   });
   return rendering;
+}
+
+void LabWorker::KeepOnly(std::span<const Box> boxes, const FrameSetup& setup) {
+  std::set<Box> padded;
+  for (const Box& box : boxes) padded.insert(PaddedBox(box, setup));
+  std::erase_if(boxes_, [&](const auto& held) { return !padded.contains(held.first); });
 }
 
 }  // namespace slabstream

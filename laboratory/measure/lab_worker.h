@@ -4,6 +4,7 @@
 
 #include <map>
 #include <memory>
+#include <span>
 
 #include "common/image/local_image.h"
 #include "common/mesh/mesh_part.h"
@@ -28,8 +29,10 @@ class LabWorker {
 
   // `box` lies inside the volume and is not empty; `setup` is of this volume (FramePlan::setup). Other boxes hide nothing. Runs on the
   // calling thread alone; one call at a time. The first rendering of a padded box cuts out its voxels (not timed) and makes the data that
-  // workers keep between frames (timed): classification, normals, occupied voxels. All padded boxes are kept.
+  // workers keep between frames (timed): classification, normals, occupied voxels. All padded boxes are kept, until KeepOnly.
   BoxRendering Render(const Box& box, const FrameSetup& setup);
+  // Drops what is held of all other boxes.
+  void KeepOnly(std::span<const Box> boxes, const FrameSetup& setup);
 
  private:
   const Volume& volume_;

@@ -61,8 +61,9 @@ def lines(
     log_y: bool = False,
     from_zero: bool = False,
     marks: bool = False,
+    markers: bool = True,
 ) -> Figure:
-    """A line for each name, with whiskers. All y are of one unit. `marks`: a tick at every x."""
+    """A line for each name, with whiskers. All y are of one unit. `marks`: a tick at every x. `markers`: False for many points."""
     data = {label: list(points) for label, points in series.items()}
     sizes = [abs(v.value) for points in data.values() for _, v in points]
     units = [v.unit for points in data.values() for _, v in points]
@@ -82,7 +83,7 @@ def lines(
             label=label,
             color=COLOURS[i % len(COLOURS)],
             linestyle=LINES[origin],
-            marker=MARKERS[i % len(MARKERS)],
+            marker=MARKERS[i % len(MARKERS)] if markers else "",
             markersize=5,
             markerfacecolor="white" if origin == "simulated" else None,
             linewidth=1.6,

@@ -14,7 +14,7 @@ TEXTS = (
     "experiment part volume view renderer decomposition axis balance_by assignment balance combine link variant stage metric unit noise origin "
     "commit machine"
 ).split()
-NUMBERS = "version n occupancy workers pixels groups teams share active k step box value low high repeats".split()
+NUMBERS = "version n occupancy workers pixels groups teams share active k box value low high repeats".split()
 
 
 class ResultsError(Exception):

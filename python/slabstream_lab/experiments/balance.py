@@ -1,420 +1,226 @@
-"""Load balance of sparse volumes: partitions, views that move, a slow worker, and what `auto` takes."""
+"""Ways to keep workers evenly loaded while a view, a transfer function, a volume or a worker changes."""
 from __future__ import annotations
 
-import statistics
 from collections import Counter
 from typing import Any, Mapping, Sequence
-
-import pandas
 
 from .. import plots
 from ..page import Page, Section, Table
 from ..ranking import Ranking, decide, rankings, ties_text
-from ..results import Run, value_of
-from ..value import Value, number_text, speed_text
+from ..results import ResultsError, Run, value_of
+from ..value import Value, speed_text
 
-LINK, SCHEME = "10gbit", "radix-k"
-SLABS = "slab by voxels, static"  # what other methods are compared with
+OURS = "kd-tree by occupied, dynamic"
+STAYS = "kd-tree by occupied"  # the same boxes, which stay
+BOUND = "shared out perfectly"
+SOURCES = {
+    "slab by voxels": "Yagel and Machiraju, 1995",
+    "kd-tree by voxels": "boxes of equal volume",
+    "kd-tree by voxels, 4 boxes a worker, random": "boxes of equal volume, owners drawn",
+    STAYS: "boxes of equal occupied voxels, cut anew when the transfer function changes, which Zellmann, Schulze and Lang made quick, 2018",
+    "kd-tree by occupied, planes": "after Marchesin, Mongenet and Dischler, 2006",
+    "kd-tree by voxels, 4 boxes a worker, handover": "a simple form of Walldén, Markidis, Okita and Ino, 2019",
+    OURS: "what the service does with --balance dynamic",
+}
 
-Subject = tuple[str, str]  # volume and renderer
+Case = tuple[str, str, int, str]  # volume, renderer, p and path
 
 
 def page(run: Run) -> Page:
-    subjects: list[Subject] = [
-        (volume, renderer)
-        for volume in run.distinct("volume", part="policy")
-        for renderer in run.distinct("renderer", part="policy", volume=volume)
-    ]
+    cases = _cases(run)
+    subjects = list(dict.fromkeys(case[:2] for case in cases))
     return Page(
-        "Load balance of sparse volumes",
-        "Where most voxels are empty, boxes of equal size take unequal times, and a frame waits for the slowest worker. How much does that "
-        "cost, and which way to divide a volume avoids it? Static balance keeps its boxes. Dynamic balance changes them between frames, by "
-        "the times that earlier frames took.",
+        "Load balance along paths",
+        "Where most voxels are empty, boxes of equal size take unequal times, and a frame waits for the worker that renders longest. "
+        "Which way to divide a volume keeps that worker's time short while the view, the transfer function, the volume or a worker changes, "
+        "and what does it move?",
         [
-            _winners(run, subjects),
-            _efficiency(run, subjects),
-            _automatic(run, subjects),
-            *[_sequence(run, subject) for subject in subjects],
-            _slowed(run, subjects),
-            _prediction(run, subjects),
-            _assignments(run, subjects),
+            _methods(run),
+            _winners(run, cases),
+            *[_paths(run, subject, [case for case in cases if case[:2] == subject]) for subject in subjects],
+            _settling(run, cases),
         ],
     )
 
 
-def _partition(row: pandas.Series) -> str:
-    return f"{row['decomposition']} by {row['balance_by']}"
+def _cases(run: Run) -> list[Case]:
+    rows = run.select(part="path", metric="longest_render_time", variant=None)
+    return list(dict.fromkeys((row["volume"], row["renderer"], int(row["workers"]), row["view"]) for _, row in rows.iterrows()))
 
 
-def _method(row: pandas.Series) -> str:
-    return f"{_partition(row)}, {row['balance']}"
+def _method(row: Mapping[str, Any]) -> str:
+    name = f"{row['decomposition']} by {row['balance_by']}"
+    if row["groups"] > 1:
+        name += f", {int(row['groups'])} boxes a worker"
+    if row["assignment"] != "cyclic":
+        name += f", {row['assignment']}"
+    return name if row["balance"] == "static" else f"{name}, {row['balance']}"
 
 
-def _by(rows: pandas.DataFrame, name: Any) -> dict[str, Value]:
-    return {name(row): value_of(row) for _, row in rows.iterrows()}
+def _values(run: Run, case: Case, metric: str, variant: str | None = None) -> dict[str, Value]:
+    """By method."""
+    volume, renderer, p, path = case
+    rows = run.select(part="path", metric=metric, variant=variant, volume=volume, renderer=renderer, workers=p, view=path)
+    return {_method(row): value_of(row) for _, row in rows.iterrows()}
 
 
-def _shared(run: Run, part: str, subject: Subject) -> list[int]:
-    """The numbers of workers, above one."""
-    return [p for p in sorted(run.distinct("workers", part=part, volume=subject[0], renderer=subject[1])) if p > 1]
+def _text(case: Case) -> str:
+    volume, renderer, p, path = case
+    return f"{volume}, {renderer}, p = {p}, {path}"
 
 
-def _of(count: int, all_: int, noun: str) -> str:
-    return f"{count} of {all_} {noun}{'' if all_ == 1 else 's'}"
+def _of(count: int, all_: int) -> str:
+    return f"{count} of {all_} case{'' if all_ == 1 else 's'}"
 
 
-def _slug(run: Run, subject: Subject) -> str:
-    """Of the names of plots: the renderer only where there are several."""
-    return "-".join(subject if len(run.distinct("renderer", part="policy")) > 1 else subject[:1]).replace(".", "-")
+def _methods(run: Run) -> Section:
+    rows = run.select(part="path", metric="longest_render_time", variant=None)
+    named = dict.fromkeys(_method(row) for _, row in rows.iterrows())
+    measured = "latency" in set(run.select(part="path", origin="measured")["metric"])
+    how = (
+        "Frames of a service with real processes, one in flight. "
+        if measured
+        else "The boxes of each frame are rendered alone on one thread. The times are learnt as a coordinator learns them, by its own table of "
+        "layouts. A box that its worker did not draw in the frame before is rendered with all that must be made for it. "
+    )
+    return Section(
+        "Methods and paths",
+        "What is compared?",
+        how + "The first frame of a path counts nowhere but in memory. Paths have small steps, since what one frame tells of the next depends "
+        "on how far their views lie apart.",
+        "",
+        [Table("Methods", ["method", "where it comes from"], [[name, SOURCES.get(name, "of this program")] for name in named])],
+    )
 
 
-def _workers_of(run: Run, part: str) -> int:
-    return run.distinct("workers", part=part)[0]
-
-
-def _latencies(run: Run, subject: Subject, p: int) -> dict[str, Value]:
-    """Of the partitions with one group in the view of the partition section."""
-    of = {"part": "policy", "metric": "latency", "volume": subject[0], "renderer": subject[1]}
-    return _by(run.select(workers=p, groups=1, combine=SCHEME, link=LINK, **of), _partition)
-
-
-def _ahead_text(ranked: Sequence[Ranking], least: str) -> str:
-    """In how many cases one method alone has the least of something, and which."""
+def _ahead_text(ranked: Sequence[Ranking]) -> str:
+    """In how many cases one method alone is ahead, and which."""
     winners = Counter(found.ordered[0] for found in ranked if found.decided and len(found.best) == 1)
     undecided = sum(not found.decided for found in ranked)
-    text = f"One method alone {least} in {_of(winners.total(), len(ranked), 'case')}"
-    text += " (" + ", ".join(f"{name}: {count}" for name, count in winners.most_common()) + ")" if winners else ""
+    text = f"One method alone has the shortest longest render time in {_of(winners.total(), len(ranked))}"
+    text += " (" + "; ".join(f"{name}: {count}" for name, count in winners.most_common()) + ")" if winners else ""
     return text + f"; several tie in {len(ranked) - winners.total() - undecided}; the repeats do not decide {undecided}."
 
 
-def _winners(run: Run, subjects: list[Subject]) -> Section:
-    cases: dict[tuple, dict[str, Value]] = {}
-    for volume, renderer in subjects:
-        for p in _shared(run, "sequence", (volume, renderer)):
-            for view in run.distinct("view", part="sequence"):
-                for metric in ("latency", "imbalance"):
-                    of = {"part": "sequence", "volume": volume, "renderer": renderer, "workers": p, "view": view}
-                    cases[metric, volume, renderer, p, view] = _by(run.select(metric=metric, step=None, **of), _method)
-    ranked = rankings(cases)
+def _winners(run: Run, cases: list[Case]) -> Section:
+    ranked = rankings({case: _values(run, case, "longest_render_time") for case in cases})
     rows = []
-    for (metric, *case), found in ranked.items():
-        if metric == "latency":
-            first, values, than = found.ordered[0], found.values, "equal slabs themselves"
-            if first != SLABS:
-                than = speed_text(values[SLABS].over(values[first]), found.outcome(first, SLABS), "equal slabs")
-            rows.append([*case, values[SLABS], found.sentence(), values[first], than, ranked["imbalance", *case].sentence()])
-    fastest, most_even = ([found for (metric, *_), found in ranked.items() if metric == wanted] for wanted in ("latency", "imbalance"))
+    for case, found in ranked.items():
+        first = found.ordered[0]
+        later = [_values(run, case, metric) for metric in ("period", "latency")]
+        least = [min(values, key=lambda name: values[name].value) if values else None for values in later]
+        speed = speed_text(found.values[OURS].over(found.values[first]), found.outcome(first, OURS), OURS) if first != OURS else ""
+        rows.append([*case, found.sentence(), speed, *least])
     return Section(
         "Which method wins where",
-        "Which partition, with static or dynamic balance, shows a moving view soonest?",
-        _moving_method(run) + " Methods are ranked by the mean latency of the steps, in parentheses, which is simulated, and by their mean "
-        "imbalance, which is measured.",
-        f"{_ahead_text(fastest, 'is fastest')} {_ahead_text(most_even, 'has the least imbalance')} {ties_text(ranked)}." if rows else "",
+        "With which method does the slowest worker render shortest?",
+        "Methods are ranked by the longest render time of a frame, in its mean over the path (in parentheses), which is measured. Period and "
+        "latency follow from it and from combining; their columns name the method with the least value, whether it ties or not.",
+        f"{_ahead_text(list(ranked.values()))} {ties_text(ranked)}." if rows else "",
         [
             Table(
-                "Least latency and least imbalance",
-                ["volume", "renderer", "p", "views", "equal slabs", "fastest", "latency of the first", "the first is", "most even"],
+                "Shortest longest render time",
+                ["volume", "renderer", "p", "path", "shortest", "the first is", "least period", "least latency"],
                 rows,
             )
         ],
     )
 
 
-def _moving_method(run: Run) -> str:
-    steps = int(run.select(part="sequence")["step"].max()) + 1
-    return (
-        f"Each sequence has {steps} steps. The boxes of each step are rendered alone on one thread; frames are simulated one at a time "
-        f"on a network of 10 Gbit/s, combined by {SCHEME}, one group. Where boxes change between steps, workers fetch the voxels that they lack "
-        "before they render, and that time counts."
-    )
-
-
-def _efficiency(run: Run, subjects: list[Subject]) -> Section:
-    table = Table(
-        "Efficiency and its factors",
-        "volume,renderer,p,partition,imbalance,efficiency,= balance,x extra work,x combining,voxels of a worker".split(","),
-        [],
-    )
-    blocks: list[Any] = []
-    most: dict[tuple[str, str], dict[str, Value]] = {}  # imbalances at the greatest p
-    for volume, renderer in subjects:
-        of = {"volume": volume, "renderer": renderer}
-        name = _slug(run, (volume, renderer))
-        whole = run.value("render_time", part="partition", workers=1, **of)
-        alone = run.value("latency", part="policy", workers=1, link=LINK, **of)
-        shared = _shared(run, "partition", (volume, renderer))
-        imbalances: dict[str, dict[int, Value]] = {}
-        efficiencies: dict[str, dict[int, Value]] = {}
-        for p in shared:
-            latencies = _latencies(run, (volume, renderer), p)
-            columns = {
-                metric: _by(run.select(part="partition", metric=metric, workers=p, **of), _partition)
-                for metric in ("imbalance", "render_time", "longest_render_time", "memory")
-            }
-            for partition, latency in latencies.items():
-                total, longest = columns["render_time"][partition], columns["longest_render_time"][partition]
-                efficiency = alone.over(latency).times(1 / p).percent()
-                imbalances.setdefault(partition, {})[p] = columns["imbalance"][partition]
-                efficiencies.setdefault(partition, {})[p] = efficiency
-                table.rows.append(
-                    [
-                        volume,
-                        renderer,
-                        p,
-                        partition,
-                        columns["imbalance"][partition],
-                        efficiency,
-                        total.over(longest).times(1 / p).percent(),
-                        whole.over(total).percent(),
-                        longest.over(latency).over(whole.over(alone)).percent(),
-                        columns["memory"][partition],
-                    ]
-                )
-            if p == shared[-1]:
-                most[volume, renderer] = columns["imbalance"]
-        for split in ("voxels", "occupied"):
-            blocks.append(
-                plots.lines(
-                    f"imbalance-{name}-{split}",
-                    f"{volume}, {renderer}: imbalance, boxes of equal {'voxels' if split == 'voxels' else 'occupied voxels'}",
-                    {q: list(by_p.items()) for q, by_p in imbalances.items() if q.endswith(split)},
-                    "workers",
-                    "longest / mean render time",
-                    "1 is perfect. A worker whose box shows nothing counts with no time.",
-                    log_x=True,
-                    log_y=True,
-                    marks=True,
-                )
-            )
-        blocks.append(
-            plots.lines(
-                f"efficiency-{name}",
-                f"{volume}, {renderer}: efficiency, boxes of equal occupied voxels",
-                {q: list(by_p.items()) for q, by_p in efficiencies.items() if q.endswith("occupied") or q == "slab by voxels"},
-                "workers",
-                "efficiency",
-                "Latency of one worker over p times the latency of p workers.",
-                log_x=True,
-                from_zero=True,
-                marks=True,
-            )
-        )
-        for partition, decomposition in (("slab by voxels", "slab"), ("kd-tree by occupied", "kd-tree")):
-            boxes = run.attached(f"boxes-{volume}-{renderer}-{decomposition}")
-            title = f"{volume}, {renderer}: {partition}, p = {_workers_of(run, 'box')}"
-            caption = "Render time of every box that the cut meets."
-            blocks.append(plots.cuts(f"boxes-{name}-{partition.replace(' ', '-')}", title, boxes, caption))
-    view = run.distinct("view", part="partition")[0]
-    pixels = run.distinct("pixels", part="partition")[0]
-    return Section(
-        "Partitions: imbalance and efficiency",
-        "Which partition gives workers equal work, and what is lost to imbalance, to extra work and to combining?",
-        f"One view (azimuth/elevation {view}), {pixels} x {pixels} pixels, one box a worker. Every box is rendered alone on one thread. "
-        "Imbalance is the longest of the workers' render times over their mean. Efficiency is the latency of one worker, T(1), over p "
-        f"times that of p workers, T(p), simulated on a network of 10 Gbit/s and combined by {SCHEME}. In each repeat its three factors "
-        "multiply exactly: balance is mean over longest render time; extra work is the render time of the whole volume by one worker over "
-        "the sum of the boxes' render times; combining is the rest: the share of the frame in which the slowest worker renders, over the "
-        "same share with one worker. A factor above 100 % is a gain. The table has medians over the repeats, whose product may differ a "
-        "little. The voxels of a worker include the halo and are those of the fullest.",
-        _least_imbalance(f"Least imbalance at p = {shared[-1]}", most) if most else "",
-        blocks + [table],
-    )
-
-
-def _least_imbalance(what: str, cases: dict[tuple[str, str], dict[str, Value]]) -> str:
-    ranked = rankings(cases)
-    return f"{what}: " + "; ".join(f"{volume} ({renderer}): {found.sentence()}" for (volume, renderer), found in ranked.items()) + "."
-
-
-def _automatic(run: Run, subjects: list[Subject]) -> Section:
-    rows, ratios = [], []
-    for volume, renderer in subjects:
-        for p in _shared(run, "auto", (volume, renderer)):
-            for link in run.distinct("link", part="auto"):
-                of = {"volume": volume, "renderer": renderer, "workers": p, "link": link}
-                chosen = run.select(part="auto", metric="latency", **of).iloc[0]
-                tried = _by(run.select(part="policy", metric="latency", **of), _policy)
-                best = min(tried, key=lambda name: tried[name].value)
-                own = tried[best].value >= chosen["value"]
-                least = value_of(chosen) if own else tried[best]
-                ratio = value_of(chosen).over(least)
-                ratios.append(ratio.value)
-                rows.append([volume, renderer, p, link, _policy(chosen), value_of(chosen), "its own" if own else best, least, ratio])
-    answer = ""
-    if rows:
-        median, worst = statistics.median(ratios), max(range(len(ratios)), key=ratios.__getitem__)
-        answer = (
-            f"By the simulation, the latency of auto is {number_text(median, 3)} times that of the best policy in the median of "
-            f"{len(ratios)} cases: {'within' if median <= 1.1 else 'not within'} 10 %. It is {number_text(ratios[worst], 3)} times in the worst case: "
-            f"{rows[worst][0]}, {rows[worst][1]}, p = {rows[worst][2]}, {rows[worst][3]}."
-        )
-    return Section(
-        "How good auto is",
-        "How far is the policy that auto takes from the best one?",
-        "The policy auto chooses before it has seen a frame, by simulating estimated boxes on a machine with standard constants. Its "
-        "choice and all policies of the lists are then simulated with measured boxes, as above: all partitions, 1 and 2 groups, cyclic, "
-        f"{', '.join(run.distinct('combine', part='policy'))}. It may also take a policy outside these lists. "
-        "If its own is the best of all, the ratio is 1. The ratio is found repeat by repeat.",
-        answer,
-        [
-            Table(
-                "auto and the best policy",
-                ["volume", "renderer", "p", "link", "auto takes", "auto", "the best", "best", "auto / best"],
-                rows,
-            )
-        ],
-    )
-
-
-def _policy(row: pandas.Series) -> str:
-    groups = int(row["groups"])
-    return f"{_partition(row)}, {groups} group{'' if groups == 1 else 's'}, {row['assignment']}, {row['combine']}"
-
-
-def _sequence(run: Run, subject: Subject) -> Section:
-    volume, renderer = subject
-    of = {"part": "sequence", "volume": volume, "renderer": renderer, "link": LINK}
+def _paths(run: Run, subject: tuple[str, str], cases: list[Case]) -> Section:
+    columns = {
+        "longest": ("longest_render_time", None),
+        "95 % of frames": ("longest_render_time", "95 % of frames"),
+        "worst frame": ("longest_render_time", "worst frame"),
+        "sum": ("render_time", None),
+        "imbalance": ("imbalance", None),
+        "period": ("period", None),
+        "latency": ("latency", None),
+        "moved a frame": ("voxel_bytes", None),
+        "time to move": ("move_share", None),
+        "fullest worker": ("memory", None),
+    }
+    speeds: dict[tuple[Case, str], Value] = {}
+    found: dict[Case, dict[str, dict[str, Value]]] = {}
+    for case in cases:
+        found[case] = {name: _values(run, case, *of) for name, of in columns.items()}
+        longest = found[case]["longest"]
+        changing = [name for name in longest if name.startswith(STAYS) and name != STAYS]
+        speeds |= {(case, name): longest[STAYS].over(longest[name]) for name in changing if STAYS in longest}
+    outcomes = decide(speeds)
     rows, blocks = [], []
-    workers = _shared(run, "sequence", subject)
-    speeds: dict[tuple, Value] = {}  # of dynamic balance against static, and the same of imbalance, which is measured
-    for view in run.distinct("view", **of):
-        for p in workers:
-            for metric in ("latency", "imbalance"):
-                values = _by(run.select(metric=metric, view=view, workers=p, step=None, **of), _method)
-                speeds |= {(metric, view, p, method): speed for method, speed in _dynamic_over_static(values).items()}
-    outcomes = decide(speeds)
-    for view in run.distinct("view", **of):
-        for p in workers:
-            values = {
-                metric: _by(run.select(metric=metric, view=view, workers=p, step=None, **of), _method)
-                for metric in ("latency", "imbalance", "voxel_bytes")
-            }
-            for method, latency in values["latency"].items():
-                case = ("latency", view, p, method)
-                speed = speed_text(speeds[case], outcomes[case], "static") if case in speeds else ""
-                rows.append([view, p, method, latency, values["imbalance"][method], values["voxel_bytes"][method], speed])
-        if not workers:
-            continue
-        p = workers[len(workers) // 2]
-        for metric, what in (("imbalance", "longest / mean render time"), ("latency", "latency")):
-            steps = run.select(metric=metric, view=view, workers=p, **of)
-            steps = steps[steps["step"].notna()]
-            series = {method: plots.points_of(group, "step") for method, group in steps.groupby(steps.apply(_method, axis=1), sort=False)}
-            name = f"{metric}-{view}-{_slug(run, subject)}"
-            even = metric == "imbalance"
-            title = f"{volume}, {view}, p = {p}: {what}"
-            blocks.append(plots.lines(name, title, series, "step", what, log_y=even, from_zero=not even, marks=True))
+    for case, by_column in found.items():
+        for method in by_column["longest"]:
+            values = {name: by_method.get(method) for name, by_method in by_column.items()}
+            shared = values.pop("sum")
+            if values["time to move"] is not None:
+                values["time to move"] = values["time to move"].percent()
+            text = speed_text(speeds[case, method], outcomes[case, method], "boxes that stay") if (case, method) in speeds else ""
+            bound = shared.times(1 / case[2]) if shared is not None else None
+            rows.append([case[3], case[2], method, values.pop("longest"), bound, *values.values(), text])
+    most_usual = cases[0][2]
+    for case in cases:
+        if case[2] == most_usual:
+            blocks += _plots(run, subject, case)
+    names = ["path", "p", "method", "longest", BOUND, *[name for name in columns if name not in ("longest", "sum")], "it is"]
     return Section(
-        f"Moving views: {volume}, {renderer}",
-        "Does dynamic balance keep workers even while the view changes, and what does it move?",
-        _moving_method(run) + " Latency, imbalance and the voxels that workers fetch for a frame are means over the steps; these "
-        "include the first steps, in which dynamic balance has nothing to go by yet.",
-        _dynamic_text(outcomes) if outcomes else "",
-        blocks
-        + [
-            Table(
-                f"{volume}: means over a sequence",
-                ["views", "p", "method", "latency", "imbalance", "voxels fetched", "dynamic is"],
-                rows,
-            )
-        ],
+        f"Paths: {subject[0]}, {subject[1]}",
+        "What do boxes that change gain over boxes that stay, and what do they move?",
+        f"Render times and the bytes that all workers fetch are means over the frames. “{BOUND}”: the sum over the boxes, shared out among "
+        "the workers without any loss; work stealing cannot be better with these boxes. “Time to move”: the share of the path's time in which the "
+        "worker that receives most receives voxels, at the link's rate, while rendering waits. Latency and period are means over every "
+        "twelfth frame.",
+        _against_boxes_that_stay(outcomes) if outcomes else "",
+        blocks + [Table(f"{subject[0]}: paths", names, rows)],
     )
 
 
-def _dynamic_over_static(values: Mapping[str, Value]) -> dict[str, Value]:
-    """By dynamic method: how much less it takes than the same method with static balance, as a speed."""
-    dynamic = {method: value for method, value in values.items() if method.endswith("dynamic")}
-    return {method: values[method.replace("dynamic", "static")].over(value) for method, value in dynamic.items()}
-
-
-def _dynamic_text(outcomes: Mapping[tuple, str]) -> str:
-    """From the outcomes of dynamic balance against static balance: the first of a key says of what."""
+def _against_boxes_that_stay(outcomes: Mapping[tuple[Case, str], str]) -> str:
     texts = []
-    words = {"latency": ("faster than static", "slower", "as fast"), "imbalance": ("more even", "less even", "as even")}
-    for metric, (more, less, same) in words.items():
-        counts = Counter(outcome for key, outcome in outcomes.items() if key[0] == metric)
-        text = f"{more} in {_of(counts['faster'], counts.total(), 'case')}, {less} in {counts['slower']}, {same} (ties) in {counts['tie']}"
-        texts.append(text + (f"; {counts['open']} are not ranked" if counts["open"] else ""))
-    return f"Dynamic balance is {'. By imbalance it is '.join(texts)}."
+    for method in dict.fromkeys(name for _, name in outcomes):
+        counts = Counter(outcome for (_, name), outcome in outcomes.items() if name == method)
+        balance = method.rpartition(", ")[2]
+        text = f"With balance {balance} the longest render time is shorter than with boxes that stay in {_of(counts['faster'], counts.total())}, "
+        text += f"longer in {counts['slower']}, as long (ties) in {counts['tie']}"
+        texts.append(text + (f"; {counts['open']} are not ranked" if counts["open"] else "") + ".")
+    return " ".join(texts)
 
 
-def _slowed(run: Run, subjects: list[Subject]) -> Section:
-    speeds: dict[tuple, Value] = {}
-    latencies = []
-    for volume, renderer in subjects:
-        of = {"volume": volume, "renderer": renderer, "link": LINK}
-        for p in _shared(run, "slowed", (volume, renderer)):
-            view = run.distinct("view", part="slowed")[0]
-            at = {"view": view, "workers": p, **of}
-            alike = _by(run.select(part="sequence", metric="latency", step=None, **at), _method)
-            slow = _by(run.select(part="slowed", metric="latency", step=None, **at), _method)
-            imbalances = _by(run.select(part="slowed", metric="imbalance", step=None, **at), _method)
-            for metric, values in (("latency", slow), ("imbalance", imbalances)):
-                speeds |= {(metric, volume, renderer, p, method): speed for method, speed in _dynamic_over_static(values).items()}
-            latencies += [(volume, renderer, p, view, method, alike[method], slow[method]) for method in slow]
-    outcomes = decide(speeds)
-    rows = []
-    for volume, renderer, p, view, method, alike_, slow_ in latencies:
-        case = ("latency", volume, renderer, p, method)
-        text = speed_text(speeds[case], outcomes[case], "static") if case in speeds else ""
-        rows.append([volume, renderer, p, view, method, alike_, slow_, slow_.over(alike_), text])
-    return Section(
-        "A worker at half speed",
-        "One worker takes twice as long for every box. Does dynamic balance give it less to do?",
-        "As under moving views, but the render times of worker 1 are doubled, before they are learnt as well. Both latencies are means "
-        "over the steps of the same views.",
-        _dynamic_text(outcomes) if outcomes else "",
-        [Table("Latency", ["volume", "renderer", "p", "views", "method", "all alike", "one slow", "slow / alike", "dynamic is"], rows)],
-    )
+def _plots(run: Run, subject: tuple[str, str], case: Case) -> list[Any]:
+    try:
+        steps = run.attached(f"path-{subject[0]}-{subject[1]}-{case[3]}")
+    except ResultsError:
+        return []
+    name = f"path-{subject[0]}-{subject[1]}-{case[3]}".replace(".", "-")
+    series = {
+        method: [(row["step"], Value.exact(row["longest_render_time"], "s")) for _, row in rows.iterrows() if row["step"] > 0]
+        for method, rows in steps.groupby(steps.apply(_method, axis=1), sort=False)
+    }
+    title = f"{_text(case)}: longest render time"
+    return [plots.lines(name, title, series, "frame", "longest render time", "Medians over the repeats.", log_y=True, markers=False)]
 
 
-def _prediction(run: Run, subjects: list[Subject]) -> Section:
-    rows, medians = [], []
-    for volume, renderer in subjects:
-        found = run.select(part="box", volume=volume, renderer=renderer)
-        for partition, boxes in found.groupby(found.apply(_partition, axis=1), sort=False):
-            times = boxes.pivot(index="box", columns="metric", values="value")
-            times = times[times["box_time"] > 0]
-            errors = (times["estimated_box_time"] / times["box_time"] - 1).abs()
-            if errors.empty:
-                continue
-            total = times["estimated_box_time"].sum() / times["box_time"].sum()
-            shares = ((times["estimated_box_time"] / total) / times["box_time"] - 1).abs()
-            medians.append(float(errors.median()))
-            found_errors = (errors.median(), errors.quantile(0.9), shares.median(), shares.quantile(0.9))
-            percent = [Value.exact(float(x) * 100, "%") for x in found_errors]
-            rows.append([volume, renderer, int(boxes["workers"].iloc[0]), partition, len(errors), Value.exact(float(total)), *percent])
+def _settling(run: Run, cases: list[Case]) -> Section:
+    rows: list[Sequence[Any]] = []
+    ours = []
+    methods = list(dict.fromkeys(_method(row) for _, row in run.select(part="path", metric="settling_frames").iterrows()))
+    for case in cases:
+        values = _values(run, case, "settling_frames")
+        if not values:
+            continue
+        rows.append([*case, *[values.get(method) for method in methods]])
+        if OURS in values:
+            ours.append(values[OURS].value)
     answer = ""
-    if medians:
-        least, most = f"{min(medians) * 100:.0f}", f"{max(medians) * 100:.0f}"
-        answer = f"The median error of a partition's boxes is {least if least == most else f'from {least} to {most}'} %."
-    columns = ["volume", "renderer", "p", "partition", "boxes", "sum expected / measured"]
-    columns += ["median error", "90 % error", "median error of shares", "90 % error of shares"]
+    if ours:
+        least, most = min(ours), max(ours)
+        answer = f"Dynamic balance settles after {least:.0f}" + (f" to {most:.0f}" if most > least else "") + " frames in the median of the repeats."
     return Section(
-        "Expected and measured times of boxes",
-        "How well does the planner know what a box will take, before it has seen a frame?",
-        "The same boxes as under partitions. The error of a box is expected over measured time, less one, without its sign; nine of ten "
-        "boxes have at most the 90 % error. A common factor does not change a partition: the last columns give the errors once the "
-        "expected times are scaled to the measured sum.",
+        "Frames until balanced again",
+        "After a change in the middle of a path, how many frames does a method take to settle?",
+        "Frames from the change on, until the longest render time stays within a tenth of its median in the last quarter of the path for three "
+        "frames. A method that keeps its boxes settles at once, at whatever imbalance it has then.",
         answer,
-        [Table("Errors", columns, rows)],
+        [Table("Frames", ["volume", "renderer", "p", "path", *methods], rows)] if rows else [],
     )
 
-
-def _assignments(run: Run, subjects: list[Subject]) -> Section:
-    rows, cases = [], {}
-    for volume, renderer in subjects:
-        found = run.select(part="assignment", metric="imbalance", volume=volume, renderer=renderer)
-        values = _by(found, lambda row: f"{_partition(row)}, {row['assignment']}")
-        names = run.distinct("assignment", part="assignment")
-        for partition in dict.fromkeys(found.apply(_partition, axis=1)):
-            rows.append([volume, renderer, partition, *[values[f"{partition}, {name}"] for name in names]])
-        cases[volume, renderer] = values
-    p, groups = _workers_of(run, "assignment"), run.distinct("groups", part="assignment")[0]
-    return Section(
-        "Assignments",
-        f"With {groups} boxes a worker, who should own which?",
-        f"p = {p}, {groups} groups. Imbalance as above, from the workers' sums over their boxes.",
-        _least_imbalance("Least imbalance", cases),
-        [Table("Imbalance by assignment", ["volume", "renderer", "partition", *run.distinct("assignment", part="assignment")], rows)],
-    )

@@ -83,7 +83,7 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
   EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
             Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, contiguous, random, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic, planes"));
+            Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic, planes, handover"));
   EXPECT_EQ(
       status([](auto& r) { r.policy.combine = "mix"; }, FullRoster(1)),
       Status::InvalidArgument("policy.combine 'mix' is not one of fan-in, centralized, chain, tree, radix-k, binary-swap, direct-send"));

@@ -1,10 +1,12 @@
 // A key holds all that decides the numbers of its trial: no two cases that are measured differently share one.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,7 +17,7 @@
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/sweep_file.h"
-#include "laboratory/experiments/view_sequence.h"
+#include "laboratory/experiments/walk.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -146,7 +148,7 @@ FrameCase Example() {
   return frame;
 }
 
-ViewSequence SequenceOf(const FrameCase& frame, int steps) { return {frame, &ViewMotions().front(), steps, std::nullopt, false}; }
+Walk WalkOf(const FrameCase& frame, int frames) { return {frame, FindPath("turntable"), frames, std::nullopt}; }
 
 // Changes of a part, as changes of the whole.
 template <class Whole, class Part>
@@ -229,10 +231,10 @@ TEST_F(Keys, EveryFieldOfARequestIsInItsJson) {
 }
 
 TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
-  enum Kind : unsigned { kBoxes = 1, kPicture = 2, kService = 4, kValidation = 8, kBalanced = 16, kSequence = 32, kAll = 63 };
+  enum Kind : unsigned { kBoxes = 1, kPicture = 2, kService = 4, kValidation = 8, kBalanced = 16, kWalk = 32, kAll = 63 };
   const auto keys_of = [&](const FrameCase& frame) {
     return std::vector<Json>{BoxCostKey(context_, frame),       FinishKey(context_, frame),   ServiceKey(context_, frame, 5),
-                             ValidationKey(context_, frame, 7), BalancedKey(context_, frame), SequenceKey(context_, SequenceOf(frame, 6))};
+                             ValidationKey(context_, frame, 7), BalancedKey(context_, frame), WalkKey(context_, WalkOf(frame, 6))};
   };
   struct Group {
     unsigned decides;
@@ -250,7 +252,7 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
                     {"parameters", [](F& f) { f.look.parameters["sampling-rate"] = "2"; }},
                     {"termination", [](F& f) { f.look.termination = 0; }},
                     {"lighting", [](F& f) { f.look.shading.model = ShadingModel::kNone; }}}};
-  Group views{kAll & ~kSequence, {}};  // a sequence has views of its own
+  Group views{kAll & ~kWalk, {}};  // a walk has views of its own
   Add<F, ViewParameters>(
       views.changes, ChangesOfView(), [](F & f) -> auto& { return f.view; });
   Add<F, TransferChoice>(
@@ -279,25 +281,28 @@ TEST_F(Keys, HoldWhatDecidesTheirNumbers) {
 TEST_F(Keys, HoldHowMuchIsMeasured) {
   EXPECT_NE(ServiceKey(context_, Example(), 5), ServiceKey(context_, Example(), 6));
   EXPECT_NE(ValidationKey(context_, Example(), 5), ValidationKey(context_, Example(), 6));
-  EXPECT_NE(SequenceKey(context_, SequenceOf(Example(), 5)), SequenceKey(context_, SequenceOf(Example(), 6)));
+  EXPECT_NE(WalkKey(context_, WalkOf(Example(), 5)), WalkKey(context_, WalkOf(Example(), 6)));
 }
 
-TEST_F(Keys, OfSequencesHoldTheWayTheTransferFunctionAndWhatIsLearnt) {
-  FrameCase dynamic = Example();
-  dynamic.policy.balance = "dynamic";
-  for (const FrameCase& frame : {Example(), dynamic}) {
-    const ViewSequence sequence = SequenceOf(frame, 4);
-    const Json key = SequenceKey(context_, sequence);
-    ViewSequence other = sequence;
-    other.motion = &ViewMotions().back();
-    EXPECT_NE(SequenceKey(context_, other), key);
-    other = sequence;
-    other.later = TransferChoice{};
-    EXPECT_NE(SequenceKey(context_, other), key);
-    other = sequence;
-    other.slowed = true;  // without learning, the same boxes are measured
-    EXPECT_EQ(SequenceKey(context_, other) != key, frame.policy.balance == "dynamic");
+TEST_F(Keys, OfWalksHoldThePathTheLaterTransferFunctionAndTheVolumes) {
+  const FrameCase frame = Example();
+  std::set<std::string> keys = {WalkKey(context_, WalkOf(frame, 4)).dump()};
+  for (const std::string_view path : {"zoom", "jump", "slow-worker", "turn-over"}) {
+    Walk walk = WalkOf(frame, 4);
+    walk.path = FindPath(path);
+    EXPECT_TRUE(keys.insert(WalkKey(context_, walk).dump()).second) << path;
   }
+  Walk transfer{frame, FindPath("transfer"), 4, TransferChoice{HalfShown(0.05)}};
+  EXPECT_TRUE(keys.insert(WalkKey(context_, transfer).dump()).second);
+  transfer.later = TransferChoice{HalfShown(0.1)};
+  EXPECT_TRUE(keys.insert(WalkKey(context_, transfer).dump()).second);
+  FrameCase drifting = frame;
+  drifting.volume = ClusterCase({.size = 16}, 0.05);
+  Walk series{drifting, FindPath("time-series"), kFramesOfAVolume, std::nullopt};
+  const Json one_volume = WalkKey(context_, series);
+  EXPECT_TRUE(keys.insert(one_volume.dump()).second);
+  ++series.frames;
+  EXPECT_NE(WalkKey(context_, series)["digest"], one_volume["digest"]);
 }
 
 TEST_F(Keys, ReadPlainly) {

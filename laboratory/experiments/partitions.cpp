@@ -1,0 +1,196 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <string_view>
+
+#include "common/planning/assignment.h"
+#include "common/planning/policy_names.h"
+#include "coordinator/tuning/box_estimator.h"
+#include "laboratory/experiments/attachments.h"
+#include "laboratory/experiments/experiment.h"
+#include "laboratory/experiments/figures.h"
+#include "laboratory/experiments/machines.h"
+#include "laboratory/experiments/policies.h"
+#include "laboratory/experiments/subjects.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::array<std::string_view, 2> kLinks = {"10gbit", "1gbit"};  // the first one wherever there is one link
+constexpr std::string_view kCombine = "radix-k";                         // wherever partitions alone are compared
+constexpr std::array<std::string_view, 3> kSchemes = {"fan-in", kCombine, "direct-send"};
+constexpr std::array<int, 2> kGroups = {1, 2};
+
+struct Comparison {
+  std::vector<BenchCase> volumes;  // a volume for each of its renderers
+  std::vector<int> workers;
+  int pixels = 512;
+
+  int TableWorkers() const { return workers[workers.size() / 2]; }
+  FrameCase Frame(const BenchCase& volume, const Policy& policy, int p) const {
+    return {volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), policy, p};
+  }
+};
+
+Comparison ComparisonOf(const ExperimentContext& context) {
+  const OwnOptions& own = context.options().own;
+  Comparison comparison{.volumes = SubjectsOf(context.options(), context.Scaled(context.quick() ? 256 : 512)),
+                        .workers = own.workers,
+                        .pixels = context.Scaled(512)};
+  if (own.workers.empty()) comparison.workers = context.quick() ? std::vector{2, 16} : std::vector{2, 16, 64};
+  std::ranges::sort(comparison.workers);
+  return comparison;
+}
+
+// Boxes by occupied voxels are cut for their owners, so that the assignment has little left to do.
+std::vector<NamedPolicy> PartitionsByVoxels() {
+  std::vector<NamedPolicy> policies = AllPartitions();
+  std::erase_if(policies, [](const NamedPolicy& named) { return named.policy.balance_by != "voxels"; });
+  return policies;
+}
+
+Policy Automatic() {
+  Policy policy;
+  policy.decomposition = policy.balance_by = policy.assignment = policy.combine = kAutomatic;
+  return policy;
+}
+
+std::vector<Trial> TrialsOf(ExperimentContext& context, const Comparison& comparison) {
+  std::vector<Trial> trials = {HostTrial()};
+  for (const BenchCase& volume : comparison.volumes) {
+    const auto add_boxes = [&](const Policy& policy, int p) {
+      trials.push_back(BoxCostTrial(context, comparison.Frame(volume, policy, p)));
+    };
+    trials.push_back(FinishTrial(context, comparison.Frame(volume, {}, 1)));
+    add_boxes(Combined(EqualSlabs().policy, kCombine), 1);
+    for (const NamedPolicy& named : AllPartitions()) {
+      for (const int p : comparison.workers) {
+        for (const int groups : kGroups) add_boxes(Combined(named.policy, kCombine, groups), p);
+      }
+    }
+    for (const NamedPolicy& named : PartitionsByVoxels()) {
+      for (const AssignmentEntry& assignment : Assignments())
+        add_boxes(Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
+    }
+    for (const int p : comparison.workers) {
+      for (const std::string_view link : kLinks)
+        trials.push_back(BoxCostTrial(context, WithChosenPolicy(context, comparison.Frame(volume, Automatic(), p), Link(link))));
+    }
+  }
+  return trials;
+}
+
+Json CaseOf(std::string_view part, const FrameCase& frame, std::string_view link = "") {
+  Json of = {{"part", part}};
+  of.update(ColumnsOf(frame));
+  if (link.empty()) {
+    of.erase("combine");  // what is measured does not depend on it
+  } else {
+    of["link"] = link;
+  }
+  return of;
+}
+
+// What boxes alone tell.
+void AddBoxFigures(Results& results, const Json& of, const std::vector<MeasuredFrame>& repeats) {
+  std::vector<double> imbalance, sum, longest;
+  for (const MeasuredFrame& frame : repeats) {
+    const std::vector<double> seconds = frame.WorkerSeconds();
+    imbalance.push_back(Imbalance(seconds));
+    sum.push_back(frame.RenderSeconds());
+    longest.push_back(*std::ranges::max_element(seconds));
+  }
+  results.Add(of, "imbalance", imbalance, Origin::kMeasured);
+  results.Add(of, "render_time", sum, Origin::kMeasured);
+  results.Add(of, "longest_render_time", longest, Origin::kMeasured);
+  results.Add(of, "memory", repeats.front().MostVoxelBytes(), Origin::kMeasured);
+}
+
+void AddLatency(ExperimentContext& context, Results& results, std::string_view part, const FrameCase& frame,
+                std::span<const std::string_view> links) {
+  const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
+  for (const std::string_view link : links) {
+    const std::vector<MachineModel> machines = Clusters(context, Link(link));
+    std::vector<double> seconds;
+    for (std::size_t i = 0; i < std::min(repeats.size(), machines.size()); ++i)
+      seconds.push_back(Simulate(repeats[i], machines[i]).frames.front().latency());
+    results.Add(CaseOf(part, frame, link), "latency", seconds, Origin::kSimulated);
+  }
+}
+
+// Every partition under every scheme, and what `auto` takes.
+void AddPolicies(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
+  const FrameCase whole = comparison.Frame(volume, Combined(EqualSlabs().policy, kCombine), 1);
+  AddBoxFigures(results, CaseOf("partition", whole), RecallRepeats(context, whole));
+  AddLatency(context, results, "policy", whole, kLinks);
+  for (const int p : comparison.workers) {
+    if (p == 1) continue;
+    for (const NamedPolicy& named : AllPartitions()) {
+      const FrameCase boxes = comparison.Frame(volume, Combined(named.policy, kCombine), p);
+      AddBoxFigures(results, CaseOf("partition", boxes), RecallRepeats(context, boxes));
+      for (const int groups : kGroups) {
+        for (const std::string_view scheme : kSchemes)
+          AddLatency(context, results, "policy", comparison.Frame(volume, Combined(named.policy, scheme, groups), p), kLinks);
+      }
+    }
+    for (const std::string_view& link : kLinks) {
+      const FrameCase chosen = WithChosenPolicy(context, comparison.Frame(volume, Automatic(), p), Link(link));
+      AddLatency(context, results, "auto", chosen, std::span(&link, 1));
+    }
+  }
+}
+
+// What the planner expects boxes to take before it has seen a frame, beside what they take.
+void AddBoxes(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
+  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
+    const FrameCase frame = comparison.Frame(volume, Combined(named.policy, kCombine), comparison.TableWorkers());
+    const std::vector<MeasuredFrame> repeats = RecallRepeats(context, frame);
+    const FramePlan& plan = repeats.front().plan;
+    const VolumeInUse in_use = context.volumes().Get(frame.volume);
+    const auto occupied = context.volumes().Occupied(frame.volume);
+    const BoxEstimator estimator(plan.setup, *in_use.summary, *occupied, nullptr, 1);
+    for (const Placement& placement : PlacementsOf(plan)) {
+      Json of = CaseOf("box", frame);
+      of["box"] = placement.id;
+      std::vector<double> seconds;
+      seconds.reserve(repeats.size());
+      for (const MeasuredFrame& repeat : repeats) seconds.push_back(repeat.boxes[placement.id].seconds);
+      results.Add(of, "box_time", seconds, Origin::kMeasured);
+      results.Add(of, "estimated_box_time", estimator.Of(placement.box).seconds, Origin::kSimulated);
+    }
+    AttachBoxes(results, fmt::format("boxes-{}-{}-{}", volume.dataset, volume.renderer->name(), named.policy.decomposition),
+                Recall(context, frame));
+  }
+}
+
+void AddAssignments(ExperimentContext& context, const Comparison& comparison, const BenchCase& volume, Results& results) {
+  for (const NamedPolicy& named : PartitionsByVoxels()) {
+    for (const AssignmentEntry& assignment : Assignments()) {
+      const FrameCase frame =
+          comparison.Frame(volume, Combined(named.policy, kCombine, kBoxesAWorker, assignment.name), comparison.TableWorkers());
+      AddBoxFigures(results, CaseOf("assignment", frame), RecallRepeats(context, frame));
+    }
+  }
+}
+
+}  // namespace
+
+void DeclarePartitions(CLI::App& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
+
+void CheckPartitions(const ExperimentOptions& options) {
+  CheckSubjects(SubjectsOf(options, kLeastScaledSide), BenchView(Projection::kOrthographic, 1, 12));
+}
+
+void RunPartitions(ExperimentContext& context, Results& results) {
+  const Comparison comparison = ComparisonOf(context);
+  context.Run(TrialsOf(context, comparison));
+  for (const BenchCase& volume : comparison.volumes) {
+    AddPolicies(context, comparison, volume, results);
+    AddBoxes(context, comparison, volume, results);
+    AddAssignments(context, comparison, volume, results);
+  }
+}
+
+}  // namespace slabstream
