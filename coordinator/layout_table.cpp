@@ -75,7 +75,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   int frames_seen = 0;
   if (const auto found = std::ranges::find(entries_, key, &Entry::key); found != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, found);
-    const bool rebalance = known && balance.change != nullptr && found->frames_seen >= std::clamp(found->changes, 1, balance.most_patience);
+    const bool rebalance = known && balance.change != nullptr && found->frames_seen > 0;
     const bool remake = known && balance.change == nullptr && !found->by_cost && policy.balance_by == BalanceBy::kCost;
     if (!rebalance && !remake) return found->layout;
     present = found->layout;
@@ -105,7 +105,7 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   lock.lock();
   const auto found = std::ranges::find(entries_, key, &Entry::key);
   if (found == entries_.end()) {
-    entries_.push_front({key, made ? std::make_shared<const Layout>(*std::move(made)) : present, cost.has_value(), 0, 0, {}});
+    entries_.push_front({key, made ? std::make_shared<const Layout>(*std::move(made)) : present, cost.has_value(), 0, {}});
     KeepFirst(entries_, kMaxKept);
     return entries_.front().layout;
   }
@@ -114,7 +114,6 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
   entry.by_cost = entry.by_cost || cost.has_value();
   if (made && *made != *present) {
     entry.layout = std::make_shared<const Layout>(*std::move(made));
-    ++entry.changes;
     entry.frames_seen = 0;
     entry.seconds.clear();
   }

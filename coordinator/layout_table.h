@@ -77,7 +77,6 @@ class LayoutTable {
     Key key;
     std::shared_ptr<const Layout> layout;
     bool by_cost = false;         // made when costs were known
-    int changes = 0;              // by the balance
     int frames_seen = 0;          // of this layout
     std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
   };

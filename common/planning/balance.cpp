@@ -14,7 +14,7 @@
 namespace slabstream {
 namespace {
 
-constexpr double kFrames = 1000;              // within which a change must pay
+constexpr double kLasts = 2;                  // times as long as a layout has lasted it is taken to last
 constexpr double kLeastGain = 0.02;           // share of the frame's render time that a change must save; times 1 + 1/n after n frames
 constexpr double kLeastGainOfNewBoxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
 
@@ -98,7 +98,7 @@ std::optional<Layout> Rebalance(const BalanceRequest& asked) {
   std::optional<Layout> chosen;
   double most_won = 0;
   const auto weigh = [&](Layout candidate, double before, double after) {
-    const double won = kFrames * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
+    const double won = kLasts * asked.frames_seen * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
     if (before - after <= least_gain * before || won <= most_won) return;
     most_won = won;
     chosen = std::move(candidate);

@@ -2,8 +2,11 @@
 //
 // Rebalance weighs three changes: hand boxes over from busy slots to others; resize the boxes to equal measured cost; or cut the volume
 // anew if that is predicted to be much better, since measured costs say little about quite different boxes. A change moves voxels: a slot
-// receives the voxels of its boxes, with halo, that it did not hold before. A change is made if it saves the coming frames more time than
-// the move takes, and saves a larger share of the frame's time than noise is likely to fake.
+// receives the voxels of its boxes, with halo, that it did not hold before, and prepares them. A change is made if it saves the coming
+// frames more time than that takes, and saves a larger share of the frame's time than noise is likely to fake. Nobody knows how many frames
+// will come before the next change: as many again as came since the last one, twice. So what changes cost stays in proportion to what
+// is lost without them, as in the ski-rental problem (Karlin, Manasse, Rudolph and Sleator, "Competitive snoopy caching", 1988), and a view
+// that turns is not followed at any price.
 #pragma once
 
 #include <cstdint>

@@ -17,7 +17,7 @@ struct BalanceRequest {
   const Layout* now = nullptr;          // the layout of the last frames
   std::span<const double> seconds;      // measured render time of each box of `now`, newer frames count more; 0: not rendered
   const LayoutRequest* make = nullptr;  // what `now` was made for, with known.cost
-  int frames_seen = 1;                  // of `now`, >= 1
+  int frames_seen = 1;                  // of `now` since it was made, >= 1
 };
 
 struct BalanceEntry {
@@ -25,9 +25,6 @@ struct BalanceEntry {
   std::string_view purpose;  // one line for --help
   // The layout to change to, if any. Pure: no picture may depend on it, and the same times give the same layout. Null: boxes never change.
   std::optional<Layout> (*change)(const BalanceRequest&) = nullptr;
-  // Before its n-th change, a layout must have been measured for n - 1 frames, 1 at least and at most this many: so noise seldom moves
-  // voxels, and a view that moves is still followed.
-  int most_patience = 1;
   bool hands_over = false;  // it changes who owns a box and never the boxes, so it needs several boxes a worker (--groups)
 };
 

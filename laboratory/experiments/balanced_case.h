@@ -6,7 +6,7 @@
 
 namespace slabstream {
 
-inline constexpr int kBalancedFrames = 6;  // to learn from, with each box measured once
+inline constexpr int kBalancedFrames = 12;  // to learn from, with each box measured once
 
 // The trial that measures the frame's boxes: BoxCostTrial, or this one of a frame with dynamic balance.
 Trial CostTrial(ExperimentContext& context, const FrameCase& frame);

@@ -12,7 +12,7 @@ namespace slabstream {
 namespace {
 
 constexpr int kWarmUpFrames = 2;
-constexpr int kLearningFrames = 8;  // with dynamic balance
+constexpr int kLearningFrames = 12; // with dynamic balance
 constexpr int kLeastMeasured = 8;   // frames from picture to picture
 constexpr Duration kPatience = std::chrono::seconds(1);
 
