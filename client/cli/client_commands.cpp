@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <limits>
 #include <memory>
 
 #include "client/cli/annotate.h"
@@ -241,6 +242,18 @@ void DeclareSphere(const CommandLine& line) {
   RunWith(*sub, line.run, options, RunSphere);
 }
 
+void DeclareClusters(const CommandLine& line) {
+  CLI::App* sub = line.app.add_subcommand("clusters", "Make a sparse test volume: balls that lie dense near a corner");
+  auto options = std::make_shared<ClustersOptions>();
+  AddInteger(*sub, "--size", options->request.size, 8, 4096, "Voxels a side")->required();
+  AddNumber(*sub, "--occupancy", options->request.occupancy, {0.001, 0.3}, "Share of voxels that are not empty");
+  AddInteger(*sub, "--balls", options->request.balls, 1, 1000, "How many");
+  AddInteger(*sub, "--seed", options->request.seed, 0, std::numeric_limits<int>::max(), "Of their places");
+  AddNumber(*sub, "--time", options->request.time, {0, 1}, "They drift along x: 0 is the beginning, 1 the end");
+  sub->add_option("-o,--output", options->output, "The volume: " + WritableEndings())->required()->type_name("FILE");
+  RunWith(*sub, line.run, options, RunClusters);
+}
+
 void DeclareUp(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
   auto options = std::make_shared<UpOptions>();
@@ -417,10 +430,10 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,  DeclareTurntable, DeclareSlice,   DeclareInfo,   DeclareValue,
-                                                 DeclareMeasure, DeclareTransfer,  DeclareConvert, DeclareIndex,  DeclareSphere,
-                                                 DeclareUp,      DeclareView,      DeclareDown,    DeclareStatus, DeclareAnnotate,
-                                                 DeclareKeys,    DeclareData,      DeclareLogs,    DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,   DeclareInfo,  DeclareValue,
+                                                 DeclareMeasure,  DeclareTransfer,  DeclareConvert, DeclareIndex, DeclareSphere,
+                                                 DeclareClusters, DeclareUp,        DeclareView,    DeclareDown,  DeclareStatus,
+                                                 DeclareAnnotate, DeclareKeys,      DeclareData,    DeclareLogs,  DeclareSlurm};
   return kCommands;
 }
 

@@ -20,6 +20,7 @@ Status RunTransfer(const TransferOptions& options);
 Status RunConvert(const ConvertOptions& options);
 Status RunIndex(const IndexingOptions& options);
 Status RunSphere(const SphereOptions& options);
+Status RunClusters(const ClustersOptions& options);
 Status RunUp(const UpOptions& options);
 Status RunView(const ViewOptions& options);
 Status RunDown(const DownOptions& options);

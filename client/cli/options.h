@@ -13,6 +13,7 @@
 #include "common/base/time.h"
 #include "common/frame/frame_request.h"
 #include "common/http/address.h"
+#include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
 #include "common/wire/client_messages.h"
 #include "data/layers/layer_reader.h"
@@ -108,6 +109,11 @@ struct IndexingOptions {
 
 struct SphereOptions {
   SphereRequest request;
+  std::string output;
+};
+
+struct ClustersOptions {
+  ClusterRequest request;
   std::string output;
 };
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <string_view>
 
+#include "client/cli/option_groups.h"
 #include "client/cli/service_connection.h"
 #include "client/request/volume_argument.h"
 #include "common/cli/add_option.h"

@@ -1,6 +1,9 @@
 #include "laboratory/experiments/client_frames.h"
 
 #include <algorithm>
+#include <array>
+#include <map>
+#include <string>
 #include <utility>
 
 #include "client/report/frame_summary.h"
@@ -12,19 +15,43 @@ namespace slabstream {
 namespace {
 
 constexpr int kWarmUpFrames = 2;
-constexpr int kLearningFrames = 12; // with dynamic balance
-constexpr int kLeastMeasured = 8;   // frames from picture to picture
+constexpr int kLearningFrames = 12;  // with dynamic balance
+constexpr int kLeastMeasured = 8;    // frames from picture to picture
 constexpr Duration kPatience = std::chrono::seconds(1);
 
 double Milliseconds(std::int64_t ns) { return double(ns) * 1e-6; }
+
+// Milliseconds a frame of each stage.
+using StageSeries = std::array<std::vector<double>, kStageCount>;
+void Append(StageSeries& series, const StageTimes& times) {
+  for (std::size_t stage = 0; stage < series.size(); ++stage) series[stage].push_back(Milliseconds(times[stage]));
+}
+Json MediansOf(StageSeries series) {
+  Json medians = Json::object();
+  for (std::size_t stage = 0; stage < series.size(); ++stage) {
+    medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(series[stage])).median;
+  }
+  return medians;
+}
+
+// Of the worker that renders longest.
+StageTimes LongestStages(const FrameStatistics& statistics) {
+  std::map<std::uint32_t, StageTimes> by_worker;
+  for (const RankReport& report : statistics.reports) AddTimes(by_worker[report.worker], report.stage_ns);
+  StageTimes longest{};
+  for (const auto& [worker, times] : by_worker) {
+    if (times[std::size_t(Stage::kRender)] > longest[std::size_t(Stage::kRender)]) longest = times;
+  }
+  return longest;
+}
 
 }  // namespace
 
 int WarmUpFrames(const Policy& policy) { return IsDynamic(policy) ? kLearningFrames : kWarmUpFrames; }
 
 Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, int frames) {
-  std::vector<double> latencies, renders, longest, imbalances, idle_shares, image_bytes;
-  std::array<std::vector<double>, kStageCount> stages;
+  std::vector<double> latencies, renders, longest, pictures, imbalances, idle_shares, image_bytes;
+  StageSeries stages, longest_stages;
   for (int i = 0; i < warm_up + frames; ++i) {
     const Picture picture = OrThrow(client.Render(request));
     if (i < warm_up) continue;
@@ -35,17 +62,17 @@ Json MeasureLatency(Client& client, const FrameRequest& request, int warm_up, in
     imbalances.push_back(summary.imbalance);
     idle_shares.push_back(summary.idle_share);
     image_bytes.push_back(double(summary.image_bytes));
-    for (std::size_t stage = 0; stage < stages.size(); ++stage) stages[stage].push_back(Milliseconds(summary.stage_ns[stage]));
-  }
-  Json stage_medians = Json::object();
-  for (std::size_t stage = 0; stage < stages.size(); ++stage) {
-    stage_medians[std::string(ToString(Stage(stage)))] = MedianOf(std::move(stages[stage])).median;
+    pictures.push_back(Milliseconds(summary.finish_ns));
+    Append(stages, summary.stage_ns);
+    Append(longest_stages, LongestStages(picture.statistics));
   }
   return Json{{"latency_ms", MedianOf(latencies).median},
               {"all_latency_ms", latencies},
-              {"stages_ms", stage_medians},
+              {"stages_ms", MediansOf(std::move(stages))},
               {"render_ms", MedianOf(std::move(renders)).median},
               {"longest_render_ms", MedianOf(std::move(longest)).median},
+              {"longest_stages_ms", MediansOf(std::move(longest_stages))},
+              {"picture_ms", MedianOf(std::move(pictures)).median},
               {"imbalance", MedianOf(std::move(imbalances)).median},
               {"idle_share", MedianOf(std::move(idle_shares)).median},
               {"image_bytes", MedianOf(std::move(image_bytes)).median}};

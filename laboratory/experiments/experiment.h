@@ -54,6 +54,9 @@ inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 inline constexpr int kRankingRepeats = 16;
 inline constexpr double kMinScale = 0.05;
 
+// A sphere's side or a picture's under --scale, at least kLeastScaledSide.
+int Scaled(const ExperimentOptions& options, int side);
+
 // The environment of an experiment.
 class ExperimentContext {
  public:
@@ -61,7 +64,7 @@ class ExperimentContext {
 
   const ExperimentOptions& options() const { return options_; }
   bool quick() const { return options_.quick; }
-  int Scaled(int side) const;  // a sphere's side or a picture's, at least kLeastScaledSide
+  int Scaled(int side) const { return slabstream::Scaled(options_, side); }
   VolumeCache& volumes() { return volumes_; }
 
   // Runs the trials that the log does not hold yet, each once (Distinct), and repeats them.
@@ -86,6 +89,8 @@ struct Experiment {
   // Checks the options before a folder is made; null: the checks common to all experiments suffice.
   void (*check)(const ExperimentOptions&) = nullptr;
   bool takes_file = false;  // ExperimentOptions::sweep_file
+  // The datasets that it needs of a service (OwnOptions::at_service); null: it measures no service. Throws Failure.
+  std::vector<BenchCase> (*served)(const ExperimentOptions&) = nullptr;
 };
 
 // The only list.
@@ -93,6 +98,7 @@ const std::vector<Experiment>& Experiments();
 
 void RunPaper(ExperimentContext& context, Results& results);
 void DeclarePaper(CLI::App& app, OwnOptions& options);
+std::vector<BenchCase> PaperVolumes(const ExperimentOptions& options);
 void RunPartitions(ExperimentContext& context, Results& results);
 void CheckPartitions(const ExperimentOptions& options);
 void DeclarePartitions(CLI::App& app, OwnOptions& options);
@@ -105,5 +111,6 @@ void RunScaling(ExperimentContext& context, Results& results);
 void RunSweep(ExperimentContext& context, Results& results);
 void CheckSweepFile(const ExperimentOptions& options);
 void DeclareSweep(CLI::App& app, OwnOptions& options);
+std::vector<BenchCase> SweepVolumes(const ExperimentOptions& options);
 
 }  // namespace slabstream

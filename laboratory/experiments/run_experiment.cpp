@@ -17,7 +17,6 @@
 #include "laboratory/bench/bench_machine.h"
 #include "laboratory/experiments/request_json.h"
 #include "laboratory/experiments/service_roster.h"
-#include "laboratory/experiments/subjects.h"
 #include "laboratory/experiments/sweep_file.h"
 #include "laboratory/measure/other_load.h"
 
@@ -26,13 +25,8 @@ namespace {
 
 Json ReferenceLoopKey() { return {{"what", "reference loop"}}; }
 
-std::vector<BenchCase> ServedVolumes(const ExperimentOptions& options) {
-  if (options.sweep_file.empty()) return SubjectsAtService(options);
-  return OrThrow(ReadSweep(options.sweep_file, SweepPlace::kAtService)).volumes;
-}
-
 // Everything that decides the set of trials.
-Json Parameters(const ExperimentOptions& options, VolumeCache& cache) {
+Json Parameters(const Experiment& experiment, const ExperimentOptions& options, VolumeCache& cache) {
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
@@ -44,7 +38,7 @@ Json Parameters(const ExperimentOptions& options, VolumeCache& cache) {
   for (const RendererKind* renderer : renderers) parameters["own"]["renderers"].push_back(renderer->name());
   for (const TransferChoice& transfer : transfers) parameters["own"]["transfers"].push_back(TransferJson(transfer));
   if (options.own.at_service()) {
-    const std::vector<BenchCase> volumes = ServedVolumes(options);
+    const std::vector<BenchCase> volumes = experiment.served(options);
     parameters["service"] = DescribeService(service, volumes);
     for (const BenchCase& volume : volumes) parameters["contents"].push_back(TransferJson(volume.transfer));
     return parameters;
@@ -124,7 +118,7 @@ void Run(const ExperimentOptions& options) {
   const std::string machine_text = fmt::format("{}, {} cores, {}", machine.cpu, machine.cores, machine.simd);
   if (experiment->check != nullptr) experiment->check(options);
   VolumeCache volumes;
-  const Json parameters = Parameters(options, volumes);
+  const Json parameters = Parameters(*experiment, options, volumes);
   TrialLog log = OrThrow(TrialLog::Open(options.folder, {options.name, parameters, SLABSTREAM_COMMIT, machine_text}, options.resume));
   if (log.size() > 0) std::cout << fmt::format("continues with {} trials that are done\n", log.size()) << std::flush;
 
@@ -140,7 +134,7 @@ void Run(const ExperimentOptions& options) {
 ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, std::function<bool()> interrupted, VolumeCache volumes)
     : options_(std::move(options)), log_(std::move(log)), interrupted_(std::move(interrupted)), volumes_(std::move(volumes)) {}
 
-int ExperimentContext::Scaled(int side) const { return std::max(kLeastScaledSide, int(std::lround(side * options_.scale))); }
+int Scaled(const ExperimentOptions& options, int side) { return std::max(kLeastScaledSide, int(std::lround(side * options.scale))); }
 
 void ExperimentContext::Run(std::vector<Trial> trials) {
   repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? 1 : kRankingRepeats;

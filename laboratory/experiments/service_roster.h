@@ -4,7 +4,8 @@
 #include <span>
 
 #include "client/client.h"
-#include "laboratory/experiments/experiment.h"
+#include "laboratory/experiments/frame_case.h"
+#include "laboratory/results/results.h"
 
 namespace slabstream {
 

@@ -6,8 +6,7 @@
 
 namespace slabstream {
 
-// Adds measured latency, period, render_time, longest_render_time, imbalance, idle_share and image_bytes of each frame, and attaches the
-// roster: its workers with host and threads. Throws Failure, also if the roster changes meanwhile.
+// Adds the figures of each frame (AddServiceFrames), and attaches the roster. Throws Failure.
 void RunServiceSweep(ExperimentContext& context, const Sweep& sweep, Results& results);
 
 }  // namespace slabstream

@@ -81,6 +81,10 @@ void DeclareSweep(CLI::App& app, OwnOptions& options) {
       ->default_str("none: workers are simulated from measurements on this machine");
 }
 
+std::vector<BenchCase> SweepVolumes(const ExperimentOptions& options) {
+  return OrThrow(ReadSweep(options.sweep_file, SweepPlace::kAtService)).volumes;
+}
+
 void CheckSweepFile(const ExperimentOptions& options) { (void)OrThrow(ReadSweep(options.sweep_file, PlaceOf(options))); }
 
 void RunSweep(ExperimentContext& context, Results& results) {

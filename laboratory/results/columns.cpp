@@ -73,6 +73,7 @@ std::span<const Metric> Metrics() {
       {"render_time", "s", "render time of a frame, summed over its boxes"},
       {"longest_render_time", "s", "render time of the worker that has most to render"},
       {"stage_time", "s", "time of a stage, of the worker that renders longest"},
+      {"picture_time", "s", "to make and encode the picture of a frame"},
       {"combine_time", "s", "from the end of the longest rendering until one worker holds the combined image"},
       {"frame_time", "s", "until one worker holds the combined image: what the paper calls the time of a frame"},
       {"run_time", "s", "processor time of one thread for what `variant` names"},

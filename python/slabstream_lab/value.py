@@ -49,6 +49,15 @@ class Value:
         repeats = min((v.repeats for v in (self, other) if v.repeats > 0), default=0)
         return Value(self.value / other.value, self.low / other.high, self.high / other.low, repeats, unit, origin, noise)
 
+    def minus(self, other: "Value") -> "Value":
+        """This value less another of the same unit, repeat by repeat where both have as many, else with the widest interval."""
+        origin, noise = ("simulated" if "simulated" in (self.origin, other.origin) else self.origin), self.noise or other.noise
+        if self.each and len(self.each) == len(other.each):
+            each = tuple(a - b for a, b in zip(self.each, other.each))
+            return Value(statistics.median(each), *interval_of(each), len(each), self.unit, origin, noise, each)
+        repeats = min((v.repeats for v in (self, other) if v.repeats > 0), default=0)
+        return Value(self.value - other.value, self.low - other.high, self.high - other.low, repeats, self.unit, origin, noise)
+
     def times(self, factor: float, unit: str | None = None) -> "Value":
         low, high, each = self.low * factor, self.high * factor, tuple(x * factor for x in self.each)
         return dataclasses.replace(self, value=self.value * factor, low=low, high=high, unit=unit or self.unit, each=each)

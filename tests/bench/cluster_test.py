@@ -19,28 +19,30 @@ sys.path.insert(0, str(ROOT / "bench"))
 import dilated_cluster  # noqa: E402
 
 
-def load_program():
-    loader = importlib.machinery.SourceFileLoader("cluster", str(ROOT / "bench" / "cluster"))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader("cluster", loader))
+def load_program(name: str):
+    loader = importlib.machinery.SourceFileLoader(name, str(ROOT / "bench" / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
     loader.exec_module(module)
     return module
 
 
-cluster = load_program()
+cluster, cluster_paper, cluster_balance = (load_program(name) for name in ("cluster", "cluster_paper", "cluster_balance"))
 
 
-def options(*arguments: str):
+def options(*arguments: str, program=cluster):
     with unittest.mock.patch.object(sys, "argv", ["cluster", "-o", "out", *arguments]):
-        return cluster.parse_arguments()
+        return program.parse_arguments()
 
 
 class Dilation(unittest.TestCase):
     def test_times_are_multiplied_by_the_share_and_nothing_else_is(self) -> None:
-        row = {"metric": "latency", "unit": "s", "value": 10.0, "low": 8.0, "high": 12.0, "workers": 16}
+        row = {"metric": "latency", "unit": "s", "value": 10.0, "low": 8.0, "high": 12.0, "each": [8.0, 10.0, 12.0], "workers": 16}
         found = cluster.dilated(row, 0.1, 10)
         self.assertAlmostEqual(found["value"], 1.0)
         self.assertAlmostEqual(found["low"], 0.8)
         self.assertAlmostEqual(found["high"], 1.2)
+        for value, repeat in zip([0.8, 1.0, 1.2], found["each"]):
+            self.assertAlmostEqual(value, repeat)
         self.assertEqual((found["workers"], found["share"], found["link"]), (16, 0.1, "10gbit:0,10"))
         self.assertEqual(cluster.dilated(row | {"unit": "B"}, 0.1, 10)["value"], 10.0)
 
@@ -74,6 +76,18 @@ class Options(unittest.TestCase):
                 options(*arguments)
             self.assertIn(says, told.getvalue().splitlines()[-1])
 
+    def test_what_is_wrong_for_the_other_programs_is_told_in_a_line(self) -> None:
+        cases = {
+            (cluster_paper, "--repeats", "0"): "--repeats 0: must be from 1 to 1000",
+            (cluster_balance, "--repeats", "101"): "--repeats 101: must be from 1 to 100",
+            (cluster_balance, "--workers", "17"): "--workers 17: must be from 1 to 16",
+        }
+        for (program, *arguments), says in cases.items():
+            told = io.StringIO()
+            with contextlib.redirect_stderr(told), self.assertRaises(SystemExit):
+                options(*arguments, program=program)
+            self.assertIn(says, told.getvalue().splitlines()[-1])
+
     def test_the_same_volumes_are_measured_and_simulated(self) -> None:
         with tempfile.NamedTemporaryFile(suffix=".nrrd") as file:
             matrix = cluster.Matrix(options("--quick", "--volume", f"{file.name}:ct-bone"))
@@ -84,6 +98,23 @@ class Options(unittest.TestCase):
             self.assertEqual(list(matrix.data), ["class2-128", dataset])
             self.assertNotIn("workers", matrix.served)
             self.assertEqual(matrix.here["hosts"], {"cores": 1, "traffic": "encrypted"})
+
+
+class Repeats(unittest.TestCase):
+    def test_runs_of_a_case_are_its_repeats(self) -> None:
+        runs = [[{"metric": "latency", "value": float(value), "low": 0, "high": 0, "repeats": 1}] for value in (3, 1, 2)]
+        (row,) = cluster_balance.joined(runs)
+        self.assertEqual((row["value"], row["low"], row["high"], row["repeats"], row["each"]), (2, 1, 3, 3, [3, 1, 2]))
+
+    def test_steps_are_medians_over_the_runs(self) -> None:
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for run, value in enumerate((5, 1, 2)):
+                (folder / str(run)).mkdir()
+                head = "step,decomposition,balance_by,balance,assignment,groups,longest_render_time,imbalance,voxel_bytes"
+                (folder / str(run) / "path-a.csv").write_text(f"{head}\n0,kd-tree,occupied,dynamic,cyclic,1,{value},1.5,0\n")
+            cluster_balance.join_steps([folder / str(run) for run in range(3)], folder)
+            self.assertEqual((folder / "path-a.csv").read_text().splitlines()[1], "0,kd-tree,occupied,dynamic,cyclic,1,2.0,1.5,0.0")
 
 
 class Quotas(unittest.TestCase):

@@ -32,7 +32,7 @@ from slabstream_lab.value import interval_of  # noqa: E402
 PROGRAM = pathlib.Path(os.environ.get("SLABSTREAM_PROGRAMS", ROOT / "build" / "bin")) / "slabstream"
 SEED = int(os.environ.get("SLABSTREAM_SEED", "1"))
 EXPERIMENTS = ("paper", "partitions", "balance", "combining", "streaming", "scaling")
-PLANTED = "latency preview period imbalance render_time longest_render_time stage_time combine_time frame_time run_time box_time settling_frames".split()
+PLANTED = "latency preview period imbalance render_time longest_render_time stage_time combine_time frame_time run_time box_time settling_frames picture_time".split()
 NEAR = ("box_time", "settling_frames")
 # Their answers are about the paper's numbers and about pictures.
 FIXED = ("The paper's machine", "Pictures: figures 12 and 13")
@@ -96,6 +96,8 @@ class Sentences(unittest.TestCase):
             run = [PROGRAM, "experiment", experiment, "-o", cls.folder / experiment, "--quick", "--scale", "0.1"]
             subprocess.run(run, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         synthetic.sweep(cls.folder / "sweep")
+        with open(cls.folder / "paper" / "results.jsonl", "a", encoding="utf-8") as results:
+            results.write("".join(json.dumps(row) + "\n" for row in synthetic.service_frames()))
         print(f"seed {SEED}")
 
     def pages(self, change: Callable[[Rows], Rows | None], experiments=(*EXPERIMENTS, "sweep")) -> dict[str, pages.Page]:

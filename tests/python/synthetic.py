@@ -128,4 +128,19 @@ def cluster(folder: pathlib.Path, repeats: int = REPEATS, ideal: bool = True, er
     return write(folder, rows, "cluster", repeats=repeats)
 
 
+def service_frames(sizes: tuple[int, ...] = (8, 10, 20), table_size: int = 20) -> list[dict]:
+    """The frames of the paper by real processes, as bench/cluster_paper adds them to the results of `experiment paper --scale 0.1`."""
+    rows = []
+    for renderer, n, p in itertools.product(("splat", "zbuffer"), sizes, (1, 2, 5)):
+        kinds = [{"axis": "view", "combine": "fan-in"}]
+        if n == table_size and p > 1:
+            kinds += [{"axis": "view", "combine": "centralized"}, {"axis": "auto", "combine": "fan-in"}]
+        for kind in kinds:
+            of = {"part": "service frames", "renderer": renderer, "n": n, "workers": p, "volume": f"class1-{n}", "share": 1 / p, **kind}
+            metrics = {"latency": 1e-2, "picture_time": 1e-3, "longest_render_time": 4e-3 / p, "period": 1e-2 / p}
+            rows += [row(metric, value, origin="measured", **of) for metric, value in metrics.items()]
+            rows.append(row("stage_time", 1e-3 / p, origin="measured", stage="transform", **of))
+    return rows
+
+
 MAKERS = {"streaming": streaming, "combining": combining, "scaling": scaling, "sweep": sweep, "cluster": cluster}

@@ -13,8 +13,8 @@
 namespace slabstream {
 namespace {
 
-// A file that was replaced and asked for anew may be loaded twice at a time, and both loads end with voxels of the same id. The machine drops
-// the first ones when it hears of them. The second ones must be there when it hears of those.
+// A file that was replaced and asked for anew may be loaded twice at a time, and both loads end with voxels of the same id. The machine
+// drops the first ones when it hears of them. The second ones must be there when it hears of those.
 TEST(BackgroundActions, VoxelsAreServedWhenTheirEventIsHandledWhateverAnEarlierEventOfTheBatchDropped) {
   const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
   Context context;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "client/cli/option_groups.h"
 #include "common/cli/add_option.h"
 #include "laboratory/experiments/paper/setup.h"
 #include "laboratory/measure/splat_loops.h"
@@ -12,10 +13,16 @@ void DeclarePaper(CLI::App& app, OwnOptions& options) {
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kMinFootprint, kMaxFootprint); },
       fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kMinFootprint, kMaxFootprint))
       ->default_str("3,5,9,13,17,25");
+  AddService(app, options.service)
+      ->description(
+          "Measure the frames of tables 2, 5 and 6 and figures 9 to 11 at the service at this endpoint, with its workers and its "
+          "datasets class1-N; nothing else (bench/cluster --paper does so for all p)")
+      ->default_str("none: boxes are rendered alone on this machine");
 }
 
 void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
+  if (context.options().own.at_service()) return RunPaperAtService(context, setup, results);
   std::vector<Trial> trials;
   for (auto* make : {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ConstantsTrials, ImprovedTrials,
                      ClaimTrials, ValidationTrials}) {

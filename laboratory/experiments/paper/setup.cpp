@@ -10,14 +10,24 @@ namespace {
 // Oblique, so that no slab hides behind another, and slices are seen neither edge-on nor face-on.
 constexpr double kAzimuth = 30, kElevation = 20;
 
+std::vector<int> SizesOf(const ExperimentOptions& options) {
+  std::vector<int> sizes;
+  for (const int size : options.quick ? std::vector{50, 100, 200} : std::vector{50, 100, 150, 200, 250, 300}) {
+    const int scaled = Scaled(options, size);
+    if (sizes.empty() || sizes.back() != scaled) sizes.push_back(scaled);
+  }
+  return sizes;
+}
+
 }  // namespace
 
-PaperSetup::PaperSetup(ExperimentContext& context) : context_(context) {
-  const std::vector<int> sizes = context.quick() ? std::vector{50, 100, 200} : std::vector{50, 100, 150, 200, 250, 300};
-  for (const int size : sizes) {
-    const int scaled = context.Scaled(size);
-    if (sizes_.empty() || sizes_.back() != scaled) sizes_.push_back(scaled);
-  }
+std::vector<BenchCase> PaperVolumes(const ExperimentOptions& options) {
+  std::vector<BenchCase> volumes;
+  for (const int size : SizesOf(options)) volumes.push_back(StandardSphere(SphereClass::kHollow, size, Splatting()));
+  return volumes;
+}
+
+PaperSetup::PaperSetup(ExperimentContext& context) : context_(context), sizes_(SizesOf(context.options())) {
   workers_ = context.quick() ? std::vector{1, 2, 5, 10, 20, 30} : std::vector{1, 2, 5, 10, 15, 20, 25, 30};
 }
 

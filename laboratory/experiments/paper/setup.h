@@ -42,6 +42,9 @@ class PaperSetup {
   std::vector<int> sizes_, workers_;
 };
 
+// Instead of the sections: the frames of tables 2, 5 and 6 and figures 9 to 11 at a running service, with as many workers as it has.
+void RunPaperAtService(ExperimentContext& context, const PaperSetup& setup, Results& results);
+
 // Sections: the measurements that they need, and what they add to the results.
 std::vector<Trial> TransformTrials(const PaperSetup& setup);
 void AddTransform(const PaperSetup& setup, Results& results);
