@@ -93,7 +93,7 @@ ParameterTexts StandardParameters(const RendererKind& renderer) {
 
 namespace {
 
-BenchCase MadeHere(const RendererKind* renderer, std::variant<SphereRequest, ClusterRequest, std::string> volume,
+BenchCase MadeHere(const RendererKind* renderer, std::variant<SphereRequest, ClusterRequest, GridRequest, std::string> volume,
                    const std::string& dataset, const std::string& what, double opacity) {
   const bool points = HasDepth(renderer->format());
   return {.name = CaseName(*renderer, dataset) + (opacity == kOpaqueSphere && !points ? "-opaque" : ""),
@@ -119,6 +119,12 @@ BenchCase ClusterCase(const ClusterRequest& clusters, double opacity, const Rend
   const std::string what =
       fmt::format("{} balls, {} voxels a side, {:g} % occupied", clusters.balls, clusters.size, clusters.occupancy * 100);
   return MadeHere(renderer, clusters, ClusterName(clusters), what, opacity);
+}
+
+BenchCase GridCase(const GridRequest& grid) {
+  const std::string dataset = fmt::format("grid-{}-of-{}", grid.size, grid.cells);
+  return MadeHere(FindRenderer("slice"), grid, dataset, fmt::format("a ball in a grid of {0} x {0} x {0} hexahedra", grid.cells),
+                  kTranslucentSphere);
 }
 
 BenchCase StandardClusters(int size, const RendererKind* renderer) {
@@ -204,6 +210,7 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
 std::optional<int> SideOf(const BenchCase& bench_case) {
   if (const auto* sphere = std::get_if<SphereRequest>(&bench_case.volume)) return sphere->size;
   if (const auto* clusters = std::get_if<ClusterRequest>(&bench_case.volume)) return clusters->size;
+  if (const auto* grid = std::get_if<GridRequest>(&bench_case.volume)) return grid->size;
   return std::nullopt;
 }
 
@@ -213,8 +220,12 @@ Result<std::shared_ptr<const Volume>> LoadBenchVolume(const BenchCase& bench_cas
     if (!loaded.ok()) return loaded.status();
     return std::move(loaded->volume);
   }
-  const auto* const sphere = std::get_if<SphereRequest>(&bench_case.volume);
-  Result<Volume> made = sphere != nullptr ? MakeSphere(*sphere) : MakeClusters(std::get<ClusterRequest>(bench_case.volume));
+  const auto make = [&]() -> Result<Volume> {
+    if (const auto* sphere = std::get_if<SphereRequest>(&bench_case.volume)) return MakeSphere(*sphere);
+    if (const auto* clusters = std::get_if<ClusterRequest>(&bench_case.volume)) return MakeClusters(*clusters);
+    return MakeBallGrid(std::get<GridRequest>(bench_case.volume));
+  };
+  Result<Volume> made = make();
   if (!made.ok()) return made.status();
   return std::make_shared<const Volume>(*std::move(made));
 }

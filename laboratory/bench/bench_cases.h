@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/frame/frame_request.h"
+#include "common/mesh/ball_grid.h"
 #include "common/renderers/registry.h"
 #include "common/volume/clusters.h"
 #include "common/volume/sphere.h"
@@ -19,7 +20,7 @@ struct BenchCase {
   std::string name;     // in the table; fit for a file's name
   std::string purpose;  // one line for --list
   std::string dataset;  // the volume's name: cases of one volume share it, and at a service it is the dataset's
-  std::variant<SphereRequest, ClusterRequest, std::string> volume;  // made here, or a file's path (unused at a service)
+  std::variant<SphereRequest, ClusterRequest, GridRequest, std::string> volume;  // made here, or a file's path (unused at a service)
   const RendererKind* renderer = &DefaultRenderer();
   TransferChoice transfer;
   std::optional<double> opacity;  // of an occupied voxel, where all have the same
@@ -41,6 +42,8 @@ BenchCase ClusterCase(const ClusterRequest& clusters, double opacity, const Rend
 BenchCase StandardClusters(int size, const RendererKind* renderer = &DefaultRenderer());
 // Of spheres and clusters, but with only those values shown that occupied voxels have in the half of the volume where x is large.
 TransferFunction HalfShown(double opacity);
+// A ball in an unstructured grid, by slicing.
+BenchCase GridCase(const GridRequest& grid);
 // The MRI brain of Debian's package mricron-data.
 BenchCase BrainCase(const RendererKind* renderer = &DefaultRenderer());
 

@@ -51,6 +51,17 @@ std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
   return cases;
 }
 
+// What the simulation is given, by the names that the same times have at a service.
+void AddInputs(ExperimentContext& context, const SweepCase& c, Results& results) {
+  std::vector<double> longest, picture;
+  for (const MeasuredFrame& repeat : RecallCosts(context, c.team)) {
+    longest.push_back(std::ranges::max(repeat.WorkerSeconds()));
+    picture.push_back(repeat.finish_seconds);
+  }
+  results.Add(c.columns, "longest_render_time", longest, Origin::kSimulated);
+  results.Add(c.columns, "picture_time", picture, Origin::kSimulated);
+}
+
 void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& results) {
   const std::vector<SweepCase> cases = CasesOf(context, sweep);
   std::vector<Trial> trials = {HostTrial()};
@@ -63,6 +74,7 @@ void RunSweepHere(ExperimentContext& context, const Sweep& sweep, Results& resul
 
   for (const SweepCase& c : cases) {
     AddFigures(results, c.columns, RecallFigures(context, c.team, c.link, c.teams, sweep.host));
+    AddInputs(context, c, results);
     if (!c.served) continue;
     Json here = c.columns;
     here["link"] = "host";

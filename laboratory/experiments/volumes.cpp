@@ -32,6 +32,7 @@ Json ClusterJson(const ClusterRequest& clusters) {
 Json MadeJson(const BenchCase& volume) {
   if (const auto* sphere = std::get_if<SphereRequest>(&volume.volume)) return SphereJson(*sphere);
   if (const auto* clusters = std::get_if<ClusterRequest>(&volume.volume)) return ClusterJson(*clusters);
+  if (const auto* grid = std::get_if<GridRequest>(&volume.volume)) return {{"grid", grid->cells}, {"size", grid->size}};
   return {};
 }
 
@@ -116,7 +117,10 @@ std::shared_ptr<const OccupancyGrid> VolumeCache::Occupied(const BenchCase& volu
 
 Json ColumnsOf(const BenchCase& volume) {
   Json columns = {{"volume", volume.dataset}};
-  if (const Json made = MadeJson(volume); !made.is_null()) columns.update(Json{{"n", made["size"]}, {"occupancy", made["occupancy"]}});
+  if (const Json made = MadeJson(volume); !made.is_null()) {
+    columns["n"] = made["size"];
+    if (made.contains("occupancy")) columns["occupancy"] = made["occupancy"];
+  }
   return columns;
 }
 

@@ -20,9 +20,8 @@ TransformMatrix MatrixOf(const Camera& camera) {
 PointZBuffer::PointZBuffer(ImageSize size)
     : size_(size), depth_(std::size_t(size.width) * std::size_t(size.height)), voxel_(depth_.size()) {}
 
-void PointZBuffer::Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied) {
-  std::ranges::fill(depth_, std::numeric_limits<float>::infinity());
-  std::ranges::fill(voxel_, 0);
+template <class Visit>
+void PointZBuffer::ForEachPoint(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied, Visit visit) const {
   const Index3 slice = {size.x, size.y, 1};
   const std::size_t count = CountIn(slice);
   TransformedPoints points(slice);
@@ -33,13 +32,28 @@ void PointZBuffer::Draw(const TransformMatrix& matrix, const Index3& size, const
       if (occupied[i] == 0 || x[i] < 0 || y[i] < 0) continue;
       const auto column = int(x[i]), row = int(y[i]);
       if (column >= size_.width || row >= size_.height) continue;
-      const std::size_t pixel = std::size_t(row) * std::size_t(size_.width) + std::size_t(column);
-      if (depth[i] >= depth_[pixel]) continue;
-      depth_[pixel] = depth[i];
-      voxel_[pixel] = std::uint32_t(std::size_t(z) * count + i + 1);
+      visit(std::size_t(row) * std::size_t(size_.width) + std::size_t(column), depth[i], std::uint32_t(std::size_t(z) * count + i + 1));
     }
     for (std::size_t c = 0; c < 3; ++c) AddStep(points.components[c].data(), points.components[c].data(), count, matrix[c][2]);
   }
+}
+
+void PointZBuffer::Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied) {
+  std::ranges::fill(depth_, std::numeric_limits<float>::infinity());
+  std::ranges::fill(voxel_, 0);
+  ForEachPoint(matrix, size, occupied, [this](std::size_t pixel, float depth, std::uint32_t voxel) {
+    if (depth >= depth_[pixel]) return;
+    depth_[pixel] = depth;
+    voxel_[pixel] = voxel;
+  });
+}
+
+std::size_t PointZBuffer::CountDoubled(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied) const {
+  std::vector<bool> doubled(voxel_.size());
+  ForEachPoint(matrix, size, occupied, [&](std::size_t pixel, float depth, std::uint32_t voxel) {
+    if (voxel != voxel_[pixel] && depth < depth_[pixel] + 1) doubled[pixel] = true;
+  });
+  return std::size_t(std::ranges::count(doubled, true));
 }
 
 PointZBuffer::Holes PointZBuffer::HolesIn(const std::vector<float>& faces) const {

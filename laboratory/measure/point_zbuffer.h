@@ -24,6 +24,10 @@ class PointZBuffer {
   // Draws into an empty image. `occupied`: a byte a voxel, x fastest; all but 0 are.
   void Draw(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied);
 
+  // Number of pixels on which at least two of the drawn voxels fall that lie within a voxel's length of the nearest one: neither hides the
+  // other, and one of them is lost. The same arguments as those of Draw, which must have been called. Voxels have spacing 1.
+  std::size_t CountDoubled(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied) const;
+
   bool Written(std::size_t pixel) const { return voxel_[pixel] != 0; }
   // Numbers of pixels.
   struct Holes {
@@ -35,6 +39,10 @@ class PointZBuffer {
   Holes HolesIn(const std::vector<float>& faces) const;
 
  private:
+  // visit(pixel, depth, number of the voxel, from 1) for each occupied voxel that falls on the image.
+  template <class Visit>
+  void ForEachPoint(const TransformMatrix& matrix, const Index3& size, const std::uint8_t* occupied, Visit visit) const;
+
   ImageSize size_;
   std::vector<float> depth_;          // by pixel
   std::vector<std::uint32_t> voxel_;  // by pixel: the index of the nearest voxel, from 1; 0: none. Deferred shading would need it

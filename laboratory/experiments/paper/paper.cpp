@@ -24,13 +24,13 @@ void RunPaper(ExperimentContext& context, Results& results) {
   const PaperSetup setup(context);
   if (context.options().own.at_service()) return RunPaperAtService(context, setup, results);
   std::vector<Trial> trials;
-  for (auto* make : {TransformTrials, FootprintTrials, PointsTrials, FrameTrials, OccupancyTrials, ConstantsTrials, ImprovedTrials,
-                     ClaimTrials, ValidationTrials}) {
+  for (auto* make : {TransformTrials, FootprintTrials, PointsTrials, GridTrials, FrameTrials, OccupancyTrials, ConstantsTrials,
+                     ImprovedTrials, ClaimTrials, ValidationTrials}) {
     for (Trial& trial : make(setup)) trials.push_back(std::move(trial));
   }
   context.Run(std::move(trials));
-  for (auto* add : {AddTransform, AddFootprint, AddPoints, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved, AddClaims,
-                    AddValidation, AddPictures}) {
+  for (auto* add : {AddTransform, AddFootprint, AddPoints, AddGrids, AddFrames, AddOccupancy, AddModel, AddConstants, AddImproved,
+                    AddClaims, AddValidation, AddPictures}) {
     add(setup, results);
   }
 }

@@ -11,7 +11,7 @@
 namespace slabstream {
 namespace {
 
-constexpr double kMagnified[] = {1, 1.5, 2};  // pixels a voxel
+constexpr double kMagnified[] = {0.5, 1, 1.5, 2};  // pixels a voxel
 
 struct PointsCase {
   FrameCase frame;  // by faces, one worker
@@ -95,6 +95,10 @@ void AddPoints(const PaperSetup& setup, Results& results) {
     add("faces", "run_time", SecondsOfFaces(setup, of));
     const PointZBuffer points = Draw(of, *setup.context().volumes().Get(of.frame.volume).volume);
     const PointZBuffer::Holes holes = points.HolesIn(DepthsOfFaces(setup.context(), of));
+    const Volume& volume = *setup.context().volumes().Get(of.frame.volume).volume;
+    const TransformMatrix matrix = MatrixOf(MakeCamera(of.frame.view, of.frame.size, volume.description.geometry));
+    const std::size_t doubled = points.CountDoubled(matrix, volume.description.geometry.size, volume.block.samples<std::uint8_t>());
+    add("doubled pixels", "count", double(doubled));
     add("covered pixels", "count", double(holes.covered));
     add("empty pixels", "count", double(holes.empty));
     add("pixels of voxels behind", "count", double(holes.behind));

@@ -52,6 +52,8 @@ std::vector<Trial> FootprintTrials(const PaperSetup& setup);
 void AddFootprint(const PaperSetup& setup, Results& results);
 std::vector<Trial> PointsTrials(const PaperSetup& setup);
 void AddPoints(const PaperSetup& setup, Results& results);
+std::vector<Trial> GridTrials(const PaperSetup& setup);
+void AddGrids(const PaperSetup& setup, Results& results);
 std::vector<Trial> FrameTrials(const PaperSetup& setup);
 void AddFrames(const PaperSetup& setup, Results& results);
 std::vector<Trial> OccupancyTrials(const PaperSetup& setup);

@@ -15,7 +15,7 @@ AIMED_LINK, AIMED_WORKERS, AIMED_LATENCY_WORKERS, AIMED_LATENCY_SHARE = "10gbit:
 
 
 def page(run: Run) -> Page:
-    sections = [_aims(run), _dilation(run), _simulation(run)]
+    sections = [_aims(run), _dilation(run), _simulation(run), _causes(run)]
     for i, part in enumerate(run.distinct("part", origin="measured")):
         for j, link in enumerate(run.distinct("link", part=part, origin="measured")):
             sections.append(_scaling(run, part, link, f"cluster-{i + 1}-{j + 1}"))
@@ -117,6 +117,50 @@ def _simulation(run: Run) -> Section | None:
         "The same cases simulated from boxes rendered alone on this machine, for hosts of one core that encrypt what they send.",
         f"{close} of {len(rows)} simulated times are within {CLOSE * 100:.0f} % of the measured ones.",
         [Table("Measured and simulated", ["case", "policy", "link", "p", "time", "measured", "simulated", "off by"], rows)],
+    )
+
+
+def _causes(run: Run) -> Section | None:
+    """Where the simulation of a frame alone goes wrong: rendering, the picture, or the rest."""
+    rows = []
+    shares: dict[str, list[float]] = {"rendering": [], "the picture": [], "the rest": []}
+    for (part, policy, link), _ in run.select(origin="simulated", metric="picture_time").groupby(["part", "variant", "link"], sort=False):
+        of = {"part": part, "variant": policy, "link": link}
+        times = {
+            origin: {metric: _series(run, metric, origin=origin, **of) for metric in ("latency", "longest_render_time", "picture_time")}
+            for origin in ("measured", "simulated")
+        }
+        for p, latency in times["measured"]["latency"].items():
+            if any(p not in series for by_metric in times.values() for series in by_metric.values()):
+                continue
+            found = {}
+            for origin, by_metric in times.items():
+                whole, longest, picture = (by_metric[metric][p] for metric in ("latency", "longest_render_time", "picture_time"))
+                found[origin] = {"rendering": longest, "the picture": picture, "the rest": whole.minus(longest).minus(picture)}
+            row = [part, policy, link, p, latency, _signed(times["simulated"]["latency"][p].value / latency.value - 1)]
+            for cause in shares:
+                missed = (found["simulated"][cause].value - found["measured"][cause].value) / latency.value
+                shares[cause].append(missed)
+                row += [found["measured"][cause], _signed(missed)]
+            rows.append(row)
+    if not rows:
+        return None
+    worst = max(shares, key=lambda cause: sum(map(abs, shares[cause])))
+    listed = ", ".join(f"{cause} {100 * sum(map(abs, missed)) / len(missed):.0f} %" for cause, missed in shares.items())
+    return Section(
+        "The simulation's errors by cause",
+        "Which part of a frame does the simulation get wrong?",
+        "A frame alone, in three parts: the longest rendering of a worker; making the picture; and the rest, which is combining, planning, messages and "
+        "the picture's way to the client. After each part: what the simulation has more or less of it, as a share of the measured latency. "
+        "The three sum to the error of the latency.",
+        f"Mean errors, without signs, as shares of the latency: {listed}. Most comes from {worst}.",
+        [
+            Table(
+                "Errors of latency by cause",
+                ["case", "policy", "link", "p", "latency", "off by", "rendering", "off by", "picture", "off by", "rest", "off by"],
+                rows,
+            )
+        ],
     )
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from ..page import Page
 from ..results import Run
-from . import paper_beyond, paper_cluster, paper_frames, paper_kernels, paper_model
+from . import paper_beyond, paper_cluster, paper_frames, paper_grids, paper_kernels, paper_model
 
 
 def page(run: Run) -> Page:
@@ -18,6 +18,7 @@ def page(run: Run) -> Page:
             *paper_model.sections(run),
             *paper_frames.sections(run),
             *paper_cluster.sections(run),
+            *paper_grids.sections(run),
             *paper_beyond.sections(run),
             paper_kernels.pictures(run),
         ],

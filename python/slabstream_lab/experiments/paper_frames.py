@@ -16,7 +16,7 @@ TITLES = {"splat": "splatting", "zbuffer": "the Z-buffer"}
 
 def sections(run: Run) -> list[Section]:
     frames = Frames(run)
-    return [_combining(frames), _splatting(frames), _pipeline(frames, SPLAT), _pipeline(frames, ZBUFFER), _grain(frames)]
+    return [_combining(frames), _splatting(frames), _pipeline(frames, SPLAT), _pipeline(frames, ZBUFFER), _compositing(frames), _grain(frames)]
 
 
 class Frames:
@@ -390,6 +390,55 @@ def _pipeline(frames: Frames, pipeline: Pipeline) -> Section:
                 marks=True,
             ),
             axes,
+        ],
+    )
+
+
+# ---------------------------------------------------------------- compositing
+
+
+def _compositing(frames: Frames) -> Section:
+    """Equation 17: T_cp = c_cp I^2 N / p."""
+    times = {(n, p): frames.find("stage_time", "splat", n, p, stage="composite") for n in frames.sizes for p in frames.workers}
+
+    def constant(n: int, p: int) -> Value:
+        pixels = n**3 / p / frames.grain("splat", n, p)
+        found = times[n, p]
+        assert found is not None
+        return found.times(p / (pixels * n))
+
+    constants = {case: constant(*case) for case, time in times.items() if time is not None}
+    ordered = sorted(constants, key=lambda case: constants[case].value)
+    (least_n, least_p), (most_n, most_p) = ordered[0], ordered[-1]
+    least, most = constants[ordered[0]], constants[ordered[-1]]
+    return Section(
+        "Compositing: equation 17",
+        "The paper takes compositing to grow as c I² N/p. Is c the same for all N and p?",
+        "The stage of the worker that renders longest, in the frames of figure 10. I² is the number of pixels of the grid along the slices. A constant c "
+        "would make each line of the first plot fall as 1/p, and the lines of the second plot flat.",
+        f"c is least at N = {least_n}, p = {least_p}, with {least.text()} a pixel and slice, and most at N = {most_n}, p = {most_p}, with "
+        f"{most.text()}: {most.value / least.value:.1f} times as much.",
+        [
+            plots.lines(
+                "equation-17-over-p",
+                "Compositing over p",
+                {f"N = {n}": [(p, times[n, p]) for p in frames.workers if times[n, p] is not None] for n in frames.sizes},
+                "workers p",
+                "time of the stage",
+                "Both axes logarithmic.",
+                log_x=True,
+                log_y=True,
+                marks=True,
+            ),
+            plots.lines(
+                "equation-17-constant",
+                "c of equation 17 over N",
+                {f"p = {p}": [(n, constants[n, p]) for n in frames.sizes if (n, p) in constants] for p in frames.workers},
+                "N",
+                "c",
+                from_zero=True,
+                marks=True,
+            ),
         ],
     )
 

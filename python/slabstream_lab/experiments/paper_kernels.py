@@ -327,21 +327,24 @@ def _points(run: Run) -> Section:
 
     n = sizes[-1]
     shares = [f"{holes(n, view).value:.1f} % at {scale[view]:g}" for view in views]
+    doubled = [f"{share('doubled pixels', n, view).value:.1f} % at {scale[view]:g}" for view in views]
     ratios = {(size, view): time("points", size, view).over(time("faces", size, view)) for size in sizes for view in views}
     return Section(
-        "Holes: Z-buffering of voxel points",
-        "How many holes does the paper's Z-buffer leave, and what do faces cost, which leave none?",
+        "Holes and doubled pixels: Z-buffering of voxel points",
+        "How many holes and doubled pixels does the paper's Z-buffer leave, and what do faces cost, which leave none?",
         "Points, as in the paper: each occupied voxel of a class-I sphere writes the one pixel that its centre falls on, if it is the "
         "nearest; all voxels are transformed, slice by slice, from an array. Faces: the renderer's Z-buffer stage with its transform, "
         "which draws the faces of voxels and has found the surface beforehand. One thread, N x N pixels, neither is shaded. A pixel that a "
         "face covers is a hole if no point has written it, or one of a voxel that lies more than a voxel's diagonal behind the "
-        "face. A magnified sphere is cut off by the picture's border.",
-        f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes. Drawing faces is "
+        "face. A pixel is doubled if a second voxel falls on it that lies within a voxel's length of the nearest one, so that neither "
+        "hides the other. A magnified sphere is cut off by the picture's border.",
+        f"At N = {n}, of the covered pixels {', '.join(shares[:-1])} and {shares[-1]} pixels a voxel are holes; "
+        f"{', '.join(doubled[:-1])} and {doubled[-1]} are doubled. Drawing faces is "
         f"{compared_texts({'faces': ratios}, {'faces': 'drawing points'})['faces']}.",
         [
             Table(
                 "Points and faces",
-                ["N", "pixels a voxel", "points", "faces", "points over faces", "covered pixels", "empty", "a voxel behind", "holes"],
+                ["N", "pixels a voxel", "points", "faces", "points over faces", "covered pixels", "empty", "a voxel behind", "holes", "doubled"],
                 [
                     [
                         size,
@@ -353,6 +356,7 @@ def _points(run: Run) -> Section:
                         share("empty pixels", size, view),
                         share("pixels of voxels behind", size, view),
                         holes(size, view),
+                        share("doubled pixels", size, view),
                     ]
                     for size in sizes
                     for view in views

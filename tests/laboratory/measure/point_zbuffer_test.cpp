@@ -52,6 +52,24 @@ TEST(PointZBuffer, HolesShowWhatLiesBehind) {
   }
 }
 
+// A wall seen straight on at half a pixel a voxel: four voxels fall on each pixel. A wall behind it is hidden, and doubles nothing.
+TEST(PointZBuffer, VoxelsThatFallTogetherAreDoubledUnlessOneHidesTheOther) {
+  for (const int n : {2, 6, 20}) {
+    std::vector<std::uint8_t> voxels(std::size_t(n * n * 2), 1);
+    const auto doubled = [&](float scale, int slices, float apart) {
+      const TransformMatrix matrix = {{{scale, 0, 0, scale / 2}, {0, scale, 0, scale / 2}, {0, 0, apart, 1}}};
+      PointZBuffer points({2 * n, 2 * n});
+      points.Draw(matrix, {n, n, slices}, voxels.data());
+      return points.CountDoubled(matrix, {n, n, slices}, voxels.data());
+    };
+    EXPECT_EQ(doubled(0.5F, 1, 1), std::size_t(n * n / 4)) << n;
+    EXPECT_EQ(doubled(1, 1, 1), 0U) << n;
+    EXPECT_EQ(doubled(2, 1, 1), 0U) << n;
+    EXPECT_EQ(doubled(1, 2, 5), 0U) << n;
+    EXPECT_EQ(doubled(1, 2, 0.5F), std::size_t(n * n)) << n;
+  }
+}
+
 TEST(PointZBuffer, LeavesOutWhatFallsBesideTheImage) {
   const std::vector<std::uint8_t> voxels(3, 1);
   PointZBuffer points({2, 1});

@@ -1,0 +1,70 @@
+// A polyhedral grid divided among workers, each of which renders the cells that touch its box (section 2, and Yagel's slicing).
+#include <algorithm>
+#include <memory>
+
+#include "common/mesh/mesh_part.h"
+#include "laboratory/experiments/paper/setup.h"
+#include "laboratory/experiments/policies.h"
+
+namespace slabstream {
+namespace {
+
+constexpr int kWorkers[] = {1, 2, 4, 8, 16};
+constexpr int kCellsASide = 32;
+
+std::vector<FrameCase> GridFrames(const PaperSetup& setup) {
+  std::vector<FrameCase> frames;
+  for (const NamedPolicy& named : {EqualSlabs(), BalancedTree()}) {
+    for (const int p : kWorkers) {
+      FrameCase& frame = frames.emplace_back(setup.Frame(FindRenderer("slice"), setup.table_size(), p));
+      frame.volume = GridCase({.size = setup.table_size(), .cells = std::min(kCellsASide, setup.table_size() / 2)});
+      frame.policy.decomposition = named.policy.decomposition;
+      frame.policy.balance_by = named.policy.balance_by;
+      frame.policy.axis = AxisChoice::kAuto;
+    }
+  }
+  return frames;
+}
+
+// Tetrahedra that all workers hold together: each holds those that touch its padded boxes.
+double HeldCells(const MeshCutter& cells, const FramePlan& plan) {
+  double held = 0;
+  for (const Placement& placement : PlacementsOf(plan)) held += double(cells.Cut(PaddedBox(placement.box, plan.setup)).tetrahedra.size());
+  return held;
+}
+
+}  // namespace
+
+std::vector<Trial> GridTrials(const PaperSetup& setup) {
+  std::vector<Trial> trials;
+  for (const FrameCase& frame : GridFrames(setup)) {
+    trials.push_back(BoxCostTrial(setup.context(), frame));
+    trials.push_back(FinishTrial(setup.context(), frame));
+  }
+  return trials;
+}
+
+void AddGrids(const PaperSetup& setup, Results& results) {
+  for (const FrameCase& frame : GridFrames(setup)) {
+    const std::vector<MeasuredFrame> repeats = RecallRepeats(setup.context(), frame);
+    Json of = {{"part", "grids"}};
+    of.update(ColumnsOf(frame));
+    std::vector<double> sum, longest, imbalance;
+    for (const MeasuredFrame& repeat : repeats) {
+      const std::vector<double> seconds = repeat.WorkerSeconds();
+      sum.push_back(repeat.RenderSeconds());
+      longest.push_back(std::ranges::max(seconds));
+      imbalance.push_back(Imbalance(seconds));
+    }
+    results.Add(of, "render_time", sum, Origin::kMeasured);
+    results.Add(of, "longest_render_time", longest, Origin::kMeasured);
+    results.Add(of, "imbalance", imbalance, Origin::kMeasured);
+    const std::shared_ptr<const Mesh> mesh = setup.context().volumes().Get(frame.volume).volume->cells;
+    of["variant"] = "cells";
+    results.Add(of, "count", double(mesh->tetrahedra.size()), Origin::kMeasured);
+    of["variant"] = "cells that workers hold";
+    results.Add(of, "count", HeldCells(MeshCutter(mesh), repeats.front().plan), Origin::kMeasured);
+  }
+}
+
+}  // namespace slabstream
