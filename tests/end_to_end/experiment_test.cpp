@@ -55,7 +55,7 @@ class ExperimentTest : public EndToEndTest {
 
 TEST_F(ExperimentTest, EveryListedExperimentLeavesResultsAndAPage) {
   const std::string list = MustRun({"experiment", "--list"}).out;
-  for (const std::string name : {"paper", "balance", "combining", "streaming", "scaling"}) {
+  for (const std::string name : {"paper", "partitions", "balance", "combining", "streaming", "scaling"}) {
     EXPECT_THAT(list, HasSubstr(name));
     MustRun({"experiment", name, "-o", name, "--quick", "--scale", "0.15"});
     ExpectResults(name, name);
@@ -159,7 +159,7 @@ TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
 TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
   MakeSphere("ball.nrrd", 2, 24);
   MustRun({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1", "--workers", "3", "--renderer",
-           "mip,raycast", "--views", "fly-through", "--transfer", "opaque,gray-ramp"});
+           "mip,raycast", "--paths", "fly-through,transfer", "--methods", "rebuilt,dynamic", "--transfer", "opaque,gray-ramp"});
   ExpectResults("out", "balance");
   const std::string results = ReadFile("out/results.csv");
   for (const char* word : {"ball", "mip", "raycast", "fly-through"}) EXPECT_THAT(results, HasSubstr(word));
@@ -169,8 +169,8 @@ TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
 }
 
 TEST_F(ExperimentTest, OptionsBelongToTheirExperiment) {
-  EXPECT_THAT(MustRun({"experiment", "balance", "--help"}).out, HasSubstr("--views"));
-  EXPECT_THAT(MustRun({"experiment", "paper", "--help"}).out, Not(HasSubstr("--views")));
+  EXPECT_THAT(MustRun({"experiment", "balance", "--help"}).out, HasSubstr("--paths"));
+  EXPECT_THAT(MustRun({"experiment", "paper", "--help"}).out, Not(HasSubstr("--paths")));
   MustRun({"experiment", "--quick", "--scale", "0.15", "-o", "out", "streaming"});  // options may stand before the name
 }
 
@@ -182,13 +182,13 @@ TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {
       {{"experiment", "sweep", "-o", "x"}, "needs a FILE"},
       {{"experiment", "sweep", "none.json", "-o", "x"}, "'none.json' does not exist"},
       {{"experiment", "paper", "some.json", "-o", "x"}, "some.json"},
-      {{"experiment", "balance", "-o", "x", "--views", "sideways"}, "--views 'sideways'"},
+      {{"experiment", "balance", "-o", "x", "--paths", "sideways"}, "--paths 'sideways'"},
       {{"experiment", "balance", "-o", "x", "--workers", "2,0"}, "--workers 0"},
       {{"experiment", "balance", "-o", "x", "--renderer", "crayon"}, "--renderer 'crayon'"},
       {{"experiment", "balance", "-o", "x", "--transfer", "opaque"}, "--transfer"},
       {{"experiment", "balance", "none.nrrd", "-o", "x"}, "none.nrrd"},
-      {{"experiment", "balance", "-o", "x", "--renderer", "shear", "--views", "perspective"}, "renderer is 'shear', but projection"},
-      {{"experiment", "paper", "-o", "x", "--views", "turntable"}, "--views"},
+      {{"experiment", "balance", "-o", "x", "--renderer", "shear", "--paths", "fly-through"}, "renderer is 'shear', but projection"},
+      {{"experiment", "paper", "-o", "x", "--paths", "turntable"}, "--paths"},
       {{"experiment", "paper", "-o", "x", "--scale", "2"}, "--scale"},
       {{"experiment", "paper", "-o", "x", "--repeats", "0"}, "--repeats"},
       {{"experiment", "paper", "-o", "x", "--footprints", "3,99"}, "--footprints 99"},

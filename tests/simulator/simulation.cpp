@@ -273,6 +273,8 @@ void Simulation::CheckTables() {
 void Simulation::StepDatasets(const DatasetEvent& event) {
   if (!service_.coordinator_runs()) return;
   if (service_.now() < service_.coordinator_held()) return TellDatasets(service_.coordinator_held(), event);
+  // Voxels are served from just before the machine hears of them, as BackgroundActions has it.
+  if (const auto* loaded = std::get_if<DatasetLoaded>(&event)) published_.insert(loaded->dataset);
   for (DatasetAction& action : datasets_->Step(event, service_.coordinator_time())) {
     std::visit([this](auto& each) { Perform(each); }, action);
   }
@@ -327,10 +329,6 @@ void Simulation::Perform(const LoadDataset& action) {
   }
   if (voxels_ > 1) tally_.Add(Count::kReadAnew);
   const auto stamp = std::make_shared<const FileStamp>(FileStamp{{action.source.path}, voxels_});
-  // Voxels are published before the machine hears of them.
-  service_.queue().At(when, [this, epoch = epoch_, voxels = voxels_] {
-    if (epoch == epoch_) published_.insert(voxels);
-  });
   auto summary = std::make_shared<VolumeSummary>(*world_.summary);
   if (world_.in_parts) summary->stored = StoredAt{.source = kFile, .level = 0, .version = voxels_, .block = {{0, 0, 0}, kBlock}};
   TellDatasets(when, DatasetLoaded{action.name, action.load, voxels_, std::move(summary), 0, stamp});

@@ -1,5 +1,6 @@
 // Many worlds, each decided by its seed. A failure prints the command that runs its world alone. SLABSTREAM_SEEDS=n runs n worlds,
-// SLABSTREAM_FIRST_SEED=n begins with seed n.
+// SLABSTREAM_FIRST_SEED=n begins with seed n. SLABSTREAM_PIECE=1: they are a piece of a larger run (worlds), in which rare things may be
+// too rare.
 #include <errno.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -58,7 +59,7 @@ TEST(Simulator, EveryFrameEndsRightOrWithItsError) {
   Print(tally, double(std::clock()) / CLOCKS_PER_SEC);
   // The worlds must be such that everything happens in them, and the service such that faults rarely cost a frame.
   const std::uint64_t worlds = tally[Count::kWorlds];
-  if (worlds < 1000) return;
+  if (worlds < 1000 || std::getenv("SLABSTREAM_PIECE") != nullptr) return;
   EXPECT_GT(tally[Count::kPictures] * 3, tally[Count::kRequests] * 2);
   for (std::size_t i = 0; i < kCountRules.size(); ++i) {
     EXPECT_GE(tally[Count(i)] * 1000, kCountRules[i].least * worlds) << kCountRules[i].what;
