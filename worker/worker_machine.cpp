@@ -271,11 +271,12 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   }
 
   const auto setup = std::make_shared<const FrameSetup>(assignment.setup);
-  const auto hidden = std::make_shared<const OcclusionMask>(assignment.hidden);
+  const OcclusionMask accumulated = assignment.hidden;
   GroupRun& run = entry->second.emplace(std::move(assignment), worker, names);
   for (const Rank rank : run.ranks()) {
     if (!run.failure().ok()) break;
     const Placement& placement = run.placement(rank);
+    const auto hidden = std::make_shared<const OcclusionMask>(Union(accumulated, MaskBefore(placement.box, *setup)));
     // Voxels that are read in parts are not read for a box outside the picture.
     const bool outside = StoredOf(*setup, placement.level) && ReachOf(placement.box, *setup).empty();
     if (outside || HidesBox(*hidden, placement.box, *setup)) {

@@ -10,6 +10,7 @@
 #include "common/classification/transfer_function.h"
 #include "common/frame/frame_request.h"
 #include "common/frame/layer_look.h"
+#include "common/frame/opaque_front.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
 #include "common/view/sheet_grid.h"
@@ -57,6 +58,7 @@ struct FrameSetup {
   Shading shading;
   double termination = kDefaultTermination;
   std::int32_t halo = kHalo;  // voxels that a worker keeps round a box
+  OpaqueFront front = {};     // empty: nothing is known
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
 

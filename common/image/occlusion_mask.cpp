@@ -1,6 +1,7 @@
 #include "common/image/occlusion_mask.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "common/base/check.h"
@@ -31,6 +32,22 @@ bool OcclusionMask::HidesAll(const PixelBounds& bounds) const {
   return true;
 }
 
+OcclusionMask Union(const OcclusionMask& a, const OcclusionMask& b) {
+  if (a.empty()) return b;
+  if (b.empty()) return a;
+  CHECK(a.tiles_x == b.tiles_x && a.tiles_y == b.tiles_y) << "masks of two frames";
+  OcclusionMask both = a;
+  std::ranges::transform(a.steps, b.steps, both.steps.begin(), [](std::uint8_t x, std::uint8_t y) { return std::max(x, y); });
+  return both;
+}
+
+RayEnds::RayEnds(double termination) {
+  if (termination <= 0) return;
+  for (int steps = 0; steps <= kOcclusionSteps; ++steps) {
+    transmittance_[std::size_t(steps)] = float(std::pow(termination, 1 - double(steps) / kOcclusionSteps));
+  }
+}
+
 OcclusionMask FindHiddenTiles(const LocalImage& image, std::int32_t width, std::int32_t height, double termination, OcclusionMask known) {
   CHECK(image.format == PixelFormat::kRgba);
   if (termination <= 0 || image.bounds.empty()) return {};
@@ -38,17 +55,17 @@ OcclusionMask FindHiddenTiles(const LocalImage& image, std::int32_t width, std::
   if (mask.empty()) {
     mask.tiles_x = OcclusionTiles(width);
     mask.tiles_y = OcclusionTiles(height);
-    mask.hidden.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
+    mask.steps.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
   }
   CHECK(mask.tiles_x == OcclusionTiles(width) && mask.tiles_y == OcclusionTiles(height)) << "a mask of another frame";
   for (std::int32_t y = 0; y < mask.tiles_y; ++y) {
     for (std::int32_t x = 0; x < mask.tiles_x; ++x) {
-      std::uint8_t& hidden = mask.hidden[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)];
+      std::uint8_t& steps = mask.steps[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)];
       const PixelBounds tile = OcclusionTileBounds(x, y, width, height);
-      if (hidden == 0 && image.bounds.Contains(tile)) hidden = Opaque(image, tile, float(1 - termination)) ? 1 : 0;
+      if (steps < kOcclusionSteps && image.bounds.Contains(tile) && Opaque(image, tile, float(1 - termination))) steps = kOcclusionSteps;
     }
   }
-  if (std::ranges::none_of(mask.hidden, [](std::uint8_t hidden) { return hidden != 0; })) return {};
+  if (std::ranges::none_of(mask.steps, [](std::uint8_t steps) { return steps != 0; })) return {};
   return mask;
 }
 

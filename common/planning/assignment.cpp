@@ -19,6 +19,17 @@ std::vector<std::uint32_t> AssignCyclic(const AssignmentRequest& request) {
   return slots;
 }
 
+// Boxes to slots in turn, then back, and so on. Boxes of a partition are in the order of their places, so the first and the last of them
+// lie on opposite sides of the volume: of the boxes of a slot, half are in front in whatever view the others are behind.
+std::vector<std::uint32_t> AssignZigzag(const AssignmentRequest& request) {
+  std::vector<std::uint32_t> slots(request.costs.size());
+  for (std::size_t box = 0; box < slots.size(); ++box) {
+    const std::size_t turn = box % (2 * std::size_t{request.slots});
+    slots[box] = std::uint32_t(std::min(turn, 2 * std::size_t{request.slots} - 1 - turn));
+  }
+  return slots;
+}
+
 // AssignCyclic of the boxes in a shuffled order, the same every time: chance, for others to be compared with.
 std::vector<std::uint32_t> AssignRandom(const AssignmentRequest& request) {
   const std::vector<std::uint32_t> cyclic = AssignCyclic(request);
@@ -63,6 +74,7 @@ std::vector<std::uint32_t> AssignGreedy(const AssignmentRequest& request) {
 const std::vector<AssignmentEntry>& Assignments() {
   static const std::vector<AssignmentEntry> entries = {
       {"cyclic", "boxes to workers in turn", AssignCyclic},
+      {"zigzag", "boxes to workers in turn and back: each has some in front and some behind", AssignZigzag},
       {"contiguous", "neighbouring boxes to the same worker", AssignContiguous},
       {"random", "boxes to workers as if by chance, the same every time; to compare with", AssignRandom},
       {"greedy", "the costliest remaining box to the worker with the least work", AssignGreedy, true},

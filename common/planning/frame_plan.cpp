@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/planning/brick_visibility.h"
+#include "common/planning/frame_occlusion.h"
 #include "common/planning/framing.h"
 #include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
@@ -95,6 +96,9 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   plan.combine = policy.combine;
   plan.pixel_error = policy.pixel_error;
   PlaceBoxes(plan);
+  // Nothing is in front of a single box.
+  const bool several = plan.groups.size() > 1 || plan.groups.front().placements.size() > 1;
+  if (several && UsesOcclusion(plan.setup)) plan.setup.front = FindOpaqueFront(plan.layout->extinction, plan.setup);
   if (Status status = AssignWorkers(roster, plan); !status.ok()) return status;
   return plan;
 }

@@ -249,6 +249,8 @@ struct LayoutMaker::State {
     };
     Layout layout = Share(std::move(partition), policy, shows, cost_of);
     layout.filled = std::move(filled);
+    if (!extinction) extinction = FindLeastExtinction(*request.summary, *request.volume);
+    layout.extinction = *extinction;
     return layout;
   }
 
@@ -342,6 +344,7 @@ struct LayoutMaker::State {
   const LayoutRequest request;
   WorkFields fields;
   std::optional<CostEstimator> costs;
+  std::optional<LeastExtinction> extinction;
 };
 
 LayoutMaker::LayoutMaker(const LayoutRequest& request) : state_(std::make_unique<State>(request)) {}

@@ -12,6 +12,7 @@
 #include "common/decomposition/partition.h"
 #include "common/decomposition/work_field.h"
 #include "common/planning/classified_volume.h"
+#include "common/planning/least_extinction.h"
 #include "common/planning/resolved_policy.h"
 #include "common/planning/resolved_request.h"
 #include "common/volume/filled_box.h"
@@ -27,6 +28,7 @@ struct Layout {
   std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
   // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
+  LeastExtinction extinction = {};  // of the volume; empty: not known
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 

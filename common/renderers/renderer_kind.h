@@ -79,9 +79,11 @@ class RendererKind {
     PixelFormat format = PixelFormat::kRgba;  // of local images with default parameters; says how they combine (common/kernels/combine.h)
     std::int32_t reach = kHalo;               // voxels round a box that it reads, [0, kHalo]
     double derived_from_stored = 1;           // bytes that it derives from a byte of voxels that are read in parts, at most, [0, 2]
-    bool along_slices = false;                // the frame is an image along the slices (SheetGrid), else the camera's
-    std::vector<Ability> abilities;           // in order
-    double footprint = 1;                     // pixels that a voxel fills, for each pixel of its cross-section
+    // The opacity of a place depends on the values next to it alone: it is Table's of a value between the least and the greatest of them.
+    bool opacity_by_value = false;
+    bool along_slices = false;                     // the frame is an image along the slices (SheetGrid), else the camera's
+    std::vector<Ability> abilities;                // in order
+    double footprint = 1;                          // pixels that a voxel fills, for each pixel of its cross-section
     std::vector<Stage> stages = {Stage::kSample};  // stages that the pixel half charges time to, in order
     std::vector<RendererParameter> parameters;
   };
@@ -97,6 +99,7 @@ class RendererKind {
   PixelFormat format() const { return facts_.format; }
   std::int32_t reach() const { return facts_.reach; }
   double derived_from_stored() const { return facts_.derived_from_stored; }
+  bool opacity_by_value() const { return facts_.opacity_by_value; }
   bool along_slices() const { return facts_.along_slices; }
   const std::vector<Ability>& abilities() const { return facts_.abilities; }
   std::vector<std::string_view> AbilityNames() const;

@@ -37,7 +37,7 @@ struct Extent {
 
 }  // namespace
 
-SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
+SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry, double footprint) {
   const auto [c, u, v] = AxesOf(camera.traversal_axis);
   const auto column_of = [&](const std::array<double, 4>& row, Axis axis) { return row[std::size_t(Number(axis))]; };
   const Vec3 centre = geometry.centre();
@@ -66,6 +66,7 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
   };
 
   SheetGrid grid;
+  grid.footprint = footprint;
   grid.x_u = pixels_per_voxel(0);
   grid.y_v = pixels_per_voxel(1);
   const Vec3 direction = camera.view_direction / camera.spacing;  // data space
@@ -139,9 +140,10 @@ SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry) {
 }
 
 FootprintSigma FootprintIn(const SheetGrid& grid, const SlicePlacement& slice) {
-  const auto sigma = [](double shear, double scale) {
+  const auto sigma = [&grid](double shear, double scale) {
     shear = std::min(std::abs(shear), kMaxFootprintShear);
-    return std::sqrt(std::max(kFootprintVoxelVariance * (1 + shear * shear), kFootprintGridVariance / (scale * scale)));
+    const double usual = std::sqrt(std::max(kFootprintVoxelVariance * (1 + shear * shear), kFootprintGridVariance / (scale * scale)));
+    return std::min(grid.footprint * usual, kMaxFootprintSigma);
   };
   return {sigma(grid.shear_u, slice.scale_u), sigma(grid.shear_v, slice.scale_v)};
 }

@@ -35,6 +35,7 @@ struct SheetGrid {
   double y_v = 1, y_c = 0, y_0 = 0;
   double w_c = 0, w_0 = 1;
   double shear_u = 0, shear_v = 0;     // of the central ray: voxels along u and v from one slice to the next
+  double footprint = 1;                // footprints are so many times as wide as usual, [1, kMaxFootprint]
   std::int32_t width = 0, height = 0;  // pixels, at least 1
   // Row major. With (X, Y, W) = from_picture (x, y, 1): the point (x, y) of the picture lies at (X / W, Y / W) in the grid; W <= 0: its ray
   // meets no slice.
@@ -44,9 +45,11 @@ struct SheetGrid {
   friend bool operator==(const SheetGrid&, const SheetGrid&) = default;
 };
 
+inline constexpr double kMaxFootprint = 3;  // of SheetGrid::footprint
+
 // The grid for the picture of `camera` (not supersampled). Its sides exceed kMaxGridSide if an oblique view sees many slices that lie
 // hundreds of voxel widths apart: PlanFrame refuses such views.
-SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry);
+SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry, double footprint = 1);
 
 // In slice k: column = scale_u u + offset_u, row = scale_v v + offset_v; the scales are pixels a voxel, > 0.
 struct SlicePlacement {
@@ -59,12 +62,13 @@ inline SlicePlacement PlaceSlice(const SheetGrid& grid, double k) {
 
 // The footprint of a voxel within its slice: the product of a Gaussian along u and one along v, cut off at kFootprintCut standard
 // deviations. It is the shadow that a round Gaussian of variance kFootprintVoxelVariance casts along the central ray on its slice, without
-// the correlation of u and v, and with the shear limited to kMaxFootprintShear (slices far apart). It is never so narrow that the grid
-// could miss it.
+// the correlation of u and v, and with the shear limited to kMaxFootprintShear (slices far apart), `footprint` times as wide, but at most
+// kMaxFootprintSigma. It is never so narrow that the grid could miss it.
 inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2
 inline constexpr double kFootprintGridVariance = 0.3;    // pixels^2 of the grid, the least
 inline constexpr double kFootprintCut = 3;               // standard deviations
 inline constexpr double kMaxFootprintShear = 3;          // voxels a slice
+inline constexpr double kMaxFootprintSigma = 2;          // voxels: the widest footprint reaches 6 voxels
 struct FootprintSigma {
   double u, v;  // voxels
 };
@@ -74,7 +78,7 @@ FootprintSigma FootprintIn(const SheetGrid& grid, const SlicePlacement& slice);
 // above this are refused:
 inline constexpr double kMaxSliceScale = 24;
 
-// Voxels that a worker must hold round its own to compute all its samples exactly: the reach of the widest footprint of any view, less than
+// Voxels that a worker must hold round its own to compute all its samples exactly: the reach of the widest footprint of any view, at most
 // 6 voxels, and one for gradients. (The Z-buffer's normals need 2.)
 inline constexpr int kHalo = 8;
 

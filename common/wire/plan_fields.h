@@ -61,6 +61,7 @@ void Fields(auto& io, Is<SheetGrid> auto& m) {
   io.Between("w_0", m.w_0, &P::w_0, &P::set_w_0, -kMost, kMost);
   io.Between("shear_u", m.shear_u, &P::shear_u, &P::set_shear_u, -kMost, kMost);
   io.Between("shear_v", m.shear_v, &P::shear_v, &P::set_shear_v, -kMost, kMost);
+  io.Between("footprint", m.footprint, &P::footprint, &P::set_footprint, 1, kMaxFootprint);
   io.Range("width", m.width, &P::width, &P::set_width, kGridColumnStep, kMaxGridSide);
   io.Range("height", m.height, &P::height, &P::set_height, 1, kMaxGridSide);
   io.Row("from_picture", m.from_picture, &P::from_picture, &P::mutable_from_picture);
@@ -125,7 +126,7 @@ void Fields(auto& io, Is<CoarserLevel> auto& m) {
   io.Optional("stored", m.stored, &P::has_stored, &P::stored, &P::mutable_stored);
 }
 
-void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets and the clip region
+void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets, the clip region and the front
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
   io.Message("description", m.description, &P::description, &P::mutable_description);
@@ -143,8 +144,29 @@ void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its pa
   io.Range("halo", m.halo, &P::halo, &P::set_halo, 0, kMaxVolumeSide);
 }
 
+inline void Write(const OpaqueFront& in, v1::OpaqueFront& out) {
+  out.set_tile(std::uint32_t(in.tile));
+  out.set_unit(std::uint32_t(in.unit));
+  out.set_tiles_x(std::uint32_t(in.tiles_x));
+  out.set_tiles_y(std::uint32_t(in.tiles_y));
+  for (const OpaqueFront::Depths& depths : in.tiles) out.mutable_depths()->append(depths.begin(), depths.end());
+}
+inline void Read(const v1::OpaqueFront& in, OpaqueFront& out, Checker& check) {
+  out.tile = std::int32_t(check.Range("tile", in.tile(), kOcclusionTile, kMaxGridSide));
+  out.unit = std::int32_t(check.Range("unit", in.unit(), 1, kMaxVolumeSide));
+  out.tiles_x = std::int32_t(check.Range("tiles_x", in.tiles_x(), 1, OpaqueFront::kMostTiles));
+  out.tiles_y = std::int32_t(check.Range("tiles_y", in.tiles_y(), 1, OpaqueFront::kMostTiles));
+  if (!check.ok()) return;
+  const std::size_t bytes = std::size_t(out.tiles_x) * std::size_t(out.tiles_y) * kOcclusionSteps;
+  const std::string depths = check.Text("depths", in.depths(), bytes, bytes);
+  if (!check.ok()) return;
+  out.tiles.resize(bytes / kOcclusionSteps);
+  for (std::size_t i = 0; i < bytes; ++i) out.tiles[i / kOcclusionSteps][i % kOcclusionSteps] = std::uint8_t(depths[i]);
+}
+
 inline void Write(const FrameSetup& in, v1::FrameSetup& out) {
   WriteFields(in, out);
+  if (!in.front.empty()) Write(in.front, *out.mutable_front());
   out.set_renderer(std::string(in.renderer->name()));
   out.mutable_parameters()->Add(in.parameters.begin(), in.parameters.end());
   if (!in.sheets.empty()) Write(in.sheets, *out.mutable_sheets());
@@ -229,6 +251,11 @@ inline void Read(const v1::FrameSetup& in, FrameSetup& out, Checker& check) {
       Read(in.clip(), out.clip, check);
     }
     if (check.ok()) CheckClip(out, check);
+  }
+  if (check.ok() && in.has_front()) {
+    const auto scope = check.In("front");
+    Read(in.front(), out.front, check);
+    if (check.ok()) check.Adopt(CheckFits(out.front, out));
   }
   if (check.ok() && !out.coarser.empty()) CheckCoarser(out, check);
   if (check.ok()) CheckLight(out, check);

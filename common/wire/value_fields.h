@@ -202,9 +202,9 @@ inline void Write(const OcclusionMask& in, v1::OcclusionMask& out) {
   out.set_tiles_x(static_cast<std::uint32_t>(in.tiles_x));
   out.set_tiles_y(static_cast<std::uint32_t>(in.tiles_y));
   std::string& bits = *out.mutable_hidden();
-  bits.resize((in.hidden.size() + 7) / 8);
-  for (std::size_t i = 0; i < in.hidden.size(); ++i) {
-    if (in.hidden[i] != 0) bits[i / 8] = static_cast<char>(bits[i / 8] | 1 << i % 8);
+  bits.resize((in.steps.size() + 7) / 8);
+  for (std::size_t i = 0; i < in.steps.size(); ++i) {
+    if (in.steps[i] == kOcclusionSteps) bits[i / 8] = static_cast<char>(bits[i / 8] | 1 << i % 8);
   }
 }
 inline void Read(const v1::OcclusionMask& in, OcclusionMask& out, Checker& check) {
@@ -217,8 +217,8 @@ inline void Read(const v1::OcclusionMask& in, OcclusionMask& out, Checker& check
   for (std::size_t i = tiles; i < 8 * bits.size(); ++i) check.That(bit(i) == 0, "hidden", "a bit beyond the last tile");
   out.tiles_x = static_cast<std::int32_t>(tiles_x);
   out.tiles_y = static_cast<std::int32_t>(tiles_y);
-  out.hidden.resize(tiles);
-  for (std::size_t i = 0; i < tiles; ++i) out.hidden[i] = bit(i);
+  out.steps.resize(tiles);
+  for (std::size_t i = 0; i < tiles; ++i) out.steps[i] = bit(i) != 0 ? kOcclusionSteps : std::uint8_t{0};
 }
 
 // ---- reports

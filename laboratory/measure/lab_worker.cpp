@@ -28,11 +28,12 @@ BoxRendering LabWorker::Render(const Box& box, const FrameSetup& setup) {
   }
   RenderControl control;
   BoxRendering rendering;
+  const OcclusionMask hidden = MaskBefore(box, setup);
   tbb::task_arena one_thread(1);
   one_thread.execute([&] {
     const Time begin = MonotonicNow();
     rendering.processor_seconds =
-        SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, {}, control, rendering.report).value(); });
+        SecondsOf([&] { rendering.image = renderer_->Render(*padded, box, setup, hidden, control, rendering.report).value(); });
     rendering.seconds = double((MonotonicNow() - begin).count()) * 1e-9;
   });
   return rendering;

@@ -77,6 +77,7 @@ void DenseSlice::SplatByKernels() {
   const std::size_t row_floats = 4 * std::size_t(pixels_);
   std::vector<const float*> beams(static_cast<std::size_t>(taps));
   const std::vector<const SegmentWord*> filled(std::size_t(taps), all_.data());
+  const std::vector<float> never(std::size_t(words_) * std::size_t{kWordSegments}, 2.0F);  // alpha that no segment reaches
   for (std::int32_t band = 0; band < pixels_; band += kBandRows) {
     const std::int32_t end = std::min(band + kBandRows, pixels_);
     const std::int32_t first_beam = Lattice::First(lattice_.At(band)), last = Lattice::First(lattice_.At(end - 1)) + taps;
@@ -91,7 +92,8 @@ void DenseSlice::SplatByKernels() {
       for (std::int32_t n = 0; n < count; ++n) beams[std::size_t(n)] = &filtered_[std::size_t(first + n - first_beam) * row_floats];
       std::ranges::copy(all_, open_.begin());
       const float* weights = &footprint_.weights[Lattice::Phase(at) * std::size_t(taps) + std::size_t(first - Lattice::First(at))];
-      CompositeRow({count, weights, beams.data(), filled.data(), &accumulated_[std::size_t(row) * row_floats], open_.data(), words_, 2});
+      CompositeRow(
+          {count, weights, beams.data(), filled.data(), &accumulated_[std::size_t(row) * row_floats], open_.data(), words_, never.data()});
     }
   }
 }

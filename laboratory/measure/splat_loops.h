@@ -17,13 +17,13 @@
 namespace slabstream {
 
 // Footprints of k pixels are cut at three sigma on both sides. The pipeline's kernels are made for three taps or more.
-inline constexpr int kMinFootprint = 3, kMaxFootprint = 31;
+inline constexpr int kLeastDiameter = 3, kMostDiameter = 31;
 constexpr double SigmaOf(int k) { return (k - 0.5) / 6; }
 
 class DenseSlice {
  public:
-  // `side` voxels, [1, 4096]; footprints of `sigma` voxels, cut at three of them, sigma in [SigmaOf(kMinFootprint),
-  // SigmaOf(kMaxFootprint)]. `occupancy`: the probability of each voxel to be occupied, (0, 1].
+  // `side` voxels, [1, 4096]; footprints of `sigma` voxels, cut at three of them, sigma in [SigmaOf(kLeastDiameter),
+  // SigmaOf(kMostDiameter)]. `occupancy`: the probability of each voxel to be occupied, (0, 1].
   DenseSlice(std::int32_t side, double sigma, double occupancy = 1, std::uint64_t seed = 1);
 
   // Each composites the slice behind what is there.

@@ -12,9 +12,9 @@ using testing::ElementsAre;
 OcclusionMask Mask(const GroupAssignment& group, std::size_t hidden) {
   const PixelBounds frame = FrameBounds(group.setup);
   OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
-  mask.hidden.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
-  EXPECT_GT(mask.hidden.size(), hidden);
-  std::fill_n(mask.hidden.begin(), hidden, std::uint8_t{1});
+  mask.steps.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
+  EXPECT_GT(mask.steps.size(), hidden);
+  std::fill_n(mask.steps.begin(), hidden, kOcclusionSteps);
   return mask;
 }
 

@@ -81,6 +81,7 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
     ({"view": "bottom", "light": [(1, 1, 2), (-1, 0, 0)], "background": (0.1, 0.7, 0.3, 0.4)},
      ["--view", "bottom", "--light", "1,1,2", "--light", "-1,0,0", "--background", "0.1,0.7,0.3,0.4"]),
     ({"renderer": "splat", "background": "#1020fe80", "depth": 16}, ["--renderer", "splat", "--background", "#1020fe80", "--depth", "16"]),
+    ({"renderer": "splat", "footprint": 1.8}, ["--renderer", "splat", "--footprint", "1.8"]),
     ({"renderer": "zbuffer", "shading": "depth-gradient"}, [*Z, "--shading", "depth-gradient"]),
     ({"renderer": "zbuffer", "isovalue": 90, "transfer": "auto"}, [*Z, "--isovalue", "90", "--transfer", "auto"]),
     ({"renderer": "shear", "kernel": "mitchell", "supersampling": 2}, ["--renderer", "shear", "--kernel", "mitchell", "--supersampling", "2"]),

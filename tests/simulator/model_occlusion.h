@@ -32,15 +32,15 @@ inline OcclusionMask FindOpaqueTiles(const SymbolicImage& image, const PixelBoun
   OcclusionMask mask;
   mask.tiles_x = OcclusionTiles(frame.width());
   mask.tiles_y = OcclusionTiles(frame.height());
-  mask.hidden.assign(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y), 1);
+  mask.steps.assign(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y), kOcclusionSteps);
   for (std::uint64_t i = 0; i < std::uint64_t(frame.pixel_count()); ++i) {
     const std::int32_t x = std::int32_t(i % std::uint64_t(frame.width())) / kOcclusionTile;
     const std::int32_t y = std::int32_t(i / std::uint64_t(frame.width())) / kOcclusionTile;
     const auto pixel = image.find(i);
     if (pixel != image.end() && AnyOpaque(pixel->second, x, y)) continue;
-    mask.hidden[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)] = 0;
+    mask.steps[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)] = 0;
   }
-  if (std::none_of(mask.hidden.begin(), mask.hidden.end(), [](std::uint8_t hidden) { return hidden != 0; })) return {};
+  if (std::none_of(mask.steps.begin(), mask.steps.end(), [](std::uint8_t steps) { return steps != 0; })) return {};
   return mask;
 }
 

@@ -22,7 +22,7 @@ class HiddenTilesTest : public WorkerMachineTest {
   }
   Actions Found(const FindHidden& find, const OcclusionMask& hidden) { return Tell(HiddenFound{find.key, find.image, hidden}); }
 
-  const OcclusionMask tile{1, 1, {1}};
+  const OcclusionMask tile{1, 1, {kOcclusionSteps}};
 };
 
 TEST_F(HiddenTilesTest, AreLookedForAfterEachGroupButTheLastAndReportedWithIt) {
@@ -92,7 +92,7 @@ TEST_F(HiddenTilesTest, GoWithTheRendersOfTheirGroup) {
   assignment.display = kPeer;
   assignment.group.placements[0].box = {{0, 0, 0}, {128, 128, 64}};
   assignment.setup.sheets.width = 32;
-  assignment.hidden = {2, 1, {0, 1}};
+  assignment.hidden = {2, 1, {0, kOcclusionSteps}};
   const auto render = All<StartRender>(Feed(Tell(assignment)));
   ASSERT_THAT(render, SizeIs(1));
   EXPECT_EQ(*render[0].hidden, assignment.hidden);

@@ -117,7 +117,7 @@ HWY_INLINE void CompositeSegments(const RowWork& work) {
   std::vector<const float*> many(kTaps > 0 ? 0 : std::size_t(taps));
   const float* few[kTaps > 0 ? kTaps : 1];
   const float** const beams = kTaps > 0 ? few : many.data();
-  const auto one = hn::Set(d, 1.0F), opaque = hn::Set(d, work.opaque_alpha);
+  const auto one = hn::Set(d, 1.0F);
   for (std::int32_t word = 0; word < work.words; ++word) {
     SegmentWord any = 0;
     for (std::int32_t n = 0; n < taps; ++n) any |= work.filled[n][word];
@@ -138,7 +138,7 @@ HWY_INLINE void CompositeSegments(const RowWork& work) {
         hn::Store(sum, d, accumulated + i);
         least = hn::Min(least, hn::Broadcast<3>(sum));
       }
-      if (hn::AllTrue(d, hn::Ge(least, opaque))) work.open[word] &= ~bit;
+      if (hn::AllTrue(d, hn::Ge(least, hn::Set(d, work.opaque_alpha[segment])))) work.open[word] &= ~bit;
     }
   }
 }

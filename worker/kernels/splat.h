@@ -25,7 +25,8 @@ void FilterBeam(const FootprintTable& footprint, const Lattice& lattice, const B
 void FilterBeamReference(const FootprintTable& footprint, const Lattice& lattice, const BeamWork& work);
 
 // accumulated = accumulated over S, with S = sum over n < taps of weights[n] * beams[n]: premultiplied, front to back (Porter and Duff
-// 1984), in the open segments that any of the beams fills. A segment closes when its least alpha reaches opaque_alpha.
+// 1984), in the open segments that any of the beams fills. A segment closes when its least alpha reaches its
+// opaque_alpha.
 struct RowWork {
   std::int32_t taps = 0;
   const float* weights = nullptr;
@@ -34,7 +35,7 @@ struct RowWork {
   float* accumulated = nullptr;                // of the row's first pixel, 64-byte aligned
   SegmentWord* open = nullptr;                 // [words]
   std::int32_t words = 0;
-  float opaque_alpha = 2;  // above 1: never
+  const float* opaque_alpha = nullptr;  // [words * kWordSegments]; above 1: never
 };
 void CompositeRow(const RowWork& work);
 void CompositeRowReference(const RowWork& work);

@@ -42,7 +42,7 @@ void CompositeRowReference(const RowWork& work) {
         }
         least = std::min(least, pixel[3]);
       }
-      if (least >= work.opaque_alpha) work.open[word] &= ~bit;
+      if (least >= work.opaque_alpha[segment]) work.open[word] &= ~bit;
     }
   }
 }

@@ -23,7 +23,7 @@ struct RayFrame {
 
 // Renders the box's part in each piece and combines their images. region_of(number of the piece): the positions among the voxels whose
 // samples may matter.
-// render(number, ray box, tile, pixels, floats a row) renders a tile, as RenderTiles says.
+// render(number, ray box, tile, its steps, pixels, floats a row) renders a tile, as RenderTiles says.
 template <class RegionOf, class Render>
 LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame, RegionOf&& region_of, Render&& render) {
   const FrameSetup& setup = frame.setup;
@@ -36,7 +36,9 @@ LocalImage RenderPieces(std::span<const RayPiece> pieces, const RayFrame& frame,
     const RayBox box = MakeRayBox(piece.voxels, piece.cells.counts, part, region_of(number), frame.rays, setup.camera, map);
     LocalImage layer = MakeLocalImage(setup.format, box.reach.pixels);
     RenderTiles(layer, frame.hidden, frame.control, frame.report,
-                [&](const PixelBounds& tile, float* pixels, std::size_t floats_a_row) { render(number, box, tile, pixels, floats_a_row); });
+                [&](const PixelBounds& tile, std::uint8_t steps, float* pixels, std::size_t floats_a_row) {
+                  render(number, box, tile, steps, pixels, floats_a_row);
+                });
     if (image.bounds.empty()) {
       image = std::move(layer);
     } else {

@@ -24,8 +24,8 @@ void ForEachTile(std::int32_t count, const RenderControl& control, RankReport& r
   report.stage_ns[std::size_t(Stage::kSample)] += ns;
 }
 
-// Calls render(tile, first, floats a row) for the parts of the image's bounds in each tile of the frame that `hidden` does not hide, as
-// ForEachTile does; `first` is where the tile's first pixel is stored.
+// Calls render(tile, its steps, first, floats a row) for the parts of the image's bounds in each tile of the frame that `hidden` does not
+// hide, as ForEachTile does; `first` is where the tile's first pixel is stored.
 template <class Render>
 void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const RenderControl& control, RankReport& report, Render&& render) {
   const PixelBounds& bounds = image.bounds;
@@ -35,10 +35,11 @@ void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const RenderCon
   const auto width = std::size_t(bounds.width());
   ForEachTile(columns * rows, control, report, [&](std::int32_t number) {
     const std::int32_t x = (first_x + number % columns) * kOcclusionTile, y = (first_y + number / columns) * kOcclusionTile;
-    if (hidden.Hides(x, y)) return;
+    const std::uint8_t steps = hidden.StepsAt(x, y);
+    if (steps == kOcclusionSteps) return;
     const PixelBounds tile = Intersection(bounds, {x, y, x + kOcclusionTile, y + kOcclusionTile});
     const std::size_t pixel = std::size_t(tile.y_begin - bounds.y_begin) * width + std::size_t(tile.x_begin - bounds.x_begin);
-    render(tile, &image.rgba[4 * pixel], 4 * width);
+    render(tile, steps, &image.rgba[4 * pixel], 4 * width);
   });
 }
 

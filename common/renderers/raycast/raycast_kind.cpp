@@ -80,6 +80,7 @@ class RaycastKind : public RendererKind {
              .purpose = "trilinear samples along each pixel's ray, for sharp surfaces inside translucent material",
              .reach = kRayReach,
              .derived_from_stored = kRayDerived,
+             .opacity_by_value = true,
              .abilities = {Ability::kPerspective, Ability::kIsosurfaces, Ability::kGradientOpacity, Ability::kLabels, Ability::kOverlay,
                            Ability::kLights, Ability::kTransfer, Ability::kLevels, Ability::kShadows, Ability::kRegions},
              .parameters = {SamplingRate(kSamplesAVoxel),

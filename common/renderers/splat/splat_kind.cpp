@@ -19,19 +19,26 @@ Status CheckGrid(const SheetGrid& sheets) {
 class SplatKind : public RendererKind {
  public:
   SplatKind()
-      : RendererKind({.name = "splat",
-                      .title = "splatting",
-                      .purpose = "soft footprints of all visible voxels; for translucent volumes",
-                      .derived_from_stored = 2,  // bricks of the voxels, and their cells
-                      .along_slices = true,
-                      .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer, Ability::kShadows},
-                      .footprint = 4,
-                      .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite}}) {}
+      : RendererKind(
+            {.name = "splat",
+             .title = "splatting",
+             .purpose = "soft footprints of all visible voxels; for translucent volumes",
+             .derived_from_stored = 2,  // bricks of the voxels, and their cells
+             .opacity_by_value = true,
+             .along_slices = true,
+             .abilities = {Ability::kPerspective, Ability::kLights, Ability::kTransfer, Ability::kShadows},
+             .footprint = 4,
+             .stages = {Stage::kTransform, Stage::kShade, Stage::kSplat, Stage::kComposite},
+             .parameters = {{.name = "footprint",
+                             .purpose = "Width of footprints, times the usual one: wider ones smooth noise; they reach at most 6 voxels",
+                             .standard = 1,
+                             .least = 1,
+                             .most = kMaxFootprint}}}) {}
 
   Status SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const override {
     const VolumeGeometry& geometry = setup.description.geometry;
     setup.camera = MakeCamera(view, size, geometry);
-    setup.sheets = MakeSheetGrid(setup.camera, geometry);
+    setup.sheets = MakeSheetGrid(setup.camera, geometry, setup.parameters.front());
     return CheckGrid(setup.sheets);
   }
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<SplatCost>(basis); }

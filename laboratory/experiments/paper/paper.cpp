@@ -10,8 +10,8 @@ namespace slabstream {
 void DeclarePaper(CLI::App& app, OwnOptions& options) {
   AddParsedList(
       app, "--footprints", options.footprints,
-      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kMinFootprint, kMaxFootprint); },
-      fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kMinFootprint, kMaxFootprint))
+      [](const std::string& option, const std::string& text) { return ParseInteger(option, text, kLeastDiameter, kMostDiameter); },
+      fmt::format("Diameters of the footprints of figure 8b in pixels, each from {} to {}", kLeastDiameter, kMostDiameter))
       ->default_str("3,5,9,13,17,25");
   AddService(app, options.service)
       ->description(

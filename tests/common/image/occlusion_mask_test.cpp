@@ -76,12 +76,12 @@ TEST(OcclusionMask, WhatIsKnownToBeHiddenStaysAndTheRestIsAdded) {
     for (std::int32_t x = 0; x < 16; ++x) SetAlpha(image, x, y, 1);
   }
   const OcclusionMask first = FindHiddenTiles(image, 40, 20, kTermination);
-  EXPECT_EQ(first, (OcclusionMask{3, 2, {1, 0, 0, 0, 0, 0}}));
+  EXPECT_EQ(first, (OcclusionMask{3, 2, {kOcclusionSteps, 0, 0, 0, 0, 0}}));
   for (std::int32_t y = 16; y < 20; ++y) {
     for (std::int32_t x = 32; x < 40; ++x) SetAlpha(image, x, y, 1);
   }
   const OcclusionMask second = FindHiddenTiles(image, 40, 20, kTermination, first);
-  EXPECT_EQ(second, (OcclusionMask{3, 2, {1, 0, 0, 0, 0, 1}}));
+  EXPECT_EQ(second, (OcclusionMask{3, 2, {kOcclusionSteps, 0, 0, 0, 0, kOcclusionSteps}}));
   EXPECT_EQ(second, FindHiddenTiles(image, 40, 20, kTermination)) << "as if looked for anew";
 }
 
@@ -92,7 +92,7 @@ TEST(OcclusionMask, HidesAllOfARectangleIfItHidesEachPixel) {
   for (int round = 0; round < 2000; ++round) {
     const std::int32_t width = random.Integer(1, 80), height = random.Integer(1, 80);
     OcclusionMask mask{OcclusionTiles(width), OcclusionTiles(height), {}};
-    for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(random.Chance(0.8) ? 1 : 0);
+    for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.steps.push_back(random.Chance(0.8) ? kOcclusionSteps : 0);
     const std::int32_t x = random.Integer(0, width - 1), y = random.Integer(0, height - 1);
     const PixelBounds bounds{x, y, random.Integer(x + 1, width), random.Integer(y + 1, height)};
     bool expected = true;

@@ -37,7 +37,7 @@ Scene RandomScene(Random& random) {
   scene.view.zoom = std::exp(random.Real(std::log(0.002), std::log(5000)));
   scene.view.fov_degrees = random.Real(kMinFovDegrees, kMaxFovDegrees);
   scene.camera = MakeCamera(scene.view, scene.size, scene.geometry);
-  scene.grid = MakeSheetGrid(scene.camera, scene.geometry);
+  scene.grid = MakeSheetGrid(scene.camera, scene.geometry, random.Chance(0.5) ? 1 : random.Real(1, kMaxFootprint));
   return scene;
 }
 
@@ -49,7 +49,8 @@ std::string Describe(const Scene& scene) {
          std::to_string(geometry.spacing.z) + " picture " + std::to_string(size.width) + " x " + std::to_string(size.height) +
          (view.projection == Projection::kPerspective ? " perspective " : " orthographic ") + std::to_string(view.azimuth_degrees) + ' ' +
          std::to_string(view.elevation_degrees) + ' ' + std::to_string(view.roll_degrees) + " zoom " + std::to_string(view.zoom) + " fov " +
-         std::to_string(view.fov_degrees) + " grid " + std::to_string(grid.width) + " x " + std::to_string(grid.height);
+         std::to_string(view.fov_degrees) + " footprint " + std::to_string(grid.footprint) + " grid " + std::to_string(grid.width) + " x " +
+         std::to_string(grid.height);
 }
 
 struct GridPoint {

@@ -121,6 +121,7 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { sheets(e)->set_width(131080); }, "GroupAssignment.setup.sheets.width: 131080 is not in [8, 131072]"},
       {[&](E& e) { sheets(e)->set_width(sheets(e)->width() + 4); }, "GroupAssignment.setup.sheets.width: not a multiple of 8"},
       {[&](E& e) { sheets(e)->set_height(0); }, "GroupAssignment.setup.sheets.height: 0 is not in [1, 131072]"},
+      {[&](E& e) { sheets(e)->set_footprint(3.5); }, "GroupAssignment.setup.sheets.footprint: 3.5 is not in [1, 3]"},
       {[&](E& e) { sheets(e)->set_y_v(-1); }, "GroupAssignment.setup.sheets.y_v: -1 is not in [1e-12, 1e+12]"},
       {[&](E& e) { sheets(e)->set_x_0(NAN); }, "GroupAssignment.setup.sheets.x_0: NaN is not in [-1e+12, 1e+12]"},
       {[&](E& e) { sheets(e)->set_w_c(-1); }, "GroupAssignment.setup.sheets: a slice lies behind the eye"},
@@ -159,6 +160,8 @@ TEST(FieldChecks, HiddenTiles) {
                                                                  std::to_string(tiles_y));
   GroupAssignment without_termination = samples[kWithMask];
   without_termination.setup.termination = 0;
+  EXPECT_EQ(error(without_termination), "GroupAssignment.setup.front: a front in a frame that uses none");
+  without_termination.setup.front = {};
   EXPECT_EQ(error(without_termination), "GroupAssignment.hidden: a mask in a frame that uses none");
   EXPECT_EQ(error(samples[kZBuffer], 40), "GroupAssignment.hidden: a mask in a frame that uses none");
   GroupAssignment first = samples[kWithMask];

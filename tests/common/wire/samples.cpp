@@ -96,7 +96,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
 // Every third tile is hidden; the last byte of bits is used in part.
 OcclusionMask Mask(std::int32_t tiles_x, std::int32_t tiles_y) {
   OcclusionMask mask{tiles_x, tiles_y, std::vector<std::uint8_t>(std::size_t(tiles_x) * std::size_t(tiles_y))};
-  for (std::size_t i = 0; i < mask.hidden.size(); i += 3) mask.hidden[i] = 1;
+  for (std::size_t i = 0; i < mask.steps.size(); i += 3) mask.steps[i] = kOcclusionSteps;
   return mask;
 }
 
@@ -149,10 +149,21 @@ GroupAssignment WithSurfaces() {
   return message;
 }
 
+OpaqueFront Front(const FrameSetup& setup) {
+  const PixelBounds frame = FrameBounds(setup);
+  OpaqueFront front{.tile = FrontTile(setup)};
+  front.tiles_x = (frame.width() - 1) / front.tile + 1;
+  front.tiles_y = (frame.height() - 1) / front.tile + 1;
+  front.unit = 3;
+  front.tiles.resize(std::size_t(front.tiles_x) * std::size_t(front.tiles_y), {0, 1, 2, 3, 100, 200, 254, OpaqueFront::kNever});
+  return front;
+}
+
 GroupAssignment BehindOthers() {
   GroupAssignment message = Assignment(2, {}, Splatting());
   message.setup.termination = 0.5;
   message.hidden = Mask(OcclusionTiles(message.setup.sheets.width), OcclusionTiles(message.setup.sheets.height));
+  message.setup.front = Front(message.setup);
   return message;
 }
 

@@ -22,7 +22,7 @@ TEST(DenseSlice, IsTheSameInPhasesByKernelsAndPlainly) {
   Random random(51);
   SCOPED_TRACE(random.trace());
   ForEachTarget([&] {
-    for (int k = kMinFootprint; k <= kMaxFootprint; ++k) {
+    for (int k = kLeastDiameter; k <= kMostDiameter; ++k) {
       const int side = random.Integer(1, 90);
       const double occupancy = random.Chance(0.3) ? 1 : random.Real(0.02, 1);
       const auto seed = std::uint64_t(random.Integer(1, 1000));
@@ -50,7 +50,7 @@ TEST(DenseSlice, KeepsTheSumOfItsVoxels) {
   };
   const double expected = sum_of(5);
   EXPECT_NEAR(expected, 4 * kSide * kSide * 0.6 * 0.01, 0.1 * expected);
-  for (int k = kMinFootprint; k <= kMaxFootprint; ++k) EXPECT_NEAR(sum_of(k), expected, 1e-4 * expected) << k;
+  for (int k = kLeastDiameter; k <= kMostDiameter; ++k) EXPECT_NEAR(sum_of(k), expected, 1e-4 * expected) << k;
 }
 
 }  // namespace

@@ -203,7 +203,8 @@ TEST(CompositeRow, AgreesWithTheReference) {
         if (i / (4 * kSegment) % 5 == 0) before[i] = 1;  // opaque already
       }
       const std::vector<SegmentWord> open_before = RandomSegments(kWords, random);
-      RowWork work{taps, weights.data(), beam_rows.data(), filled_rows.data(), nullptr, nullptr, kWords, opaque_alpha};
+      const std::vector<float> opaque_alphas(std::size_t{kWords} * kWordSegments, opaque_alpha);
+      RowWork work{taps, weights.data(), beam_rows.data(), filled_rows.data(), nullptr, nullptr, kWords, opaque_alphas.data()};
       const auto run = [&](void (*composite)(const RowWork&), AlignedVector<float>& accumulated, std::vector<SegmentWord>& open) {
         accumulated = before, open = open_before;
         work.accumulated = accumulated.data(), work.open = open.data();

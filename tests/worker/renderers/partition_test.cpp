@@ -200,6 +200,22 @@ TEST_P(Partitions, JitteredRaysMakeOnePicture) {
   }
 }
 
+TEST_P(Partitions, WideFootprintsMakeOnePicture) {
+  if (GetParam()->name() != "splat") return;  // it alone has --footprint
+  const unsigned seed = 31;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{41, 37, 33}, {1, 0.8, 1.3}}, ScalarType::kUint8, seed);
+  for (Projection projection : GetParam()->projections()) {
+    for (const double footprint : {1.5, kMaxFootprint}) {
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      const FrameSetup setup = SplatSetup(volume, options, footprint);
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " footprint " << footprint);
+      ExpectSamePicture(RenderWhole(volume, setup), RenderByBoxes(volume, setup, CutAtRandom(volume.block.box, 11, random)), setup);
+    }
+  }
+}
+
 TEST_P(Partitions, RegionsMakeOnePicture) {
   if (!GetParam()->Can(Ability::kRegions)) return;  // has none
   const unsigned seed = 23;

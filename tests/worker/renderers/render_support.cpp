@@ -97,6 +97,13 @@ FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double sampl
   return setup;
 }
 
+FrameSetup SplatSetup(const Volume& volume, const SetupOptions& options, double footprint) {
+  FrameSetup setup = MakeSetup(volume, options);
+  setup.parameters = {footprint};
+  EXPECT_TRUE(setup.renderer->SetView(options.view, options.size, setup).ok());
+  return setup;
+}
+
 double LengthInside(const FrameSetup& setup, int x, int y) {
   const Camera::Ray ray = setup.camera.RayAt(x + 0.5, y + 0.5);
   double enter = -1e300, leave = 1e300;
@@ -150,11 +157,13 @@ std::unique_ptr<BoxData> BoxFor(const RendererKind& kind, const Volume& volume, 
 
 namespace {
 
-LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box) {
+LocalImage RenderBox(const Volume& volume, const FrameSetup& setup, const Box& box, std::uint64_t* drawn = nullptr) {
   const auto data = BoxFor(*setup.renderer, volume, box, setup.halo);
   data->SetLight(LightOf(volume, setup));
   RankReport report;
-  return MakeRenderer(*setup.renderer)->Render(*data, box, setup, {}, RenderControl(), report).value();
+  LocalImage image = MakeRenderer(*setup.renderer)->Render(*data, box, setup, MaskBefore(box, setup), RenderControl(), report).value();
+  if (drawn != nullptr) *drawn += report.drawn_voxels;
+  return image;
 }
 
 }  // namespace
@@ -163,10 +172,10 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup) {
   return RenderBox(volume, setup, volume.description.geometry.bounds());
 }
 
-LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition) {
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn) {
   LocalImage frame = MakeLocalImage(setup.format, {});
   for (BoxId id : VisibilityOrder(partition, setup.camera)) {
-    Combine(frame, RenderBox(volume, setup, partition.boxes()[id]), Side::kBack);
+    Combine(frame, RenderBox(volume, setup, partition.boxes()[id], drawn), Side::kBack);
   }
   return frame;
 }
@@ -232,7 +241,7 @@ void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& 
   const PixelBounds frame = FrameBounds(setup);
   OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
   std::bernoulli_distribution hidden(part);
-  for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.hidden.push_back(hidden(random) ? 1 : 0);
+  for (std::int32_t i = 0; i < mask.tiles_x * mask.tiles_y; ++i) mask.steps.push_back(hidden(random) ? kOcclusionSteps : 0);
   const LocalImage whole = RenderWhole(volume, setup);
   const auto data = BoxFor(*setup.renderer, volume, volume.block.box, 0);
   RankReport report;

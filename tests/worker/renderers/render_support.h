@@ -43,6 +43,8 @@ FrameSetup MakeSetup(const Volume& volume, const SetupOptions& options);
 // Null: the setup needs none.
 std::shared_ptr<const FrameLight> LightOf(const Volume& volume, const FrameSetup& setup);
 FrameSetup RaycastSetup(const Volume& volume, SetupOptions options, double samples_per_voxel = 1, double jitter = 0);
+// For a setup of splatting.
+FrameSetup SplatSetup(const Volume& volume, const SetupOptions& options, double footprint);
 
 // Physical length of the ray of a pixel inside the volume.
 double LengthInside(const FrameSetup& setup, int x, int y);
@@ -64,7 +66,7 @@ LocalImage RenderWhole(const Volume& volume, const FrameSetup& setup);
 // nothing is drawn.
 void ExpectHiddenTilesChangeNothingElse(const Volume& volume, const FrameSetup& setup, double part, std::mt19937& random);
 // Each box of the partition from its own padded box, combined in visibility order.
-LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition);
+LocalImage RenderByBoxes(const Volume& volume, const FrameSetup& setup, const Partition& partition, std::uint64_t* drawn = nullptr);
 // The picture, of the whole volume as one box.
 LocalImage RenderPicture(const Volume& volume, const FrameSetup& setup);
 

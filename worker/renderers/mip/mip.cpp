@@ -51,7 +51,8 @@ class MipRenderer : public Renderer {
     const ValueScale values = MakeValueScale(double(setup.range.min), double(setup.range.max), mapping);
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
-        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* pixels, std::size_t floats_a_row) {
+        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,
+            std::size_t floats_a_row) {
           const ProjectWork work = {.rays = &rays,
                                     .box = &ray_box,
                                     .bounds = bounds == nullptr ? nullptr : &(*bounds)[piece],

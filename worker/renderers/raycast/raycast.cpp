@@ -197,11 +197,12 @@ class RaycastRenderer : public Renderer {
 
     std::optional<FrameLight::View> light;
     if (data.light() != nullptr) light = data.light()->Seen(MapTo(setup, at.level));
+    const RayEnds ends(setup.termination);
     std::atomic<std::uint64_t> shaded = 0;
     tbb::enumerable_thread_specific<GradientBricks> bricks;
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t piece) { return visible[piece].region; },
-        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, float* rgba, std::size_t floats_a_row) {
+        [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t steps, float* rgba, std::size_t floats_a_row) {
           const std::optional<RayLayers> layers = shown.Of(piece);
           const MarchWork work = {.rays = &rays,
                                   .box = &ray_box,
@@ -209,7 +210,7 @@ class RaycastRenderer : public Renderer {
                                   .to_samples = &visible[piece].to_samples,
                                   .to_surfaces = visible[piece].to_surfaces ? &*visible[piece].to_surfaces : nullptr,
                                   .surface_cells = visible[piece].surface_cells.data(),
-                                  .termination = float(setup.termination),
+                                  .termination = ends[steps],
                                   .layers = layers ? &*layers : nullptr,
                                   .light = light ? &*light : nullptr};
           shaded += MarchTile(work, tile, bricks.local(), rgba, floats_a_row);

@@ -41,17 +41,21 @@ SplatBand::SplatBand(const SplatPass& pass, std::int32_t y_begin, std::int32_t y
       clock_(report),
       segments_(pass.bounds.width() / kSegment),
       words_(SegmentWords(segments_)),
-      opaque_alpha_(pass.setup.termination > 0 ? float(1 - pass.setup.termination) : 2.0F),
+      first_tile_row_(y_begin / kOcclusionTile),
       clipped_(!pass.clip.empty()),
       open_(std::size_t(y_end - y_begin) * std::size_t(words_)),
       owned_(std::size_t(words_)),
       nothing_(std::size_t(words_)) {
   static_assert(kOcclusionTile % kSegment == 0);
+  const RayEnds ends(pass.setup.termination);
+  const auto segment_x = [&](std::int32_t segment) { return pass.bounds.x_begin + segment * kSegment; };
+  opaque_alpha_.assign(std::size_t((y_end - 1) / kOcclusionTile + 1 - first_tile_row_) * RowSegments(), kNeverOpaque);
   for (std::int32_t row = y_begin; row < y_end; ++row) {
     Insert(Open(row), 0, segments_);
-    if (pass.hidden.empty()) continue;
+    float* const opaque_alpha = OpaqueAlpha(row);
     for (std::int32_t segment = 0; segment < segments_; ++segment) {
-      if (pass.hidden.Hides(pass.bounds.x_begin + segment * kSegment, row)) Remove(Open(row), segment, segment + 1);
+      if (pass.setup.termination > 0) opaque_alpha[segment] = 1 - ends[pass.hidden.StepsAt(segment_x(segment), row)];
+      if (pass.hidden.Hides(segment_x(segment), row)) Remove(Open(row), segment, segment + 1);
     }
   }
 }
@@ -269,7 +273,7 @@ void SplatBand::CompositeRows(const SliceSamples& slice) {
                           .accumulated = &image_.rgba[4 * std::size_t(row - pass_.bounds.y_begin) * std::size_t(pass_.bounds.width())],
                           .open = Open(row),
                           .words = words_,
-                          .opaque_alpha = opaque_alpha_};
+                          .opaque_alpha = OpaqueAlpha(row)};
     if (clipped_) {
       CompositeClipped(work, row);
     } else {

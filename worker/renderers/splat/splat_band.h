@@ -45,6 +45,9 @@ class SplatBand {
   void ClearForeignSamples(const SliceSamples& slice, std::int32_t beam);
   void CompositeRows(const SliceSamples& slice);
 
+  static constexpr float kNeverOpaque = 2;
+  std::size_t RowSegments() const { return std::size_t(words_) * std::size_t{kWordSegments}; }
+  float* OpaqueAlpha(std::int32_t row) { return &opaque_alpha_[std::size_t(row / kOcclusionTile - first_tile_row_) * RowSegments()]; }
   SegmentWord* Open(std::int32_t row) { return &open_[std::size_t(row - y_begin_) * std::size_t(words_)]; }
   std::size_t BeamWord(std::int32_t beam) const { return std::size_t(beam - first_beam_) * std::size_t(words_); }
   // Beams take turns in kShadedBeams places.
@@ -59,9 +62,10 @@ class SplatBand {
   RankReport& report_;
   StageClock clock_;
   const std::int32_t segments_, words_;  // of a row
-  const float opaque_alpha_;
+  const std::int32_t first_tile_row_;    // of the frame
   const bool clipped_;
-  std::vector<SegmentWord> open_;  // [row][word]: not opaque yet
+  std::vector<float> opaque_alpha_;  // [row of tiles][segment]: alpha of the box at which nothing behind shows
+  std::vector<SegmentWord> open_;    // [row][word]: not opaque yet
 
   // Of the current slice.
   std::int32_t slice_ = 0;

@@ -21,9 +21,10 @@ double Stored(const VoxelBlock& block, const Index3& v) {
 class Footprint {
  public:
   // A pixel is 1 / scale voxels wide and its centre lies `first_place` + pixel / scale voxels from voxel 0; `shear`: of the central ray.
-  Footprint(double shear, double scale, double first_place) : scale_(scale), first_place_(first_place) {
+  // `width`: times the usual one.
+  Footprint(double shear, double scale, double first_place, double width) : scale_(scale), first_place_(first_place) {
     shear = std::min(std::abs(shear), 3.0);
-    sigma_ = std::sqrt(std::max(0.36 * (1 + shear * shear), 0.3 / (scale * scale)));
+    sigma_ = std::min(width * std::sqrt(std::max(0.36 * (1 + shear * shear), 0.3 / (scale * scale))), 2.0);
   }
 
   double Weight(int pixel, int voxel) const {
@@ -90,8 +91,10 @@ LocalImage ReferenceSplatting(const Volume& volume, const FrameSetup& setup) {
     Index3 q;
     q[c] = camera.ascending ? i : size[c] - 1 - i;
     const double w = grid.w_c * q[c] + grid.w_0;
-    const Footprint along_u(central_ray[u] / central_ray[c], grid.x_u / w, (0.5 * w - grid.x_c * q[c] - grid.x_0) / grid.x_u);
-    const Footprint along_v(central_ray[v] / central_ray[c], grid.y_v / w, (0.5 * w - grid.y_c * q[c] - grid.y_0) / grid.y_v);
+    const Footprint along_u(central_ray[u] / central_ray[c], grid.x_u / w, (0.5 * w - grid.x_c * q[c] - grid.x_0) / grid.x_u,
+                            setup.parameters.at(0));
+    const Footprint along_v(central_ray[v] / central_ray[c], grid.y_v / w, (0.5 * w - grid.y_c * q[c] - grid.y_0) / grid.y_v,
+                            setup.parameters.at(0));
     for (q[v] = 0; q[v] < size[v]; ++q[v]) {
       for (q[u] = 0; q[u] < size[u]; ++q[u]) {
         const double stored = Stored(volume.block, q);

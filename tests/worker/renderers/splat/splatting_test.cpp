@@ -61,6 +61,46 @@ TEST(Splatting, IsItsDefinitionAtEveryZoom) {
   }
 }
 
+TEST(Splatting, IsItsDefinitionAtEveryWidthOfFootprints) {
+  const unsigned seed = 40;
+  std::mt19937 random(seed);
+  const Volume volume = MakeBlobs({{26, 19, 23}, {1, 1, 1.5}}, ScalarType::kUint8, seed);
+  for (Projection projection : kProjections) {
+    for (double footprint : {1.0, 1.3, 2.0, kMaxFootprint}) {
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << " footprint " << footprint);
+      SetupOptions options;
+      options.view = RandomView(projection, random);
+      ExpectIsItsDefinition(volume, SplatSetup(volume, options, footprint));
+    }
+  }
+}
+
+// A bright voxel in a clear volume: footprints twice as wide spread the same opacity over a larger area.
+TEST(Splatting, WiderFootprintsSpreadTheSameOpacity) {
+  const Volume volume = MakeVolume({{31, 31, 31}, {1, 1, 1}}, ScalarType::kUint8, [](const Index3& v) {
+    return v == Index3{15, 15, 15} ? 200.0 : 0.0;
+  });
+  SetupOptions options;
+  options.transfer = Ramp(0.3);
+  options.size = {96, 96};
+  const auto alpha = [&](double footprint) {
+    const FrameSetup setup = SplatSetup(volume, options, footprint);
+    const LocalImage image = RenderPicture(volume, setup);
+    double sum = 0, most = 0;
+    for (int y = 0; y < setup.camera.height; ++y) {
+      for (int x = 0; x < setup.camera.width; ++x) {
+        sum += PixelOf(image, x, y)[3];
+        most = std::max<double>(most, PixelOf(image, x, y)[3]);
+      }
+    }
+    return std::pair{sum, most};
+  };
+  const auto [sum, most] = alpha(1);
+  const auto [wide_sum, wide_most] = alpha(2);
+  EXPECT_NEAR(wide_sum, sum, 0.02 * sum);
+  EXPECT_GT(most / wide_most, 2.5) << "4, but for what resampling spreads of the narrow one";
+}
+
 // Length of the ray through the middle of a pixel within the volume, in physical units; 0: it misses or passes within `margin` voxels of an
 // edge.
 double LengthInside(const FrameSetup& setup, int x, int y, double margin) {

@@ -1,0 +1,146 @@
+#include "common/frame/opaque_front.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "common/frame/frame_setup.h"
+
+namespace slabstream {
+namespace {
+
+// The ray of a point of the frame. Nothing: it does not meet all slices in the camera's order.
+std::optional<TileBeam::Ray> RayOf(const FrameSetup& setup, double x, double y) {
+  const auto [c, u, v] = AxesOf(setup.camera.traversal_axis);
+  if (!setup.sheets.empty()) {
+    const SheetGrid& grid = setup.sheets;
+    return TileBeam::Ray{(x * grid.w_0 - grid.x_0) / grid.x_u, (x * grid.w_c - grid.x_c) / grid.x_u, (y * grid.w_0 - grid.y_0) / grid.y_v,
+                         (y * grid.w_c - grid.y_c) / grid.y_v};
+  }
+  const Camera::Ray ray = setup.camera.RayAt(x, y);
+  const double along = setup.camera.ascending ? ray.direction[c] : -ray.direction[c];
+  if (!(along > 1e-3 * Length(ray.direction))) return std::nullopt;
+  const double nearest = setup.camera.ascending ? -1 : setup.description.geometry.size[c];
+  const bool behind_eye = (setup.camera.ascending ? nearest - ray.origin[c] : ray.origin[c] - nearest) < 0;
+  if (behind_eye && setup.camera.projection == Projection::kPerspective) return std::nullopt;
+  const double u_k = ray.direction[u] / ray.direction[c], v_k = ray.direction[v] / ray.direction[c];
+  return TileBeam::Ray{ray.origin[u] - ray.origin[c] * u_k, u_k, ray.origin[v] - ray.origin[c] * v_k, v_k};
+}
+
+}  // namespace
+
+TileBeam::Area TileBeam::Between(double j, double k) const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  Area area = {kInfinity, kInfinity, -kInfinity, -kInfinity};
+  for (const Ray& ray : corners_) {
+    for (const double slice : {j, k}) {
+      const double u = ray.u_0 + slice * ray.u_k, v = ray.v_0 + slice * ray.v_k;
+      area = {std::min(area.u_begin, u), std::min(area.v_begin, v), std::max(area.u_end, u), std::max(area.v_end, v)};
+    }
+  }
+  return area;
+}
+
+double TileBeam::LeastLength(const SliceAxes& axes, const Vec3& spacing) const {
+  // With t the angle between a ray and the normal of slices, the length is the slices' distance over cos t. A ray between the corners has
+  // an angle to one of them that is at most the largest one between two corners.
+  const double distance = spacing[axes.c];
+  double least_angle = std::numeric_limits<double>::infinity(), across = 0;
+  std::array<Vec3, 4> directions;
+  for (std::size_t i = 0; i < corners_.size(); ++i) {
+    directions[i] = Normalized(Vec3{corners_[i].u_k * spacing[axes.u], corners_[i].v_k * spacing[axes.v], distance});
+    least_angle = std::min(least_angle, std::acos(std::min(directions[i].z, 1.0)));
+    for (std::size_t j = 0; j < i; ++j) across = std::max(across, std::acos(std::clamp(Dot(directions[i], directions[j]), -1.0, 1.0)));
+  }
+  return distance / std::cos(std::max(0.0, least_angle - across));
+}
+
+std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile) {
+  const PixelBounds frame = FrameBounds(setup);
+  const std::int32_t columns = (frame.width() - 1) / tile + 1, rows = (frame.height() - 1) / tile + 1;
+  std::vector<std::optional<TileBeam::Ray>> corners;
+  for (std::int32_t y = 0; y <= rows; ++y) {
+    for (std::int32_t x = 0; x <= columns; ++x) corners.push_back(RayOf(setup, double(x) * tile, double(y) * tile));
+  }
+  std::vector<std::optional<TileBeam>> beams;
+  for (std::int32_t y = 0; y < rows; ++y) {
+    for (std::int32_t x = 0; x < columns; ++x) {
+      const auto corner = [&](std::int32_t dx, std::int32_t dy) -> const std::optional<TileBeam::Ray>& {
+        return corners[std::size_t(y + dy) * std::size_t(columns + 1) + std::size_t(x + dx)];
+      };
+      const bool all = corner(0, 0) && corner(1, 0) && corner(0, 1) && corner(1, 1);
+      beams.push_back(all ? std::optional(TileBeam({*corner(0, 0), *corner(1, 0), *corner(0, 1), *corner(1, 1)})) : std::nullopt);
+    }
+  }
+  return beams;
+}
+
+std::int32_t FrontTile(const FrameSetup& setup) {
+  const PixelBounds frame = FrameBounds(setup);
+  constexpr std::int32_t kLeastSide = kOcclusionTile * OpaqueFront::kMostTiles;
+  return ((std::max(frame.width(), frame.height()) - 1) / kLeastSide + 1) * kOcclusionTile;
+}
+
+Status CheckFits(const OpaqueFront& front, const FrameSetup& setup) {
+  if (front.empty()) return Status::Ok();
+  if (setup.format != PixelFormat::kRgba || !(setup.termination > 0)) return Status::InvalidArgument("a front in a frame that uses none");
+  const PixelBounds frame = FrameBounds(setup);
+  const std::int32_t tile = FrontTile(setup);
+  const std::int32_t tiles_x = (frame.width() - 1) / tile + 1, tiles_y = (frame.height() - 1) / tile + 1;
+  if (front.tile == tile && front.tiles_x == tiles_x && front.tiles_y == tiles_y) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} x {} tiles of {} pixels, but the frame has {} x {} of {}", front.tiles_x, front.tiles_y,
+                                             front.tile, tiles_x, tiles_y, tile));
+}
+
+OcclusionMask MaskBefore(const Box& box, const FrameSetup& setup) {
+  const OpaqueFront& front = setup.front;
+  if (front.empty()) return {};
+  constexpr std::int32_t kStride = 4;  // slices that are looked at together
+  const SliceAxes axes = AxesOf(setup.camera.traversal_axis);
+  const bool ascending = setup.camera.ascending;
+  const std::int32_t slices = setup.description.geometry.size[axes.c];
+  // Samples of the box lie up to half a voxel beyond it, and on the volume's rim as far as footprints reach.
+  const Index3& size = setup.description.geometry.size;
+  const auto low_end = [&](Axis axis) { return box.begin[axis] - 1 - (box.begin[axis] == 0 ? setup.halo : 0); };
+  const auto high_end = [&](Axis axis) { return box.end[axis] + (box.end[axis] == size[axis] ? setup.halo : 0); };
+  const auto after = [&](std::int32_t slice) { return ascending ? slice : slices - 1 - slice; };  // slices before this one
+  const std::int32_t nearest = after(ascending ? box.begin[axes.c] : box.end[axes.c] - 1);
+  const std::int32_t farthest = after(ascending ? box.end[axes.c] - 1 : box.begin[axes.c]);
+  const PixelBounds frame = FrameBounds(setup);
+  OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
+  mask.steps.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
+  const std::vector<std::optional<TileBeam>> beams = TileBeams(setup, front.tile);
+  const std::int32_t inside = front.tile / kOcclusionTile;
+  const PixelBounds reach = ReachOf(box, setup);
+  for (std::int32_t y = 0; y < front.tiles_y; ++y) {
+    for (std::int32_t x = 0; x < front.tiles_x; ++x) {
+      const std::size_t number = std::size_t(y) * std::size_t(front.tiles_x) + std::size_t(x);
+      if (!beams[number]) continue;
+      std::uint8_t steps = kOcclusionSteps;
+      const PixelBounds pixels = {x * front.tile, y * front.tile, (x + 1) * front.tile, (y + 1) * front.tile};
+      const bool reached = !Intersection(reach, pixels).empty();
+      for (std::int32_t first = nearest - 1; reached && first <= farthest + 1; first += kStride) {
+        const double k = after(first), next = after(first + kStride);
+        const TileBeam::Area area = beams[number]->Between(k, next);
+        if (area.u_end < low_end(axes.u) || area.u_begin > high_end(axes.u) || area.v_end < low_end(axes.v) ||
+            area.v_begin > high_end(axes.v)) {
+          continue;
+        }
+        const auto done = [&](std::uint8_t depth) { return depth != OpaqueFront::kNever && depth * front.unit <= first; };
+        steps = std::uint8_t(std::ranges::count_if(front.tiles[number], done));
+        break;
+      }
+      for (std::int32_t ty = y * inside; ty < std::min((y + 1) * inside, mask.tiles_y); ++ty) {
+        for (std::int32_t tx = x * inside; tx < std::min((x + 1) * inside, mask.tiles_x); ++tx) {
+          mask.steps[std::size_t(ty) * std::size_t(mask.tiles_x) + std::size_t(tx)] = steps;
+        }
+      }
+    }
+  }
+  return mask;
+}
+
+}  // namespace slabstream
