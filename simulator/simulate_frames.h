@@ -3,8 +3,8 @@
 // The coordinator's FrameMachine and a WorkerMachine for each worker decide everything, as in the service: the window, who renders what
 // when, which step of a schedule is taken, in which order groups are accumulated. What they start takes the time given by the machine model
 // and the costs of boxes. A worker has three lanes: one renders, one combines and encodes, one makes pictures; each does one task after the
-// other. Simplifications: nothing is lost, nothing is hidden by groups in front (box costs are those of boxes alone), one client asks for
-// the frames, previews travel for free.
+// other. Simplifications: nothing is lost; a box costs what it took by itself, whatever groups in front hide; one client asks for the
+// frames; previews travel for free.
 //
 // An image of several ranks fills this share of a range: in each tile of 16 x 16 pixels the ranks' shares count as independent, 1 - prod(1
 // - share). The truth lies between their maximum and their sum; in full or empty tiles all three agree. A message has one run for each row

@@ -143,7 +143,7 @@ FootprintSigma FootprintIn(const SheetGrid& grid, const SlicePlacement& slice) {
   const auto sigma = [&grid](double shear, double scale) {
     shear = std::min(std::abs(shear), kMaxFootprintShear);
     const double usual = std::sqrt(std::max(kFootprintVoxelVariance * (1 + shear * shear), kFootprintGridVariance / (scale * scale)));
-    return std::min(grid.footprint * usual, kMaxFootprintSigma);
+    return std::max(usual, std::min(grid.footprint * usual, kMaxFootprintSigma));
   };
   return {sigma(grid.shear_u, slice.scale_u), sigma(grid.shear_v, slice.scale_v)};
 }

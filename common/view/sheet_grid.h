@@ -62,8 +62,8 @@ inline SlicePlacement PlaceSlice(const SheetGrid& grid, double k) {
 
 // The footprint of a voxel within its slice: the product of a Gaussian along u and one along v, cut off at kFootprintCut standard
 // deviations. It is the shadow that a round Gaussian of variance kFootprintVoxelVariance casts along the central ray on its slice, without
-// the correlation of u and v, and with the shear limited to kMaxFootprintShear (slices far apart), `footprint` times as wide, but at most
-// kMaxFootprintSigma. It is never so narrow that the grid could miss it.
+// the correlation of u and v, and with the shear limited to kMaxFootprintShear (slices far apart), and never so narrow that the grid could
+// miss it. SheetGrid::footprint makes it wider, up to kMaxFootprintSigma.
 inline constexpr double kFootprintVoxelVariance = 0.36;  // voxels^2
 inline constexpr double kFootprintGridVariance = 0.3;    // pixels^2 of the grid, the least
 inline constexpr double kFootprintCut = 3;               // standard deviations

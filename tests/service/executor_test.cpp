@@ -155,9 +155,9 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   const auto first = outputs_.NextEvent<HiddenFound>();
   EXPECT_EQ(first.image, 1U);
   EXPECT_EQ(first.key, kKey);
-  EXPECT_EQ(first.hidden, (OcclusionMask{3, 1, {1, 0, 0}}));
+  EXPECT_EQ(first.hidden, (OcclusionMask{3, 1, {kOcclusionSteps, 0, 0}}));
   EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
-  EXPECT_EQ(outputs_.NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {1, 0, 1}}));
+  EXPECT_EQ(outputs_.NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {kOcclusionSteps, 0, kOcclusionSteps}}));
 }
 
 TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
