@@ -23,16 +23,17 @@ bool MayComeFirst(const Camera& camera, const Box& near, const Box& far) {
   });
 }
 
-// Whether `seen`, a pixel of the tile, is `expected` without some boxes that lie behind an opaque one or may be left out everywhere.
-bool LacksHiddenBoxesOnly(const SymbolicPixel& seen, const SymbolicPixel& expected, const std::set<BoxId>& left_out, std::int32_t tile_x,
-                          std::int32_t tile_y) {
+// Whether `seen`, a pixel of the frame, is `expected` without some boxes that lie behind an opaque one or may be left out there.
+bool LacksHiddenBoxesOnly(const SymbolicPixel& seen, const SymbolicPixel& expected, const std::map<BoxId, OcclusionMask>& left_out,
+                          std::int32_t x, std::int32_t y) {
   auto at = seen.begin();
   bool hidden = false;
   for (const BoxId box : expected) {
     const bool here = at != seen.end() && *at == box;
     if (here) ++at;
-    if (!here && !hidden && left_out.count(box) == 0) return false;
-    hidden = hidden || (here && IsOpaque(box, tile_x, tile_y));
+    const auto mask = left_out.find(box);
+    if (!here && !hidden && (mask == left_out.end() || !mask->second.Hides(x, y))) return false;
+    hidden = hidden || (here && IsOpaque(box, x / kOcclusionTile, y / kOcclusionTile));
   }
   return at == seen.end();
 }
@@ -85,8 +86,12 @@ void FrameWitness::OnAssignment(const GroupAssignment& assignment, std::size_t w
     Box& last = last_boxes_.try_emplace(placement.id, placement.box).first->second;
     if (faultless_ && last != placement.box) tally_.Add(Count::kMovedBoxes);
     last = placement.box;
-    if (HidesBox(assignment.hidden, placement.box, assignment.setup)) {
-      frame.left_out.insert(placement.id);
+    const OcclusionMask before = MaskBefore(placement.box, assignment.setup), hidden = Union(assignment.hidden, before);
+    if (!before.empty()) tally_.Add(Count::kFronts);
+    OcclusionMask& left_out = frame.left_out[placement.id];
+    left_out = Union(left_out, hidden);
+    if (HidesBox(hidden, placement.box, assignment.setup)) {
+      std::ranges::fill(left_out.steps, kOcclusionSteps);  // the model's boxes reach all pixels
       tally_.Add(Count::kHiddenBoxes);
       continue;
     }
@@ -161,8 +166,7 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
     const auto pixel = pixels.find(i);
     const SymbolicPixel& seen = pixel == pixels.end() ? SymbolicPixel() : pixel->second;
     if (seen == expected) continue;
-    const auto x = std::int32_t(i % std::uint64_t(bounds.width())) / kOcclusionTile;
-    const auto y = std::int32_t(i / std::uint64_t(bounds.width())) / kOcclusionTile;
+    const auto x = std::int32_t(i % std::uint64_t(bounds.width())), y = std::int32_t(i / std::uint64_t(bounds.width()));
     EXPECT_TRUE(UsesOcclusion(frame->second.setup) && LacksHiddenBoxesOnly(seen, expected, frame->second.left_out, x, y))
         << "frame " << image.frame << ", pixel " << i << " shows " << testing::PrintToString(seen) << ", not "
         << testing::PrintToString(expected);

@@ -38,7 +38,7 @@ class FrameWitness {
     std::set<std::uint32_t> handed_out;               // groups of this attempt
     std::map<WorkerId, std::uint32_t> done;           // groups that a display worker has said are done: the first so many
     std::set<std::pair<WorkerId, Box>> padded_boxes;  // who needed which voxels
-    std::set<BoxId> left_out;                         // boxes that were hidden as a whole, in any attempt
+    std::map<BoxId, OcclusionMask> left_out;          // what masks hide of each box, in any attempt
     std::set<BoxId> outside;                          // of the picture, and so not read
     bool all_cached = true;                           // when it was handed out, workers held all voxels that it needs
     bool over = false;

@@ -29,7 +29,8 @@ TransferFunction StepTransfer() {
   return transfer;
 }
 
-// Whole layers of bricks across x are empty, so that some boxes show nothing.
+// Whole layers of bricks across x are empty, so that some boxes show nothing, or visible in every voxel, so that they hide others
+// before anything is drawn.
 void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) {
   auto summary = std::make_shared<VolumeSummary>();
   summary->description.geometry.size = kVolumeSize;
@@ -38,7 +39,10 @@ void MakeVolume(Random& random, const ModelCells& cells, SimulatedWorld& world) 
   summary->brick_counts = {kVolumeSize.x / kBrick, kVolumeSize.y / kBrick, kVolumeSize.z / kBrick};
   const double empty = random.Chance(0.05) ? 1 : random.Real(0, 0.8);
   std::vector<ValueRange> layers;
-  for (int x = 0; x < summary->brick_counts.x; ++x) layers.push_back(random.Chance(empty) ? ValueRange{0, 10} : ValueRange{0, 200});
+  const double solid = random.Chance(0.3) ? random.Real(0, 1) : 0;
+  for (int x = 0; x < summary->brick_counts.x; ++x) {
+    layers.push_back(random.Chance(empty) ? ValueRange{0, 10} : ValueRange{random.Chance(solid) ? 100.0F : 0.0F, 200});
+  }
   for (int i = 0; i < summary->brick_counts.y * summary->brick_counts.z; ++i) {
     summary->bricks.insert(summary->bricks.end(), layers.begin(), layers.end());
   }

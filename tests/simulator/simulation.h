@@ -66,7 +66,8 @@ class Simulation : private Conditions {
   void AddClient();
   void StartCoordinator();
   void Submit(ModelClient& client, RequestId request);
-  bool Idle() const;
+  bool Idle() const;     // every request has ended
+  bool Working() const;  // some worker does something, for whatever attempt it was
 
   // ---- what breaks
   void PlanTroubles(Duration span);
@@ -168,7 +169,8 @@ class Simulation : private Conditions {
   std::deque<ModelWorker> workers_;         // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
   std::set<Node> told_dead_;                      // workers whose death the sockets notice
-  std::set<Node> leaving_;                        // workers that were told to leave
+  std::map<Node, double> leaving_;                // workers that were told to leave, and when
+  bool hurried_ = false;                          // one left before its work was done: its time was over
   std::set<std::pair<FrameId, BoxId>> rendered_;  // in gentle worlds
   std::map<Node, HostilePeer> hostile_peers_;
   HostileWords words_;

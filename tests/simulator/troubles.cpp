@@ -86,7 +86,7 @@ void Simulation::TellWorkerToLeave() {
   const Node leaver = staying[random_.Integer<std::size_t>(0, staying.size() - 1)];
   // Until it knows its id it cannot say that it leaves: it is lost.
   if (faults_.gentle() && !service_.worker(leaver).registered()) return;
-  leaving_.insert(leaver);
+  leaving_.emplace(leaver, service_.now());
   tally_.Add(Count::kWorkersLeft);
   workerless_ = workerless_ || staying.size() == 1;
   service_.StepWorker(leaver, LeaveRequested{});
