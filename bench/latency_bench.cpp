@@ -1,7 +1,7 @@
 // The latency of a frame beside rendering: request to last byte, less the time from the first worker's start of rendering to the last one's
 // end, and less making the picture from the frame (resampling or resolving, which an embedded renderer would have to do too). One frame in
-// flight, a turning view; embedded, and with a coordinator and workers as processes over ipc and tcp. With one frame in flight nothing
-// overlaps: this is the user's wait between two pictures.
+// flight, a turning view; embedded, and with a coordinator and workers as processes over ipc and tcp, the latter also with keys. With one
+// frame in flight nothing overlaps: this is the user's wait between two pictures.
 //
 // A line a transport: medians and 95th percentiles of the frames after a warm-up. "Before render" is the part of this latency before the
 // first worker begins.
@@ -71,7 +71,7 @@ Measured Measure(Client& client, const std::string& dataset, const Options& opti
 }
 
 void PrintHead() {
-  fmt::print("{:12} {:>16} {:>16} {:>16} {:>16} {:>16}   ms: median (95 %)\n", "", "latency", "render", "picture", "beside these",
+  fmt::print("{:14} {:>16} {:>16} {:>16} {:>16} {:>16}   ms: median (95 %)\n", "", "latency", "render", "picture", "beside these",
              "before render");
 }
 
@@ -79,7 +79,7 @@ void PrintRow(const std::string& name, const Measured& measured) {
   const auto cell = [](const std::vector<double>& values) {
     return fmt::format("{:.2f} ({:.2f})", MedianOf(values).median, Quantile(values, 0.95));
   };
-  fmt::print("{:12} {:>16} {:>16} {:>16} {:>16} {:>16}\n", name, cell(measured.latency), cell(measured.render), cell(measured.finish),
+  fmt::print("{:14} {:>16} {:>16} {:>16} {:>16} {:>16}\n", name, cell(measured.latency), cell(measured.render), cell(measured.finish),
              cell(measured.beside), cell(measured.before));
   std::fflush(stdout);
 }
@@ -91,6 +91,15 @@ Measured MeasureProcesses(const Options& options, const std::string& listen, con
   Context context;
   Client client = service.Connect(context);
   return Measure(client, "sphere", options);
+}
+
+// With keys: pictures straight from workers, and through the coordinator. Call before this process has threads.
+std::pair<Measured, Measured> MeasureWithKeys(const Options& options, const std::string& directory) {
+  const ServiceProcesses service(
+      {.directory = directory, .volume = options.volume, .workers = options.workers, .threads = options.threads, .keys = true});
+  Context context;
+  Client direct = service.Connect(context), relayed = service.Connect(context, false);
+  return {Measure(direct, "sphere", options), Measure(relayed, "sphere", options)};
 }
 
 Measured MeasureEmbedded(const Options& options, const std::shared_ptr<const Volume>& volume, int workers, int threads) {
@@ -108,6 +117,9 @@ Status Run(const Options& options) {
   PrintHead();
   const std::pair<const char*, std::string> transports[] = {{"tcp", "tcp://127.0.0.1:*"}, {"ipc", "ipc://" + directory + "/service"}};
   for (const auto& [name, listen] : transports) PrintRow(name, MeasureProcesses(options, listen, directory));
+  const auto [direct, relayed] = MeasureWithKeys(options, directory);
+  PrintRow("keys, direct", direct);
+  PrintRow("keys, relayed", relayed);
   PrintRow("embedded", MeasureEmbedded(options, sphere, options.workers, options.threads));
   if (options.workers > 1) PrintRow("embedded, 1", MeasureEmbedded(options, sphere, 1, options.workers * options.threads));
   return Status::Ok();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "client/service/service_state.h"
 #include "common/base/check.h"
 #include "common/base/program_beside.h"
 #include "common/volume/sphere.h"
@@ -13,6 +14,8 @@ namespace {
 
 constexpr Duration kPatience = std::chrono::seconds(30);
 
+std::string KeysIn(const ServiceProcessesOptions& options) { return options.directory + "/keys"; }
+
 Child StartProgram(const ServiceProcessesOptions& options, const std::string& name, const std::vector<std::string>& arguments) {
   std::vector<std::string> command = {ProgramBeside(name).value()};
   for (const auto* list : {&arguments, &options.arguments_of_each}) command.insert(command.end(), list->begin(), list->end());
@@ -21,6 +24,7 @@ Child StartProgram(const ServiceProcessesOptions& options, const std::string& na
 
 Child StartCoordinator(const ServiceProcessesOptions& options) {
   std::vector<std::string> arguments = {"--listen", options.listen};
+  if (options.keys) arguments.insert(arguments.end(), {"--keys", KeysIn(options)});
   const auto add = [&](const std::string& name, int size) {
     const std::string file = options.directory + "/" + name + ".mha";
     CHECK(WriteVolume(MakeSphere({.sphere_class = SphereClass::kHollow, .size = size}).value(), file).ok());
@@ -36,9 +40,15 @@ Child StartCoordinator(const ServiceProcessesOptions& options) {
 ServiceProcesses::ServiceProcesses(const ServiceProcessesOptions& options) : coordinator_(StartCoordinator(options)) {
   const std::string line = coordinator_.ReadLine(kPatience).value();
   endpoint_ = ValueIn(line, "client");
+  if (options.keys) keys_ = KeysIn(options);
   for (int i = 0; i < options.workers; ++i) {
-    workers_.push_back(StartProgram(options, "slabstream-worker",
-                                    {"--coordinator", ValueIn(line, "workers"), "--threads", std::to_string(options.threads)}));
+    std::vector<std::string> arguments = {"--threads", std::to_string(options.threads)};
+    if (options.keys) {
+      arguments.insert(arguments.end(), {"--service", keys_ + "/worker.json"});
+    } else {
+      arguments.insert(arguments.end(), {"--coordinator", ValueIn(line, "workers")});
+    }
+    workers_.push_back(StartProgram(options, "slabstream-worker", arguments));
   }
 }
 
@@ -47,8 +57,10 @@ ServiceProcesses::~ServiceProcesses() {
   coordinator_.Terminate(kPatience);
 }
 
-Client ServiceProcesses::Connect(Context& context) const {
-  Client client = Client::Connect(context, endpoint_).value();
+Client ServiceProcesses::Connect(Context& context, bool direct_pictures) const {
+  ServiceAddress address = keys_.empty() ? ServiceAddress(endpoint_) : ResolveService({.file = keys_ + "/client.json"}).value();
+  address.direct_pictures = direct_pictures;
+  Client client = Client::Connect(context, address).value();
   while (client.QueryStatus().value().workers.size() < workers_.size()) ::usleep(10000);
   return client;
 }

@@ -17,6 +17,7 @@ struct ServiceProcessesOptions {
   int volume = 64;                             // voxels a side of the sphere
   int other_volume = 0;                        // of the other one; 0: there is none
   int workers = 2, threads = 1;                // threads: of each worker
+  bool keys = false;                           // connections are encrypted; keys are made in the directory
   std::vector<std::string> arguments_of_each;  // further ones, of the coordinator and of each worker
 };
 
@@ -30,13 +31,14 @@ class ServiceProcesses {
   ServiceProcesses& operator=(const ServiceProcesses&) = delete;
 
   // Connects once all workers have registered.
-  Client Connect(Context& context) const;
+  Client Connect(Context& context, bool direct_pictures = true) const;
   const std::string& endpoint() const { return endpoint_; }  // of clients
   std::vector<std::pair<std::string, pid_t>> pids() const;   // by name: "coordinator", "worker 1"
 
  private:
   Child coordinator_;
   std::string endpoint_;
+  std::string keys_;  // folder; empty: there are none
   std::vector<Child> workers_;
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/direct_pictures.h"
 #include "common/base/any_of.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
@@ -29,7 +30,8 @@ struct OpenRequest {
   Time submitted, deadline;
   int unknown_pongs = 0;  // in a row
   int resubmits = 0;
-  bool cancelled = false;  // by the caller; the service has not answered yet
+  bool cancelled = false;       // by the caller; the service has not answered yet
+  bool awaits_picture = false;  // the service has done its part, and need not know it any more
 };
 
 // The checked picture of a reply: whoever answers at the endpoint may send anything.
@@ -51,6 +53,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize
   picture.groups_done = reply.groups_done;
   picture.group_count = reply.group_count;
   picture.statistics = std::move(reply.statistics);
+  picture.direct = reply.direct;
   return picture;
 }
 
@@ -85,13 +88,23 @@ std::string Milliseconds(Duration duration) {
   return std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) + " ms";
 }
 
+// A reply whose runs come straight from a worker.
+struct AwaitedPicture {
+  FrameReply reply;
+  Time until;  // then they are taken for lost
+};
+
 constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 }  // namespace
 
 struct Client::Impl {
-  Impl(std::string service_endpoint, Socket service_socket, ClientTiming client_timing)
-      : endpoint(std::move(service_endpoint)), socket(std::move(service_socket)), timing(client_timing) {}
+  Impl(Context& client_context, const ServiceAddress& service, Socket service_socket, ClientTiming client_timing)
+      : context(client_context),
+        endpoint(service.endpoint),
+        takes_pictures(service.keys.has_value() && service.direct_pictures),
+        socket(std::move(service_socket)),
+        timing(client_timing) {}
 
   Status Send(MessageView message) { return socket.Send({}, Encode(message)); }
 
@@ -114,8 +127,15 @@ struct Client::Impl {
   Result<Reply> Await(RequestId id);
   void SendPing(Time now);
   bool Receive();  // true: something came
+  // Else the service takes it for one that does not read.
+  void TellReceived() {
+    if (received_bytes - told_bytes >= kTellBytes) SendPing(MonotonicNow());
+  }
   void Handle(CoordinatorToClient& message, const Bytes& payload);
   void Handle(FrameReply& reply, const Bytes& payload);
+  void OpenDirectPictures();
+  void MatchPictures();           // hands over the awaited ones that have come
+  bool ExpirePictures(Time now);  // asks for those that are lost; true: there are some
   void Handle(const ClientPong& pong);
   void SubmitAgain(OpenRequest& lost);
   void End(RequestId request, decltype(Event::what) end);  // nothing happens if it has ended
@@ -125,7 +145,9 @@ struct Client::Impl {
   // The reason, once the service counts as gone.
   std::optional<std::string> Loss(Time now) const;
 
+  Context& context;
   std::string endpoint;
+  const bool takes_pictures;  // straight from workers, if they reach this host
   Socket socket;
   ClientTiming timing;
   const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
@@ -136,6 +158,9 @@ struct Client::Impl {
   std::map<RequestId, OpenRequest> open;
   std::map<RequestId, OpenQuestion> questions;             // by nonce
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
+  std::unique_ptr<DirectPictures> direct;                  // from the first frame on; null: there is no such way
+  bool direct_opened = false;                              // or tried
+  std::vector<AwaitedPicture> awaited;                     // in the order of their replies
   std::deque<Event> events;
   Time next_ping;
   std::optional<Time> unanswered_since;  // time of the first ping since the last message
@@ -149,6 +174,7 @@ void Client::Impl::Submit(const SubmitFrame& message) {
 
 void Client::Impl::SendPing(Time now) {
   ClientPing ping{.nonce = ++last_id, .open = {}, .received_bytes = received_bytes};
+  if (direct) ping.senders = direct->senders();
   told_bytes = received_bytes;
   for (const auto& [request, unused] : open) {
     if (ping.open.size() < kMaxOpenRequests) ping.open.push_back(request);
@@ -170,6 +196,7 @@ bool Client::Impl::Pump(Time limit) {
   bool ready = Receive();
   Time now = MonotonicNow();
   if (ExpireQuestions(now)) ready = true;
+  if (ExpirePictures(now)) ready = true;
   if (!open.empty() || !questions.empty()) {
     if (now >= next_ping) SendPing(now);
     if (const std::optional<std::string> loss = Loss(now)) {
@@ -179,9 +206,11 @@ bool Client::Impl::Pump(Time limit) {
     limit = std::min(limit, next_ping);
     if (unanswered_since && !same_process) limit = std::min(limit, *unanswered_since + timing.silence);
     for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
+    for (const AwaitedPicture& picture : awaited) limit = std::min(limit, picture.until);
   }
   if (ready) return false;  // this may be what the caller waits for
-  const std::array<Socket*, 1> sockets = {&socket};
+  std::vector<Socket*> sockets = {&socket};
+  if (direct) sockets.push_back(&direct->socket());
   now = MonotonicNow();
   const bool woken = Wait(sockets, &wakeup, std::max<Duration>(limit - now, Duration::zero()));
   Receive();  // a message may come together with a wakeup, which is told all the same: nobody notifies twice
@@ -201,8 +230,14 @@ bool Client::Impl::Receive() {
     unanswered_since.reset();
     received_bytes += payload.size();
     Handle(*message, payload);
-    if (received_bytes - told_bytes >= kTellBytes) SendPing(MonotonicNow());  // else the service takes it for one that does not read
+    TellReceived();
   }
+  if (const std::uint64_t bytes = direct ? direct->Receive() : 0; bytes > 0) {
+    received = true;
+    received_bytes += bytes;
+    TellReceived();
+  }
+  MatchPictures();
   return received;
 }
 
@@ -221,9 +256,54 @@ void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
   std::visit(handle, message);
 }
 
+void Client::Impl::OpenDirectPictures() {
+  if (std::exchange(direct_opened, true) || !takes_pictures) return;
+  direct = DirectPictures::Open(context, endpoint);
+  if (direct) SendPing(MonotonicNow());  // the answer says whom to admit
+}
+
+void Client::Impl::MatchPictures() {
+  if (!direct) return;
+  if (open.empty()) direct->DropAll();  // of requests that were cancelled
+  std::vector<std::pair<FrameReply, Bytes>> come;
+  std::erase_if(awaited, [&](AwaitedPicture& picture) {
+    if (!open.contains(picture.reply.request)) return true;  // cancelled
+    std::optional<Bytes> payload = direct->Take(picture.reply.runs.digest, picture.reply.runs.encoded_bytes);
+    if (payload) come.emplace_back(std::move(picture.reply), *std::move(payload));
+    return payload.has_value();
+  });
+  for (auto& [reply, payload] : come) Handle(reply, payload);
+}
+
+bool Client::Impl::ExpirePictures(Time now) {
+  std::vector<FrameReply> lost;
+  std::erase_if(awaited, [&](AwaitedPicture& picture) {
+    if (now < picture.until) return false;
+    lost.push_back(std::move(picture.reply));
+    return true;
+  });
+  for (const FrameReply& reply : lost) {
+    const auto found = open.find(reply.request);
+    if (found == open.end() || reply.groups_done < reply.group_count) continue;  // previews are not repeated
+    found->second.message.pictures.reset();
+    found->second.awaits_picture = false;
+    SubmitAgain(found->second);
+  }
+  return !lost.empty();
+}
+
 void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
   const auto found = open.find(reply.request);
   if (found == open.end()) return;  // cancelled, or a duplicate
+  if (reply.direct && payload.empty()) {
+    if (!direct) return End(reply.request, Status::DataLoss("the service sent a picture on a way that this client does not have"));
+    if (reply.groups_done == reply.group_count) found->second.awaits_picture = true;
+    constexpr std::uint64_t kSlowBytesPerMillisecond = 1000;  // over a slower link, pictures come twice
+    const Time until =
+        MonotonicNow() + timing.lost_picture + std::chrono::milliseconds(reply.runs.encoded_bytes / kSlowBytesPerMillisecond);
+    awaited.push_back({std::move(reply), until});
+    return;
+  }
   Result<Picture> picture = DecodePicture(reply, payload, found->second.message.frame.size);
   if (!picture.ok()) {
     End(reply.request, picture.status());
@@ -238,6 +318,7 @@ void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
 
 void Client::Impl::Handle(const ClientPong& pong) {
   const auto ping = pinged.find(pong.nonce);
+  if (pong.senders && direct) direct->Admit(*pong.senders);
   if (ping == pinged.end()) return;
   const std::vector<RequestId> asked = std::move(ping->second);
   pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
@@ -245,6 +326,7 @@ void Client::Impl::Handle(const ClientPong& pong) {
     const auto found = open.find(request);
     if (found == open.end()) continue;
     OpenRequest& state = found->second;
+    if (state.awaits_picture) continue;
     if (std::find(pong.known.begin(), pong.known.end(), request) != pong.known.end()) {
       state.unknown_pongs = 0;
     } else if (++state.unknown_pongs >= kUnknownPongs) {
@@ -290,6 +372,7 @@ void Client::Impl::FailAll(const std::string& reason) {
   while (!questions.empty()) End(questions.begin()->first, Status::Unavailable(reason));
   while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
   pinged.clear();
+  awaited.clear();
   unanswered_since.reset();
 }
 
@@ -298,7 +381,7 @@ Result<Client> Client::Connect(Context& context, const ServiceAddress& service, 
   Result<Socket> socket = Socket::Dealer(context, {.client_keys = service.keys});
   if (!socket.ok()) return socket.status();
   if (Status connected = socket->Connect(service.endpoint); !connected.ok()) return connected;
-  Client client(std::make_unique<Impl>(service.endpoint, std::move(*socket), timing));
+  Client client(std::make_unique<Impl>(context, service, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
   constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up
   for (const Time end = MonotonicNow() + timeout; !client.impl_->pinged.empty();) {
@@ -321,7 +404,9 @@ Client::~Client() {
 RequestId Client::Submit(const FrameRequest& request, Duration deadline) {
   const RequestId id = ++impl_->last_id;
   const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(deadline).count();
+  impl_->OpenDirectPictures();
   SubmitFrame message{.request = id, .deadline_ms = std::uint32_t(std::clamp<std::int64_t>(ms, 1, kMaxDeadlineMs)), .frame = request};
+  if (impl_->direct) message.pictures = impl_->direct->door();
   const Time now = MonotonicNow();
   const Time limit = now + std::chrono::milliseconds(message.deadline_ms);
   impl_->open.emplace(id, OpenRequest{.message = message, .submitted = now, .deadline = limit});

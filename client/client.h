@@ -30,6 +30,7 @@ struct Picture {
   std::uint32_t groups_done = 1, group_count = 1;
   FrameStatistics statistics;  // final only
   Duration latency{};          // request to last byte, measured here; final only
+  bool direct = false;         // it came straight from a worker, not through the coordinator
 };
 
 struct ClientEvent {
@@ -45,6 +46,7 @@ struct ServiceAddress {
 
   std::string endpoint;
   std::optional<ClientKeys> keys;  // of role client or admin; none: the service has no keys
+  bool direct_pictures = true;     // with keys, workers that can reach this host send it pictures; else all come through the coordinator
 };
 
 struct ClientTiming {
@@ -52,6 +54,9 @@ struct ClientTiming {
   // If a ping has had no answer for this long, the service counts as gone. A service in the same process (inproc) cannot be lost, only be
   // slow: it counts as gone when it has ended.
   Duration silence = std::chrono::seconds(5);
+  // If the service says that a worker has sent a picture, and it does not come for this long, and 1 s longer a MB, it is asked for again,
+  // this time through the coordinator.
+  Duration lost_picture = std::chrono::seconds(5);
 };
 
 inline constexpr Duration kAnswerTime = std::chrono::minutes(2);  // for an answer to a question: volumes may have to be loaded first

@@ -337,6 +337,9 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
     peer.memory_scope = description.memory_scope;
     peer.images_key = description.images_key;
   }
+  if (const Member* display = roster.Find(out.assignment.display); display != nullptr && !display->description.images_key.empty()) {
+    out.assignment.pictures = frame.request().pictures;
+  }
   for (const WorkerId worker : out.workers) SendWorker(worker, out.assignment);
 }
 

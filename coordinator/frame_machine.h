@@ -78,6 +78,7 @@ struct FromWorker {
 struct FromClient {
   PeerToken from = 0;
   ClientToFrames message;
+  std::string host = {};  // that it has connected from, as in an endpoint; empty: not known
 };
 // The client has said something to the DatasetMachine, too.
 struct ClientHeard {

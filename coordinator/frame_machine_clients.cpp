@@ -9,13 +9,24 @@
 
 namespace slabstream {
 
-void FrameMachine::State::OnClientMessage(PeerToken client, const SubmitFrame& message) {
+namespace {
+
+// Nobody but the client itself is connected to, whatever it says.
+std::optional<PicturesAddress> AddressOf(const std::optional<PicturesDoor>& door, const std::string& host) {
+  if (!door || host.empty()) return std::nullopt;
+  return PicturesAddress{fmt::format("tcp://{}:{}", host, door->port), door->key};
+}
+
+}  // namespace
+
+void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& message) {
+  const PeerToken client = event.from;
   clients.Meet(client, now);
   if (IsOpen(client, message.request)) return;
   if (Answer* answer = clients.FindAnswer(client, message.request)) return SendAnswer(client, *answer);
 
   const Policy& policy = message.frame.policy;
-  OpenRequest request{.client = client, .submit = message, .arrived = now};
+  OpenRequest request{.client = client, .submit = message, .pictures = AddressOf(message.pictures, event.host), .arrived = now};
   if (Status names = CheckNames(policy); !names.ok()) return FailRequest(request, names, &RefusedRequests::bad_request);
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
   request.use = ++last_use;
@@ -111,6 +122,10 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& me
     // If the client asks long after the answer was sent, a connection must have lost it.
     if (answer != nullptr && now >= answer->sent + config.client_timeout / 2) SendAnswer(client, *answer);
   }
+  if (message.senders) {
+    PictureSenders senders = roster.SendersOfPictures();
+    if (senders.version != *message.senders) pong.senders = std::move(senders);
+  }
   SendClient(client, std::move(pong));
 }
 
@@ -171,6 +186,8 @@ void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {
 
 void FrameMachine::State::EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload) {
   SendClient(client, message, payload);
+  // What went straight to the client cannot be sent again: if it asks again, the frame is made anew.
+  if (const auto* reply = std::get_if<FrameReply>(&message); reply != nullptr && reply->direct) return;
   clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
 }
 

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/overloaded.h"
 #include "coordinator/clients.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/frames_in_flight.h"
@@ -70,7 +71,9 @@ struct FrameMachine::State {
   }
   void On(const FromClient& event) {
     clients.Touch(event.from, now);
-    std::visit([&](const auto& message) { OnClientMessage(event.from, message); }, event.message);
+    std::visit(Overloaded{[&](const SubmitFrame& message) { OnSubmit(event, message); },
+                          [&](const auto& message) { OnClientMessage(event.from, message); }},
+               event.message);
   }
   void On(const WorkerGone& event) {
     for (const WorkerId worker : roster.At(event.who)) LoseWorker(worker, LiveRoster::Loss::kGone);
@@ -96,7 +99,7 @@ struct FrameMachine::State {
   }
 
   // ---- messages of clients
-  void OnClientMessage(PeerToken client, const SubmitFrame& message);
+  void OnSubmit(const FromClient& event, const SubmitFrame& message);
   void OnClientMessage(PeerToken client, const CancelFrame& message);
   void OnClientMessage(PeerToken client, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);

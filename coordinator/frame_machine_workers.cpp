@@ -50,7 +50,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   if (!IsFrom(event, message.epoch, message.worker)) return;
   roster.Touch(message.worker, now);
   RunningFrame* frame = frames.Find(message.frame);
-  if (frame == nullptr) return;
+  if (frame == nullptr || (message.direct && !frame->request().pictures)) return;
   const std::uint32_t groups_before = frame->groups_done();
   const RunningFrame::Use use = frame->OnImage(message, now);
   if (frame->groups_done() > groups_before) AfterGroupDone(*frame);
@@ -63,7 +63,9 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .group_count = message.group_count,
                    .runs = message.runs,
                    .statistics = {},
-                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry)};
+                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry),
+                   .direct = message.direct};
+  if (message.direct) clients.Sent(request.client, message.runs.encoded_bytes);
   if (use == RunningFrame::Use::kPreview) {
     if (clients.IsBehind(request.client)) return;
     SendClient(request.client, std::move(reply), event.payload);

@@ -37,6 +37,7 @@ struct PlanMade {
 struct OpenRequest {
   PeerToken client = 0;
   SubmitFrame submit;
+  std::optional<PicturesAddress> pictures = {};  // where its client takes them
   Time arrived;
   UseId use = 0;             // of its dataset
   std::string lowered = {};  // FrameStatistics::lowered

@@ -1,8 +1,11 @@
 #include "coordinator/roster.h"
 
 #include <algorithm>
+#include <span>
+#include <string>
 #include <utility>
 
+#include "common/wire/digest.h"
 #include "common/wire/limits.h"
 
 namespace slabstream {
@@ -145,6 +148,19 @@ std::vector<WorkerId> LiveRoster::At(PeerToken peer) const {
 
 std::vector<WorkerId> LiveRoster::Silent(Time now) const {
   return IdsOf(members_, [&](const Member& member) { return now >= member.last_heard + timeout_; });
+}
+
+PictureSenders LiveRoster::SendersOfPictures() const {
+  PictureSenders senders;
+  std::string text;
+  for (const Member& member : members_) {
+    const std::string& key = member.description.images_key;
+    if (key.empty() || senders.keys.size() == kMaxListed) continue;
+    senders.keys.push_back(key);
+    text += key;
+  }
+  senders.version = std::max<std::uint64_t>(1, Digest(std::as_bytes(std::span(text))));
+  return senders;
 }
 
 std::vector<WorkerId> LiveRoster::Leaving() const {

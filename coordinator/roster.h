@@ -66,6 +66,7 @@ class LiveRoster {
   // Removed within the last two timeouts, at most kMaxPeers of them: whoever has not heard of it by then registers anew.
   std::vector<WorkerId> Gone(Time now) const;
   const std::vector<Member>& members() const { return members_; }
+  PictureSenders SendersOfPictures() const;  // all members with keys
   std::vector<WorkerId> Leaving() const;
   std::size_t staying() const;  // members that are not leaving
   bool empty() const { return members_.empty(); }

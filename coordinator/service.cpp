@@ -251,7 +251,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     std::visit(
         [&, from = client_peers.Heard(incoming->identity, MonotonicNow())]<class Message>(Message& each) {
           if constexpr (std::constructible_from<ClientToFrames, Message>) {
-            HandleEvent(FromClient{from, std::move(each)});
+            HandleEvent(FromClient{from, std::move(each), incoming->host});
           } else if constexpr (std::constructible_from<ClientToDatasets, Message>) {
             HandleEvent(ClientHeard{from, std::is_same_v<Message, AddVolume>});
             HandleEvent(ClientAsked{from, std::move(each), incoming->payload()});

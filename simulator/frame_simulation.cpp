@@ -139,10 +139,13 @@ void FrameSimulation::Perform(ToClient& action) {
   if (reply == nullptr) return;  // news of progress travels for free
   const auto frame = std::uint32_t(reply->request - 1);
   timeline_.frames[frame].done = now();
-  // The coordinator decrypts and encrypts; the client decrypts.
-  const double bytes = inputs_[frame].picture_bytes, cipher = bytes * machine_.picture.cipher_byte;
-  coordinator_passed_ = std::max(coordinator_passed_, service_.coordinator_free()) + 2 * cipher;
-  client_passed_ = std::max(client_passed_, coordinator_passed_ + bytes * machine_.picture.link_byte) + cipher;
+  // The coordinator decrypts and encrypts, unless the picture does not pass it; the client decrypts.
+  const PictureWay& way = machine_.picture;
+  const double bytes = inputs_[frame].picture_bytes, cipher = bytes * way.cipher_byte;
+  coordinator_passed_ = std::max(coordinator_passed_, service_.coordinator_free()) + (way.direct ? 0 : 2 * cipher);
+  const double there =
+      way.direct ? std::max(coordinator_passed_, frames_.at(frame).picture_there) : coordinator_passed_ + bytes * way.link_byte;
+  client_passed_ = std::max(client_passed_, there) + cipher;
   const double arrival = service_.threads().Begin(Threads::kClient, client_passed_ + machine_.client_seconds);
   service_.queue().At(arrival + inputs_[frame].receive_seconds, [this, frame] { OnPicture(frame); });
 }
@@ -298,7 +301,9 @@ Arrivals FrameSimulation::ToCoordinator(Node, WorkerToCoordinator& message) {
   if (const auto* trouble = std::get_if<WorkerTrouble>(&message)) CHECK(false) << trouble->status.message();
   double arrival = service_.now() + machine_.link.latency_seconds;
   if (const auto* picture = std::get_if<FrameImage>(&message)) {
-    arrival += inputs_[frame_of_.at(picture->frame)].picture_bytes * machine_.picture.link_byte;
+    const std::uint32_t frame = frame_of_.at(picture->frame);
+    const double whole = arrival + inputs_[frame].picture_bytes * machine_.picture.link_byte;
+    (machine_.picture.direct ? frames_.at(frame).picture_there : arrival) = whole;
   }
   return Arrivals::At(arrival);
 }

@@ -34,6 +34,7 @@ class FrameSimulation : private Conditions {
   struct Frame {
     std::map<std::uint32_t, Group> groups;  // handed out, and not done as far as the coordinator knows
     FrameAccount account;                   // from its plan until its picture is received
+    double picture_there = 0;               // when a direct picture is at the client
   };
 
   const FramePlan& plan(std::uint32_t frame) const { return *inputs_[frame].plan; }

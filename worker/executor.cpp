@@ -394,7 +394,7 @@ void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& 
   send.message.runs.image = runs.header;
   const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
   AddStage(report, Stage::kEncode, resolved_ns, NowNs());
-  outbox_.Post(OutgoingFrame{key, Encode(send.message), payload});
+  outbox_.Post(OutgoingFrame{key, std::move(send.message), payload, std::move(send.pictures)});
 }
 
 void Executor::Perform(const ReleaseImage& action) { images_.erase(action.image); }

@@ -48,9 +48,10 @@ struct OutgoingPartial {
 };
 struct OutgoingFrame {
   GroupKey key;  // the last group that it shows
-  std::vector<std::byte> header;
+  FrameImage message;
   Bytes payload;
-};  // to the coordinator
+  std::optional<PicturesAddress> pictures;  // as in SendFrame
+};
 using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
 
 // Called with the name of each task when the task begins, on its thread. If it throws, the task fails. For tests; may be empty.

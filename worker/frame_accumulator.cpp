@@ -17,6 +17,7 @@ FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId s
       group_count_(assignment.group_count),
       previews_(assignment.previews),
       setup_(std::make_shared<const FrameSetup>(assignment.setup)),
+      pictures_(assignment.pictures),
       pixels_(WholeFrame(assignment.setup)),
       names_(names),
       attempt_(assignment.key.attempt) {}
@@ -117,7 +118,7 @@ void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) c
 void FrameAccumulator::SendPicture(WorkerActions& actions) {
   FrameImage message{epoch_, self_, frame_, attempt_, groups_done_, group_count_, {}, {}};
   message.runs.image.format = setup_->format;
-  actions.push_back(SendFrame{client_, std::move(message), image_, setup_});
+  actions.push_back(SendFrame{client_, std::move(message), image_, setup_, pictures_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

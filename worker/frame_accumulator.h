@@ -50,6 +50,7 @@ class FrameAccumulator {
   const std::uint32_t group_count_;
   const bool previews_;
   const std::shared_ptr<const FrameSetup> setup_;
+  const std::optional<PicturesAddress> pictures_;
   const PixelRange pixels_;
   ImageNames& names_;
 

@@ -25,6 +25,7 @@
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
+#include "worker/picture_sockets.h"
 #include "worker/stored_voxels.h"
 #include "worker/worker_metrics.h"
 
@@ -77,6 +78,7 @@ struct WorkerService::Impl {
         images(std::move(images_socket)),
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
+        pictures(service_context, keys ? std::optional(keys->own) : std::nullopt),
         executor(std::in_place, outbox, options.machine.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw,
                  int(options.machine.threads), options.make_renderer, options.task_hook) {}
 
@@ -104,6 +106,7 @@ struct WorkerService::Impl {
     executor->Perform(std::move(action));
   }
   void Send(Socket& socket, MessageView message);
+  Status Send(OutgoingFrame& frame);  // its payload straight to the client, if there is a way
 
   Context& context;
   const WorkerOptions options;
@@ -115,6 +118,7 @@ struct WorkerService::Impl {
   std::optional<Socket> voxels;  // once the coordinator has named its endpoint
   std::string voxels_endpoint;
   PeerSockets peers;
+  PictureSockets pictures;
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
@@ -174,6 +178,7 @@ Status WorkerService::Impl::Loop() {
       HandleEvent(StopRequested{});
     }
     peers.CloseIdle(now);
+    pictures.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
     if (control.refused()) {
       return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
@@ -211,6 +216,9 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
         continue;
       }
     }
+    if (const auto* group = std::get_if<GroupAssignment>(&message);
+        group != nullptr && group->display == machine.worker() && group->pictures)
+      pictures.Prepare(*group->pictures, MonotonicNow());
     HandleEvent(MessageReceived{std::move(message), std::move(payload)});
   }
 }
@@ -243,9 +251,9 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
   } else if (auto* frame = std::get_if<OutgoingFrame>(&output)) {
     const Status sent = Guarded("send", [&] {
       if (options.task_hook) options.task_hook("send");
-      return control.Send({}, std::move(frame->header), frame->payload);
+      return Send(*frame);
     });
-    metrics.CountSent(Plane::kControl, frame->payload.size(), sent.ok());
+    metrics.CountSent(Plane::kPictures, frame->payload.size(), sent.ok());
     if (!sent.ok()) HandleEvent(SendFailed{frame->key, sent});
   } else {
     auto& partial = std::get<OutgoingPartial>(output);
@@ -261,6 +269,12 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
     LogWarning("worker " + std::to_string(partial.to.worker) + " is not reached: " + sent.message());
     HandleEvent(PeerUnreachable{partial.to.worker});
   }
+}
+
+Status WorkerService::Impl::Send(OutgoingFrame& frame) {
+  const SentPicture picture{.digest = frame.message.runs.digest, .bytes = frame.payload.size()};
+  frame.message.direct = frame.pictures && !frame.payload.empty() && pictures.Send(*frame.pictures, picture, frame.payload, MonotonicNow());
+  return control.Send({}, Encode(frame.message), frame.message.direct ? Bytes() : frame.payload);
 }
 
 // Lost messages are not sent again here: registration, heartbeats and requests repeat.

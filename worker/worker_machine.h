@@ -284,13 +284,14 @@ struct ForgetGroups {
            (key.frame == next.frame && (key.attempt < next.attempt || key.group < next.group));
   }
 };
-// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator. -> SendFailed, or
-// nothing.
+// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator; the payload
+// straight to the client, if that is possible. -> SendFailed, or nothing.
 struct SendFrame {
   ClientId client = 0;
   FrameImage message;
   ImageHandle image = 0;
   std::shared_ptr<const FrameSetup> setup;
+  std::optional<PicturesAddress> pictures = {};  // where its client takes it; none: through the coordinator
 };
 // Runs after everything that was started before it. Every handle that is named in a StartRender, or as a new image in a StartCombine, is
 // released exactly once, even if making the image failed.

@@ -21,7 +21,7 @@ class WorkerMetrics {
   explicit WorkerMetrics(std::uint64_t memory_limit) : memory_limit_(memory_limit) {}
 
   void Count(const WorkerEvent& event);                           // of those of the executor
-  void CountSent(Plane plane, std::size_t bytes, bool has_left);  // a payload: kImages, to a worker; kControl, a picture
+  void CountSent(Plane plane, std::size_t bytes, bool has_left);  // a payload: kImages, to a worker; kPictures, to a client
 
   Snapshot<WorkerCounts> now;
 

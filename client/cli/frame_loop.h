@@ -18,6 +18,7 @@ struct FrameRecord {
   Time received{};             // when the last byte was there
   FrameStatistics statistics;  // reports only if they were asked for
   bool empty = false;          // the picture shows nothing
+  bool direct = false;         // it came straight from a worker, not through the coordinator
 };
 
 struct FrameLoopOptions {

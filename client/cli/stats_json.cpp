@@ -40,6 +40,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
   Json json = {{"output", frame.output},
                {"latency_ms", Milliseconds(frame.latency.count())},
                {"queued_ms", Milliseconds(frame.statistics.queued_ns)},
+               {"direct", frame.direct},
                {"attempts", frame.statistics.attempts},
                {"workers", frame.statistics.workers},
                {"levels", LevelsJson(frame.statistics)},

@@ -4,8 +4,9 @@
 //     "plan": {"workers", "groups", "decomposition", "balance_by", "axis",       of the last frame: a lost worker changes it
 //              "assignment", "balance", "combine"},
 //     "bytes": {"voxels", "images"},                                        of all frames
-//     "frames": [{"output", "latency_ms", "queued_ms", "attempts", "workers", "bytes": {...}, "stages_ms": {stage: worker time},
-//                 "imbalance", "idle_share"}] }
+//     "frames": [{"output", "latency_ms", "queued_ms",
+//                 "direct": whether the picture came straight from a worker, not through the coordinator,
+//                 "attempts", "workers", "bytes": {...}, "stages_ms": {stage: worker time}, "imbalance", "idle_share"}] }
 #pragma once
 
 #include <string>

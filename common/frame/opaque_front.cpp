@@ -46,16 +46,18 @@ TileBeam::Area TileBeam::Between(double j, double k) const {
 
 double TileBeam::LeastLength(const SliceAxes& axes, const Vec3& spacing) const {
   // With t the angle between a ray and the normal of slices, the length is the slices' distance over cos t. A ray between the corners has
-  // an angle to one of them that is at most the largest one between two corners.
+  // an angle to one of them that is at most the largest one between two corners, `across`.
   const double distance = spacing[axes.c];
-  double least_angle = std::numeric_limits<double>::infinity(), across = 0;
+  double cos_least = 0, cos_across = 1;
   std::array<Vec3, 4> directions;
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     directions[i] = Normalized(Vec3{corners_[i].u_k * spacing[axes.u], corners_[i].v_k * spacing[axes.v], distance});
-    least_angle = std::min(least_angle, std::acos(std::min(directions[i].z, 1.0)));
-    for (std::size_t j = 0; j < i; ++j) across = std::max(across, std::acos(std::clamp(Dot(directions[i], directions[j]), -1.0, 1.0)));
+    cos_least = std::max(cos_least, directions[i].z);
+    for (std::size_t j = 0; j < i; ++j) cos_across = std::min(cos_across, Dot(directions[i], directions[j]));
   }
-  return distance / std::cos(std::max(0.0, least_angle - across));
+  if (cos_least >= cos_across) return distance;
+  const auto sine = [](double cosine) { return std::sqrt(std::max(0.0, 1 - cosine * cosine)); };
+  return distance / (cos_least * cos_across + sine(cos_least) * sine(cos_across));
 }
 
 std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile) {

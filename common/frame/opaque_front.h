@@ -20,7 +20,7 @@ namespace slabstream {
 struct FrameSetup;
 
 struct OpaqueFront {
-  static constexpr std::int32_t kMostTiles = 64;  // along an axis
+  static constexpr std::int32_t kMostTiles = 32;  // along an axis
   static constexpr std::uint8_t kNever = 255;     // of `depths`
   using Depths = std::array<std::uint8_t, kOcclusionSteps>;
 
@@ -44,6 +44,8 @@ class TileBeam {
     double u_begin, v_begin, u_end, v_end;
   };
   explicit TileBeam(const std::array<Ray, 4>& corners) : corners_(corners) {}
+
+  const Ray& corner() const { return corners_.front(); }
 
   // A rectangle that holds where all rays meet the slices between j and k.
   Area Between(double j, double k) const;

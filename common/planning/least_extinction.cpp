@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "common/renderers/renderer_kind.h"
@@ -79,37 +80,65 @@ double ReachOfSamples(const FrameSetup& setup) {
   return reach;
 }
 
-// The least extinction of slices [begin, end) along a beam, 0 if it leaves the volume there.
+// Slices in the order of the camera: slice number t is the volume's t-th from the eye.
 class BeamMarch {
  public:
   BeamMarch(const LeastExtinction& extinction, const FrameSetup& setup)
       : extinction_(extinction),
         axes_(AxesOf(setup.camera.traversal_axis)),
         size_(setup.description.geometry.size),
+        ascending_(setup.camera.ascending),
         reach_(ReachOfSamples(setup)) {}
 
+  std::int32_t slices() const { return size_[axes_.c]; }
+
+  // The least extinction of slices [begin, end) along a beam, 0 if it leaves the volume there.
   float Between(const TileBeam& beam, std::int32_t begin, std::int32_t end) const {
+    if (!ascending_) std::tie(begin, end) = std::pair(slices() - end, slices() - begin);
     const TileBeam::Area area = beam.Between(begin - 0.5, end - 0.5);
     const double u_begin = area.u_begin - reach_, u_end = area.u_end + reach_, v_begin = area.v_begin - reach_, v_end = area.v_end + reach_;
     if (u_begin < 0 || v_begin < 0 || u_end > size_[axes_.u] - 1 || v_end > size_[axes_.v] - 1) return 0;
     if (begin < 1 || end > size_[axes_.c] - 1) return 0;
+    const std::int32_t last_u = BrickAt(axes_.u, u_end + 1), last_v = BrickAt(axes_.v, v_end + 1), last_c = BrickAt(axes_.c, end);
+    const std::int32_t first_u = std::int32_t(u_begin) / kBrick, first_v = std::int32_t(v_begin) / kBrick;
     LeastExtinction::Bins bins{std::numeric_limits<std::uint16_t>::max(), 0};
-    Index3 brick;
-    for (brick[axes_.c] = (begin - 1) / kBrick; brick[axes_.c] <= end / kBrick; ++brick[axes_.c]) {
-      for (brick[axes_.v] = std::int32_t(v_begin) / kBrick; brick[axes_.v] <= std::int32_t(v_end + 1) / kBrick; ++brick[axes_.v]) {
-        for (brick[axes_.u] = std::int32_t(u_begin) / kBrick; brick[axes_.u] <= std::int32_t(u_end + 1) / kBrick; ++brick[axes_.u]) {
-          const LeastExtinction::Bins& more = extinction_.bricks[NumberIn(extinction_.counts, Min(brick, extinction_.counts - Uniform(1)))];
-          bins = {std::min(bins.low, more.low), std::max(bins.high, more.high)};
+    for (std::int32_t c = (begin - 1) / kBrick; c <= last_c; ++c) {
+      for (std::int32_t v = first_v; v <= last_v; ++v) {
+        const LeastExtinction::Bins* brick = &At(first_u, v, c);
+        for (std::int32_t u = first_u; u <= last_u; ++u, brick += step_[axes_.u]) {
+          bins = {std::min(bins.low, brick->low), std::max(bins.high, brick->high)};
         }
       }
     }
     return extinction_.Of(bins);
   }
 
+  // From slice `begin` on, so many slices in which a ray of the beam lies in a brick of extinction 0, and so the beam's is 0. No more than
+  // the ray stays in one brick.
+  double EmptyFrom(const TileBeam::Ray& ray, std::int32_t begin) const {
+    const double k = ascending_ ? begin : slices() - 1 - begin, step = ascending_ ? 1 : -1;
+    const double u = ray.u_0 + k * ray.u_k, v = ray.v_0 + k * ray.v_k;
+    const auto outside = [&](Axis axis, double at) { return at < 0 || at > size_[axis] - 1; };
+    if (outside(axes_.u, u) || outside(axes_.v, v)) return 1;
+    const std::int32_t brick_u = BrickAt(axes_.u, u), brick_v = BrickAt(axes_.v, v), brick_c = BrickAt(axes_.c, k);
+    if (extinction_.Of(At(brick_u, brick_v, brick_c)) > 0) return 0;
+    const auto left = [](std::int32_t in, double at, double slope) {  // slices until it leaves the brick along this axis
+      return slope > 0 ? ((in + 1) * double(kBrick) - at) / slope : slope < 0 ? (in * double(kBrick) - at) / slope : 1e9;
+    };
+    return std::max(1.0, std::min({left(brick_u, u, step * ray.u_k), left(brick_v, v, step * ray.v_k), left(brick_c, k, step)}));
+  }
+
  private:
+  std::int32_t BrickAt(Axis axis, double voxel) const { return std::min(std::int32_t(voxel) / kBrick, extinction_.counts[axis] - 1); }
+  const LeastExtinction::Bins& At(std::int32_t u, std::int32_t v, std::int32_t c) const {
+    return extinction_.bricks[std::size_t(u * step_[axes_.u] + v * step_[axes_.v] + c * step_[axes_.c])];
+  }
+
   const LeastExtinction& extinction_;
+  const Index3 step_{1, extinction_.counts.x, extinction_.counts.x* extinction_.counts.y};  // from brick to brick, in `bricks`
   const SliceAxes axes_;
   const Index3 size_;
+  const bool ascending_;
   const double reach_;  // voxels within a slice
 };
 
@@ -144,9 +173,13 @@ OpaqueFront FindOpaqueFront(const LeastExtinction& extinction, const FrameSetup&
     double owed = lost;                                                                  // voxel lengths of this stretch that do not count
     std::size_t step = 0;
     for (std::int32_t before = 0; before < slices && step < depths.size(); before += kStride) {
+      if (const double empty = march.EmptyFrom(beam->corner(), before); empty > 0) {
+        owed = lost;
+        before += (std::int32_t(std::min(empty, double(slices))) - 1) / kStride * kStride;
+        continue;
+      }
       const std::int32_t after = std::min(before + kStride, slices);
-      const float least =
-          setup.camera.ascending ? march.Between(*beam, before, after) : march.Between(*beam, slices - after, slices - before);
+      const float least = march.Between(*beam, before, after);
       if (!(least > 0)) {
         owed = lost;
         continue;

@@ -158,6 +158,11 @@ void Authenticator::AdmitOnly(const std::string& plane, std::set<std::string> pu
   impl_->wakeup.Notify();
 }
 
+void Authenticator::Forget(const std::string& plane) {
+  const std::lock_guard lock(impl_->mutex);
+  impl_->planes.erase(plane);
+}
+
 void Authenticator::SetSealed(const std::string& plane, std::shared_ptr<LatestSeals> seals) {
   const std::lock_guard lock(impl_->mutex);
   impl_->planes[plane].seals = std::move(seals);

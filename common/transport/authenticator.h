@@ -23,6 +23,9 @@ class Authenticator {
   // Replaces the public keys that may connect to `plane`. Connections that are there stay (Socket::EndConnections ends them).
   void AdmitOnly(const std::string& plane, std::set<std::string> public_keys);
 
+  // The plane's socket is gone.
+  void Forget(const std::string& plane);
+
   // An unknown key is refused at once, and its socket does not try again. On a plane with patience it waits this long to be admitted, and
   // tries again after that. This is for planes that learn keys from messages, which the key's holder may have heard earlier.
   void SetPatience(const std::string& plane, Duration patience);

@@ -14,21 +14,36 @@ void ConnectionTable::Connection::ShutDown() const {
   if (open()) (void)::shutdown(descriptor, SHUT_RDWR);
 }
 
-std::string ConnectionTable::Heard(const std::string& identity, zmq::message_t& part) {
-  if (const auto known = connections_.find(identity); known != connections_.end()) return known->second.user;
+namespace {
+
+std::string Property(zmq::message_t& part, const char* name) {
+  const char* const value = zmq_msg_gets(part.handle(), name);  // null: the connection has no such property
+  return value == nullptr ? "" : value;
+}
+
+// IPv4 addresses that IPv6 sockets report, ::ffff:1.2.3.4, are those of IPv4.
+std::string HostOf(std::string address) {
+  constexpr std::string_view kMapped = "::ffff:";
+  if (address.starts_with(kMapped) && address.find('.') != std::string::npos) address.erase(0, kMapped.size());
+  return address.find(':') == std::string::npos ? address : "[" + address + "]";
+}
+
+}  // namespace
+
+ConnectionTable::Sender ConnectionTable::Heard(const std::string& identity, zmq::message_t& part) {
+  if (const auto known = connections_.find(identity); known != connections_.end()) return known->second.sender;
   if (connections_.size() >= next_sweep_) {
     std::erase_if(connections_, [](const auto& entry) { return !entry.second.open(); });
     next_sweep_ = std::max<std::size_t>(64, 2 * connections_.size());
   }
-  const char* const user = zmq_msg_gets(part.handle(), "User-Id");  // null over connections without CURVE
-  const int descriptor = zmq_msg_get(part.handle(), ZMQ_SRCFD);     // -1 over inproc
-  return connections_.insert_or_assign(identity, Connection{user == nullptr ? "" : user, descriptor, SocketCookie(descriptor)})
-      .first->second.user;
+  const int descriptor = zmq_msg_get(part.handle(), ZMQ_SRCFD);  // -1 over inproc
+  Sender sender = {Property(part, "User-Id"), HostOf(Property(part, "Peer-Address"))};
+  return connections_.insert_or_assign(identity, Connection{std::move(sender), descriptor, SocketCookie(descriptor)}).first->second.sender;
 }
 
 void ConnectionTable::End(const std::string& user) {
   std::erase_if(connections_, [&](const auto& entry) {
-    if (entry.second.user != user) return false;
+    if (entry.second.sender.user != user) return false;
     entry.second.ShutDown();
     return true;
   });

@@ -11,8 +11,12 @@ namespace slabstream {
 
 class ConnectionTable {
  public:
-  // The user that the connection `identity`, of which this message part has come, was admitted as; empty: it is not encrypted.
-  std::string Heard(const std::string& identity, zmq::message_t& part);
+  struct Sender {
+    std::string user;  // as it was admitted; empty: the connection is not encrypted
+    std::string host;  // its address, as the host of an endpoint; empty: not tcp
+  };
+  // Who is at the other end of the connection `identity`, of which this message part has come.
+  Sender Heard(const std::string& identity, zmq::message_t& part);
 
   // Shut down the user's connections, or the one of this identity, if they are still there; ZeroMQ then closes them.
   void End(const std::string& user);
@@ -20,7 +24,7 @@ class ConnectionTable {
 
  private:
   struct Connection {
-    std::string user;
+    Sender sender;
     int descriptor = -1;
     std::uint64_t cookie = 0;  // SocketCookie; 0: no socket
     bool open() const;

@@ -22,6 +22,8 @@ class ConnectionTuner : public ConnectionMonitor {
 
   // Somebody listens who does not admit the socket's key.
   bool refused() const { return refused_; }
+  // Whether there is a connection, and the other end has admitted this one.
+  bool connected() const { return connected_; }
   // Whether a connection broke, or could not be made, since the last call.
   bool TakeBroken() { return std::exchange(broken_, false); }
   // This host's address on the latest connection, as the host of an endpoint; empty: there was none.
@@ -29,11 +31,15 @@ class ConnectionTuner : public ConnectionMonitor {
 
  private:
   void on_event_connected(const zmq_event_t& event, const char* endpoint) override;
-  void on_event_disconnected(const zmq_event_t&, const char*) override { broken_ = true; }
+  void on_event_handshake_succeeded(const zmq_event_t&, const char*) override { connected_ = true; }
+  void on_event_disconnected(const zmq_event_t&, const char*) override {
+    broken_ = true;
+    connected_ = false;
+  }
   void on_event_closed(const zmq_event_t&, const char*) override { broken_ = true; }  // it could not be made
   void on_event_handshake_failed_auth(const zmq_event_t&, const char*) override { refused_ = true; }
 
-  bool refused_ = false, broken_ = false;
+  bool refused_ = false, connected_ = false, broken_ = false;
   std::string local_host_;
 };
 

@@ -43,6 +43,13 @@ struct Socket::Impl {
   std::vector<std::string> names;          // inproc endpoints bound here
   std::vector<IpcListener> listeners;      // ipc files bound here
 
+  // Says of what is coming who has sent it. `part`: any of it.
+  void Name(Incoming& incoming, zmq::message_t& part) {
+    ConnectionTable::Sender sender = connections.Heard(incoming.identity, part);
+    incoming.user = std::move(sender.user);
+    incoming.host = std::move(sender.host);
+  }
+
   // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.
   ~Impl() {
     for (const std::string& name : names) {
@@ -203,7 +210,7 @@ std::optional<Incoming> TryReceivePlain(Socket::Impl& impl) {
     std::size_t surplus = 0;
     while (more && ReceivePart(impl.socket, part)) {
       more = part.more();
-      if (impl.knows_connections && incoming.parts.empty()) incoming.user = impl.connections.Heard(incoming.identity, part);
+      if (impl.knows_connections && incoming.parts.empty()) impl.Name(incoming, part);
       if (incoming.parts.size() < 2) {
         incoming.parts.push_back(Adopt(std::move(part)));
       } else {
@@ -224,7 +231,7 @@ std::optional<Incoming> TryReceiveSealed(Socket::Impl& impl) {
     std::vector<Bytes> frames;
     for (bool more = part.more(); more && ReceivePart(impl.socket, part);) {
       more = part.more();
-      if (frames.empty()) incoming.user = impl.connections.Heard(incoming.identity, part);
+      if (frames.empty()) impl.Name(incoming, part);
       frames.push_back(Adopt(std::move(part)));
     }
     const std::shared_ptr<Unsealer> unsealer = impl.seals->Of(incoming.user);
@@ -339,6 +346,12 @@ bool Socket::refused() const {
   if (impl_->tuner == nullptr) return false;
   impl_->tuner->HandleEvents();
   return impl_->tuner->refused();
+}
+
+bool Socket::connected() const {
+  if (impl_->tuner == nullptr) return false;
+  impl_->tuner->HandleEvents();
+  return impl_->tuner->connected();
 }
 
 bool Socket::TakeBroken() {

@@ -35,6 +35,7 @@ namespace slabstream {
 struct Incoming {
   std::string identity;      // routers: who sent it
   std::string user;          // routers: the sender's public key, as the Authenticator admitted it; empty: the connection is not encrypted
+  std::string host;          // routers with keys: where the sender's connection comes from, as the host of an endpoint
   std::vector<Bytes> parts;  // 1 or 2: header, payload; the bytes are the message's own memory, not a copy
 
   std::span<const std::byte> header() const { return parts.front().span(); }
@@ -75,6 +76,9 @@ class Socket {
 
   // Dealers: whether the other end has refused this socket's key; it does not try again.
   bool refused() const;
+
+  // Dealers over tcp: whether there is a connection, and the other end has admitted this one. What is sent now leaves at once.
+  bool connected() const;
 
   // Dealers over tcp: whether a connection broke, or could not be made, since the last call. What was sent may be lost.
   bool TakeBroken();

@@ -62,8 +62,9 @@ Status Parse(std::span<const std::byte> header, Envelope& envelope) {
   return Status::Ok();
 }
 
-std::size_t PayloadBytesOf(const FrameImage& message) { return message.runs.encoded_bytes; }
-std::size_t PayloadBytesOf(const FrameReply& message) { return message.runs.encoded_bytes; }
+std::size_t PayloadBytesOf(const FrameImage& message) { return message.direct ? 0 : message.runs.encoded_bytes; }
+std::size_t PayloadBytesOf(const FrameReply& message) { return message.direct ? 0 : message.runs.encoded_bytes; }
+std::size_t PayloadBytesOf(const SentPicture& message) { return message.bytes; }
 std::size_t PayloadBytesOf(const PartialImage& message) {
   if (message.shared) return sizeof(ColumnSpan) * message.shared->rows();
   return message.packed ? message.packed->bytes : PayloadBytes(message.image);
@@ -89,7 +90,7 @@ bool ReadIf(const Envelope& envelope, const FieldDescriptor* field, Result<Messa
 }  // namespace
 
 std::string_view NameOf(Plane plane) {
-  constexpr std::array<std::string_view, 4> kNames = {"control", "voxels", "images", "client"};
+  constexpr std::array<std::string_view, 5> kNames = {"control", "voxels", "images", "client", "pictures"};
   return kNames.at(std::size_t(plane));
 }
 
@@ -134,6 +135,7 @@ template Result<CoordinatorToWorker> Decode(std::span<const std::byte>, std::siz
 template Result<WorkerToVoxels> Decode(std::span<const std::byte>, std::size_t);
 template Result<VoxelsToWorker> Decode(std::span<const std::byte>, std::size_t);
 template Result<WorkerToWorker> Decode(std::span<const std::byte>, std::size_t);
+template Result<WorkerToClient> Decode(std::span<const std::byte>, std::size_t);
 template Result<ClientToCoordinator> Decode(std::span<const std::byte>, std::size_t);
 template Result<CoordinatorToClient> Decode(std::span<const std::byte>, std::size_t);
 

@@ -19,6 +19,7 @@
 #include "common/wire/client_messages.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/image_messages.h"
+#include "common/wire/picture_messages.h"
 #include "common/wire/voxel_messages.h"
 
 namespace slabstream {
@@ -26,8 +27,8 @@ namespace slabstream {
 inline constexpr std::uint32_t kWireVersion = 1;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
-using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToVoxels, VoxelsToWorker, WorkerToWorker, ClientToCoordinator,
-                          CoordinatorToClient>;
+using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToVoxels, VoxelsToWorker, WorkerToWorker, WorkerToClient,
+                          ClientToCoordinator, CoordinatorToClient>;
 
 // A message where it is: itself, or in a variant of messages.
 class MessageView {
@@ -47,8 +48,9 @@ class MessageView {
   const Held held;
 };
 
-// The sockets that messages travel on: between coordinator and workers, between workers, and between clients and coordinator.
-enum class Plane { kControl, kVoxels, kImages, kClient };
+// The sockets that messages travel on: between coordinator and workers, between workers, between clients and coordinator, and from workers
+// to clients.
+enum class Plane { kControl, kVoxels, kImages, kClient, kPictures };
 std::string_view NameOf(Plane plane);  // "control": for logs
 
 std::vector<std::byte> Encode(MessageView message);

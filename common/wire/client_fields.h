@@ -12,12 +12,19 @@ static_assert(v1::DatasetState_MAX == static_cast<int>(DatasetState::kFailed));
 static_assert(v1::LengthUnit_MAX == static_cast<int>(LengthUnit::kMetre));
 static_assert(v1::DataAction_MAX == static_cast<int>(DataAction::kReload));
 
+void Fields(auto& io, Is<PicturesDoor> auto& m) {
+  using P = v1::PicturesDoor;
+  io.Range("port", m.port, &P::port, &P::set_port, 1, 65535);
+  io.Bytes("key", m.key, &P::key, &P::mutable_key, kKeyTextBytes, kKeyTextBytes);
+}
+
 v1::SubmitFrame ProtoOf(const SubmitFrame&);
 void Fields(auto& io, Is<SubmitFrame> auto& m) {
   using P = v1::SubmitFrame;
   io.Any(m.request, &P::request, &P::set_request);
   io.Range("deadline_ms", m.deadline_ms, &P::deadline_ms, &P::set_deadline_ms, 1, 86400000);
   io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+  io.Optional("pictures", m.pictures, &P::has_pictures, &P::pictures, &P::mutable_pictures);
 }
 
 v1::FrameProgress ProtoOf(const FrameProgress&);
@@ -102,6 +109,7 @@ void Fields(auto& io, Is<FrameReply> auto& m) {
   io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
   io.Message("statistics", m.statistics, &P::statistics, &P::mutable_statistics);
   io.Message("geometry", m.geometry, &P::geometry, &P::mutable_geometry);
+  io.Any(m.direct, &P::direct, &P::set_direct);
   io.Check([&](Checker& check) {
     const PixelBounds picture = {0, 0, m.size.width, m.size.height};
     check.That(picture.Contains(m.runs.image.bounds), "runs.image.bounds", "not inside the picture");
@@ -119,12 +127,19 @@ void Fields(auto& io, Is<FrameFailed> auto& m) {
 v1::CancelFrame ProtoOf(const CancelFrame&);
 void Fields(auto& io, Is<CancelFrame> auto& m) { io.Any(m.request, &v1::CancelFrame::request, &v1::CancelFrame::set_request); }
 
+void Fields(auto& io, Is<PictureSenders> auto& m) {
+  using P = v1::PictureSenders;
+  io.Range("version", m.version, &P::version, &P::set_version, 1, std::numeric_limits<std::uint64_t>::max());
+  io.ByteStrings("keys", m.keys, &P::keys, &P::mutable_keys, kMaxListed, kKeyTextBytes);
+}
+
 v1::ClientPing ProtoOf(const ClientPing&);
 void Fields(auto& io, Is<ClientPing> auto& m) {
   using P = v1::ClientPing;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Numbers("open", m.open, &P::open, &P::mutable_open, kMaxOpenRequests);
   io.Any(m.received_bytes, &P::received_bytes, &P::set_received_bytes);
+  io.Optional("senders", m.senders, &P::has_senders, &P::senders, &P::set_senders);
 }
 
 v1::ClientPong ProtoOf(const ClientPong&);
@@ -133,6 +148,14 @@ void Fields(auto& io, Is<ClientPong> auto& m) {
   io.Any(m.epoch, &P::epoch, &P::set_epoch);
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Numbers("known", m.known, &P::known, &P::mutable_known, kMaxOpenRequests);
+  io.Optional("senders", m.senders, &P::has_senders, &P::senders, &P::mutable_senders);
+}
+
+v1::SentPicture ProtoOf(const SentPicture&);
+void Fields(auto& io, Is<SentPicture> auto& m) {
+  using P = v1::SentPicture;
+  io.Any(m.digest, &P::digest, &P::set_digest);
+  io.Range("bytes", m.bytes, &P::bytes, &P::set_bytes, 0, kMaxRunsBytes);
 }
 
 v1::StatusQuery ProtoOf(const StatusQuery&);

@@ -49,6 +49,7 @@ struct SubmitFrame {
   RequestId request = 0;
   std::uint32_t deadline_ms = 600000;  // [1, 86400000], from arrival at the coordinator
   FrameRequest frame;
+  std::optional<PicturesDoor> pictures = {};  // where the pictures may come straight from workers; none: through the coordinator
   friend bool operator==(const SubmitFrame&, const SubmitFrame&) = default;
 };
 
@@ -90,13 +91,14 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-struct FrameReply {  // payload: the runs
+struct FrameReply {  // payload: the runs, unless `direct`
   RequestId request = 0;
   ImageSize size;                                  // of the whole picture
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final
   EncodedRuns runs;
   FrameStatistics statistics;  // final only
   PictureGeometry geometry;
+  bool direct = false;  // the payload comes straight from the display worker (SentPicture), perhaps before this
   friend bool operator==(const FrameReply&, const FrameReply&) = default;
 };
 
@@ -115,13 +117,16 @@ struct ClientPing {
   std::uint64_t nonce = 0;
   std::vector<RequestId> open;       // at most kMaxOpenRequests
   std::uint64_t received_bytes = 0;  // payloads of all replies that the client has read
+  std::optional<std::uint64_t> senders =
+      {};  // PictureSenders::version that its pictures plane admits, 0: nobody; none: it has no such plane
   friend bool operator==(const ClientPing&, const ClientPing&) = default;
 };
 
 struct ClientPong {
   Epoch epoch = 0;
-  std::uint64_t nonce = 0;       // echoed
-  std::vector<RequestId> known;  // of those asked about: queued, running, or with a reply kept
+  std::uint64_t nonce = 0;                     // echoed
+  std::vector<RequestId> known;                // of those asked about: queued, running, or with a reply kept
+  std::optional<PictureSenders> senders = {};  // if they are others than the ping says
   friend bool operator==(const ClientPong&, const ClientPong&) = default;
 };
 

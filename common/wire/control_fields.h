@@ -66,6 +66,12 @@ void Fields(auto& io, Is<Ping> auto& m) {
   io.Numbers("gone", m.gone, &P::gone, &P::mutable_gone, kMaxPeers);
 }
 
+void Fields(auto& io, Is<PicturesAddress> auto& m) {
+  using P = v1::PicturesAddress;
+  io.Bytes("endpoint", m.endpoint, &P::endpoint, &P::mutable_endpoint, 1, kMaxEndpointBytes);
+  io.Bytes("key", m.key, &P::key, &P::mutable_key, kKeyTextBytes, kKeyTextBytes);
+}
+
 void Fields(auto& io, Is<Peer> auto& m) {
   using P = v1::Peer;
   io.Range("worker", m.worker, &P::worker, &P::set_worker, 1, kMaxWorkerId);
@@ -128,6 +134,7 @@ void Fields(auto& io, Is<GroupAssignment> auto& m) {
   io.Message("group", m.group, &P::group, &P::mutable_group);
   io.Messages("peers", m.peers, &P::peers, &P::mutable_peers, kMaxPeers);
   io.Message("hidden", m.hidden, &P::hidden, &P::mutable_hidden);
+  io.Optional("pictures", m.pictures, &P::has_pictures, &P::pictures, &P::mutable_pictures);
   io.Check([&](Checker& check) {
     if (!check.ok()) return;
     CheckPeers(m, check);
@@ -157,6 +164,7 @@ void Fields(auto& io, Is<FrameImage> auto& m) {
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
   io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
   io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
+  io.Any(m.direct, &P::direct, &P::set_direct);
 }
 
 v1::WorkerTrouble ProtoOf(const WorkerTrouble&);

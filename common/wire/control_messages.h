@@ -7,7 +7,8 @@
 //             <------------------------  Ping
 //             <------------------------  GroupAssignment       one message has all that a group needs: order of arrival does not matter
 //   GroupDone ------------------------>            display worker only; opens the window for the next group
-//   FrameImage + payload ------------->            display worker only; a preview or the finished frame
+//   FrameImage + payload ------------->            display worker only; a preview or the finished frame. Without payload if that went
+//                                                  straight to the client
 //   WorkerTrouble -------------------->            something failed for this group
 //   Leave     ------------------------>            a worker ends now, whatever it had to do
 //             <------------------------  Retire    you are not (or no longer) known: register again
@@ -15,6 +16,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -25,6 +27,7 @@
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
 #include "common/wire/ids.h"
+#include "common/wire/picture_messages.h"
 
 namespace slabstream {
 
@@ -103,10 +106,11 @@ struct GroupAssignment {
   WorkerId display = 0;
   FrameSetup setup;
   GroupPlan group;
-  std::vector<Peer> peers;        // every worker of the group, and the display worker
-  OcclusionMask hidden;           // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
-  std::uint32_t groups_done = 0;  // of the frame, at most key.group: accumulated, so images lent for them have been read
-  ClientId client = 0;            // whom the frame is for: a worker shares its time among clients
+  std::vector<Peer> peers;                       // every worker of the group, and the display worker
+  OcclusionMask hidden;                          // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
+  std::uint32_t groups_done = 0;                 // of the frame, at most key.group: accumulated, so images lent for them have been read
+  ClientId client = 0;                           // whom the frame is for: a worker shares its time among clients
+  std::optional<PicturesAddress> pictures = {};  // where that client takes pictures; none: through the coordinator
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
 };
 
@@ -130,7 +134,7 @@ struct EncodedRuns {
   friend bool operator==(const EncodedRuns&, const EncodedRuns&) = default;
 };
 
-// Final pixels (supersampling resolved), premultiplied; payload: the runs.
+// Final pixels (supersampling resolved), premultiplied; payload: the runs, unless they went straight to the client.
 struct FrameImage {
   Epoch epoch = 0;
   WorkerId worker = 0;
@@ -139,6 +143,7 @@ struct FrameImage {
   std::uint32_t groups_done = 0, group_count = 1;  // equal: the finished frame
   EncodedRuns runs;
   std::vector<RankReport> reports;  // resolve and encode times of the display worker; at most kMaxReports
+  bool direct = false;              // the payload went straight to the client (SentPicture)
   friend bool operator==(const FrameImage&, const FrameImage&) = default;
 };
 

@@ -224,7 +224,12 @@ class Reader {
   }
   template <class T>
   void Optional(std::string_view field, std::optional<T>& value, bool (P::*has)() const, T (P::*get)() const, void (P::*)(T)) {
-    if ((in_.*has)()) value = check_.Finite(field, (in_.*get)());
+    if (!(in_.*has)()) return;
+    if constexpr (std::is_floating_point_v<T>) {
+      value = check_.Finite(field, (in_.*get)());
+    } else {
+      value = (in_.*get)();
+    }
   }
   // At most `max` items.
   template <class Struct, class Inner>

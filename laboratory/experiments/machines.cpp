@@ -55,7 +55,9 @@ MachineModel JoinedBy(MachineModel machine, const LinkModel& link, const HostMod
   machine.cores_a_host = host.cores;
   if (host.encrypted) {
     machine.combining.cipher_byte = calibration::service::kCipherByte;
-    machine.picture = {.link_byte = 1 / link.bytes_per_second, .cipher_byte = calibration::service::kCurveByte};
+    machine.picture = {.link_byte = 1 / link.bytes_per_second,
+                       .cipher_byte = host.direct_pictures ? calibration::service::kCipherByte : calibration::service::kCurveByte,
+                       .direct = host.direct_pictures};
   }
   return machine;
 }

@@ -14,8 +14,9 @@ Trial HostTrial();
 
 // A host for each worker, with cores of this machine's speed.
 struct HostModel {
-  int cores = 2;           // if there are two, one renders and one does everything else
-  bool encrypted = false;  // what hosts send each other, which costs processor time
+  int cores = 2;                // if there are two, one renders and one does everything else
+  bool encrypted = false;       // what hosts send each other, which costs processor time
+  bool direct_pictures = true;  // if it is encrypted: pictures do not pass the coordinator
 };
 // Such hosts, joined by `link`. HostTrial must have been run.
 MachineModel Cluster(const ExperimentContext& context, const LinkModel& link, const HostModel& host = {});

@@ -38,11 +38,12 @@ struct WakeUps {
 };
 
 // A picture's way: the display worker encrypts it after making it; the coordinator decrypts and encrypts it, and the client decrypts it,
-// one picture after the other and beside their other threads. Each does so with the whole picture. 0: no time, as between the paper's
-// hosts.
+// one picture after the other and beside their other threads. Each does so with the whole picture. A direct one travels to the client
+// over one connection. 0: no time, as between the paper's hosts.
 struct PictureWay {
-  double link_byte = 0;    // to travel over one of its two connections
+  double link_byte = 0;    // to travel over a connection
   double cipher_byte = 0;  // to encrypt or decrypt it
+  bool direct = false;
   friend bool operator==(const PictureWay&, const PictureWay&) = default;
 };
 

@@ -12,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/transport/authenticator.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
 #include "common/wire/payload.h"
@@ -34,8 +35,8 @@ class FakeService {
  public:
   using Handler = std::function<std::vector<Answer>(const AnyMessage&)>;
 
-  FakeService(Context& context, const std::string& endpoint, Handler handler)
-      : handler_(std::move(handler)), socket_(Socket::Router(context).value()) {
+  FakeService(Context& context, const std::string& endpoint, Handler handler, const SocketOptions& options = {})
+      : handler_(std::move(handler)), socket_(Socket::Router(context, options).value()) {
     endpoint_ = socket_.Bind(endpoint).value();
     thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
   }
@@ -103,6 +104,83 @@ class ClientTest : public testing::Test {
   Context context_;
   const ClientTiming quick_ = {.ping = milliseconds(20), .silence = milliseconds(400)};
 };
+
+// A service with keys, and a worker of it that brings pictures, as the test says, under a key that the service names or under another one.
+class DirectPicturesTest : public ClientTest {
+ protected:
+  enum class Brings { kNothing, kPicture, kPictureOfAnother, kPictureFirst };
+
+  // How often the client has asked for the picture, and what it got.
+  struct Outcome {
+    Result<Picture> picture;
+    int asked = 0, asked_with_door = 0;
+  };
+
+  Outcome Render(Brings brings) {
+    context_.authenticator().AdmitOnly("clients", {client_.public_key});
+    Outcome outcome{Status::Internal(""), 0, 0};
+    const auto answer = [&](const AnyMessage& message) -> std::vector<Answer> {
+      if (const auto* ping = std::get_if<ClientPing>(&message)) {
+        ClientPong pong = PongTo(*ping);
+        pong.known.clear();  // the frame is over for the service
+        if (ping->senders && *ping->senders != 7) pong.senders = PictureSenders{7, {worker_.public_key}};
+        return {{pong, {}}};
+      }
+      const auto& submit = std::get<SubmitFrame>(message);
+      ++outcome.asked;
+      Answer reply = ReplyTo(submit.request);
+      if (!submit.pictures) return {reply};
+      ++outcome.asked_with_door;
+      if (brings != Brings::kNothing) {
+        const KeyPair& own = brings == Brings::kPictureOfAnother ? stranger_ : worker_;
+        SocketOptions options;
+        options.client_keys = ClientKeys{.server_key = submit.pictures->key, .own = own, .sealed = true};
+        worker_socket_.emplace(Socket::Dealer(context_, options).value());
+        EXPECT_TRUE(worker_socket_->Connect("tcp://127.0.0.1:" + std::to_string(submit.pictures->port)).ok());
+        EXPECT_TRUE(
+            worker_socket_
+                ->Send({}, Encode(SentPicture{std::get<FrameReply>(reply.message).runs.digest, reply.payload.size()}), reply.payload)
+                .ok());
+        while (brings == Brings::kPictureFirst && !worker_socket_->connected()) std::this_thread::yield();
+      }
+      std::get<FrameReply>(reply.message).direct = true;
+      return {{reply.message, {}}};
+    };
+    const SocketOptions options{.server_keys = ServerKeys{.secret_key = service_.secret_key, .plane = "clients"}};
+    const FakeService service(context_, "tcp://127.0.0.1:*", answer, options);
+    const ServiceAddress address(service.endpoint(), ClientKeys{.server_key = service_.public_key, .own = client_});
+    Client client = Client::Connect(context_, address, seconds(30), {.ping = milliseconds(20), .lost_picture = lost_after_}).value();
+    outcome.picture = client.Render(SmallRequest(), seconds(60));
+    return outcome;
+  }
+
+  Duration lost_after_ = seconds(60);
+  const KeyPair service_ = MakeKeyPair(), client_ = MakeKeyPair(), worker_ = MakeKeyPair(), stranger_ = MakeKeyPair();
+  std::optional<Socket> worker_socket_;
+};
+
+TEST_F(DirectPicturesTest, ComeFromAWorkerThatTheServiceNames) {
+  for (const Brings brings : {Brings::kPicture, Brings::kPictureFirst}) {
+    const Outcome outcome = Render(brings);
+    ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
+    EXPECT_TRUE(outcome.picture->direct);
+    EXPECT_EQ(outcome.picture->image.bounds, (PixelBounds{4, 6, 20, 18}));
+    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
+    EXPECT_EQ(outcome.asked, 1);
+  }
+}
+
+TEST_F(DirectPicturesTest, AreAskedForAgainIfTheyAreLost) {
+  lost_after_ = milliseconds(50);
+  for (const Brings brings : {Brings::kNothing, Brings::kPictureOfAnother}) {
+    const Outcome outcome = Render(brings);
+    ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
+    EXPECT_FALSE(outcome.picture->direct);
+    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
+    EXPECT_EQ(outcome.asked, 2);
+    EXPECT_EQ(outcome.asked_with_door, 1) << "the second one comes through the coordinator";
+  }
+}
 
 TEST_F(ClientTest, NobodyAnswers) {
   Socket silent = Socket::Router(context_).value();

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/renderers/renderer_kind.h"
+#include "common/wire/any_message.h"
 #include "coordinator/dataset_machine.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
@@ -197,6 +198,8 @@ class CoordinatorScript {
   std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
   std::map<WorkerId, PeerToken> tokens;  // of all that have joined
   std::vector<PeerToken> clients;        // those that send pings
+  std::string host;                      // that clients connect from; empty: not known
+  std::string images_key;                // of workers that join
   std::vector<LoadDataset> loads;        // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;
@@ -229,7 +232,7 @@ class CoordinatorScript {
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {
     return Step(FromWorker{from.token, std::move(message), std::move(payload)});
   }
-  Actions Client(PeerToken from, const ClientToFrames& message) { return Step(FromClient{from, message}); }
+  Actions Client(PeerToken from, const ClientToFrames& message) { return Step(FromClient{from, message, host}); }
   Actions Client(PeerToken from, const ClientToDatasets& message, const Bytes& payload = {}) {
     Actions actions = Step(ClientHeard{from, std::holds_alternative<AddVolume>(message)});
     Append(actions, Step(ClientAsked{from, message, payload}));
@@ -245,7 +248,9 @@ class CoordinatorScript {
   // A worker that stays: its id is filled in, and it is heard while time passes. `out`: what the machine did.
   FakeWorker Join(PeerToken token, Incarnation incarnation, Actions* out = nullptr) {
     FakeWorker worker{.token = token, .incarnation = incarnation};
-    const Actions actions = Worker(worker, RegisterOf(worker));
+    Register hello = RegisterOf(worker);
+    hello.images_key = images_key;
+    const Actions actions = Worker(worker, hello);
     const auto welcomes = ToWorkers<Welcome>(actions);
     EXPECT_EQ(welcomes.size(), 1U);
     if (!welcomes.empty()) worker.id = welcomes[0].message.worker;

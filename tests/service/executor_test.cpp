@@ -175,8 +175,7 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
                               .image = 1,
                               .setup = std::make_shared<const FrameSetup>(setup)});
   const auto sent = std::get<OutgoingFrame>(outputs_.Next());
-  const AnyMessage message = Decode(sent.header).value();
-  const auto& frame = std::get<FrameImage>(message);
+  const FrameImage& frame = sent.message;
   EXPECT_EQ(frame.runs.image.bounds, (PixelBounds{1, 0, 4, 2}));
   ASSERT_EQ(frame.reports.size(), 1U);
   EXPECT_GT(frame.reports[0].stage_ns[std::size_t(Stage::kEncode)], 0);

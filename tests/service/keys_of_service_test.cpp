@@ -10,6 +10,7 @@
 
 #include "client/client.h"
 #include "common/service/service_file.h"
+#include "common/wire/any_message.h"
 #include "coordinator/service.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/service/pictures.h"
@@ -82,6 +83,66 @@ TEST_F(KeysOfServiceTest, PicturesAreThoseOfOneRenderer) {
       EXPECT_EQ(picture->statistics.attempts, 1U);
     }
   }
+}
+
+TEST_F(KeysOfServiceTest, PicturesGoStraightToClientsAndAreTheSame) {
+  StartWorkers(2);
+  ServiceAddress relayed_address(coordinator_->client_endpoint(), FileOf(Role::kClient).keys());
+  relayed_address.direct_pictures = false;
+  Client direct = ConnectAs(Role::kClient), relayed = Client::Connect(client_context_, relayed_address, seconds(30)).value();
+  FrameRequest request = TestRequest(Splatting(), 30, 3);
+  // Each worker makes pictures in turn; until it has a connection to the client, they come through the coordinator.
+  int in_a_row = 0;
+  for (const Time end = MonotonicNow() + seconds(60); in_a_row < 4 && MonotonicNow() < end;) {
+    const Result<Picture> picture = direct.Render(request);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    in_a_row = picture->direct ? in_a_row + 1 : 0;
+  }
+  ASSERT_EQ(in_a_row, 4);
+  const Result<Picture> other = relayed.Render(request);
+  ASSERT_TRUE(other.ok()) << other.status().message();
+  EXPECT_FALSE(other->direct);
+
+  request.previews = true;
+  direct.Submit(request);
+  int pictures = 0;
+  for (bool final = false; !final;) {
+    const std::optional<ClientEvent> event = direct.Next(seconds(30));
+    ASSERT_TRUE(event.has_value());
+    ASSERT_EQ(std::get_if<Status>(&event->what), nullptr);
+    const auto* picture = std::get_if<Picture>(&event->what);
+    if (picture == nullptr) continue;
+    ++pictures;
+    final = picture->final;
+    EXPECT_TRUE(picture->direct);
+    if (final) {
+      EXPECT_EQ(LargestDifference(picture->image, other->image, request.size), 0);
+    }
+  }
+  EXPECT_EQ(pictures, 3);
+}
+
+TEST_F(KeysOfServiceTest, PicturesComeThroughTheCoordinatorIfNobodyListensAtTheDoor) {
+  StartWorkers(1);
+  SocketOptions options;
+  options.client_keys = FileOf(Role::kClient).keys();
+  Socket client = Socket::Dealer(client_context_, options).value();
+  ASSERT_TRUE(client.Connect(coordinator_->client_endpoint()).ok());
+  const SubmitFrame submit{.request = 1, .frame = TestRequest(Splatting(), 30), .pictures = PicturesDoor{9, MakeKeyPair().public_key}};
+  ASSERT_TRUE(client.Send({}, Encode(submit)).ok());
+  const std::array<Socket*, 1> sockets = {&client};
+  for (const Time end = MonotonicNow() + seconds(60); MonotonicNow() < end; Wait(sockets, nullptr, end - MonotonicNow())) {
+    const std::optional<Incoming> incoming = client.TryReceive();
+    if (!incoming) continue;
+    const Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(incoming->header(), incoming->payload().size());
+    ASSERT_TRUE(message.ok()) << message.status().message();
+    const auto* reply = std::get_if<FrameReply>(&*message);
+    if (reply == nullptr) continue;
+    EXPECT_FALSE(reply->direct);
+    EXPECT_FALSE(incoming->payload().empty());
+    return;
+  }
+  FAIL() << "no picture";
 }
 
 TEST_F(KeysOfServiceTest, WhoeverHasNoKeyOfTheRoleIsRefused) {

@@ -150,6 +150,18 @@ TEST(SimulateFrames, PicturesTravelOverTheCoordinatorToTheClient) {
   EXPECT_NEAR(period, kBytes * 2 * kCipherByte, kRelative * period) << "the coordinator is busy all the time";
 }
 
+// Twice it is encrypted or decrypted, and it takes one connection; the coordinator has nothing to do with it.
+TEST(SimulateFrames, DirectPicturesTravelToTheClient) {
+  constexpr double kBytes = 1000, kLinkByte = 1e-3, kCipherByte = 2e-3;
+  MadeFrame frame(2, 1, kSide, 1, 1, "fan-in");
+  MachineModel machine = WithoutDelays();
+  const double plain = Simulate({frame.input()}, machine).frames[0].latency();
+  frame.picture_bytes = kBytes;
+  machine.picture = {.link_byte = kLinkByte, .cipher_byte = kCipherByte, .direct = true};
+  const double expected = plain + kBytes * (kLinkByte + 2 * kCipherByte);
+  EXPECT_NEAR(Simulate({frame.input()}, machine).frames[0].latency(), expected, expected * kRelative);
+}
+
 // Yagel and Machiraju, Eq. 18: one round for each doubling of the workers, if messages do not get in each other's way.
 TEST(SimulateFrames, ATreeTakesLogarithmicallyManyRounds) {
   for (std::uint32_t rounds = 0; rounds <= 6; ++rounds) {

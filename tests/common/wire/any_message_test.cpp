@@ -107,8 +107,8 @@ bool Takes(const AnyMessage& message) {
 TEST(AnyMessage, EachMessageHasOnePlaceToGo) {
   for (const AnyMessage& message : AllSamples()) {
     EXPECT_EQ(Takes<WorkerToCoordinator>(message) + Takes<CoordinatorToWorker>(message) + Takes<WorkerToVoxels>(message) +
-                  Takes<VoxelsToWorker>(message) + Takes<WorkerToWorker>(message) + Takes<ClientToCoordinator>(message) +
-                  Takes<CoordinatorToClient>(message),
+                  Takes<VoxelsToWorker>(message) + Takes<WorkerToWorker>(message) + Takes<WorkerToClient>(message) +
+                  Takes<ClientToCoordinator>(message) + Takes<CoordinatorToClient>(message),
               1)
         << NameOf(message);
   }

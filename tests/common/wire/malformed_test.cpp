@@ -252,8 +252,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 11)
-      << "reports are in four messages, parameters in three; datasets, isosurfaces, gradients, opacities, labels and levels in two";
+  EXPECT_EQ(seen.size(), limits.size() + 12)
+      << "reports are in four messages, parameters in three; datasets, keys, isosurfaces, gradients, opacities, labels and levels in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

@@ -19,6 +19,7 @@ constexpr std::int64_t kMaxTime = std::numeric_limits<std::int64_t>::max();
 const std::string kLongName(kMaxNameBytes, 'n');
 const std::string kLongText(kMaxTextBytes, 't');
 const std::string kLongEndpoint(kMaxEndpointBytes, 'e');
+const std::string kKey(kKeyTextBytes, 'k');
 const std::string kOddEndpoint = "ipc:///tmp/not\xFFutf-8";  // paths are bytes
 const std::string kUmlaut = "B\xC3\xBCro";
 
@@ -164,6 +165,7 @@ GroupAssignment BehindOthers() {
   message.setup.termination = 0.5;
   message.hidden = Mask(OcclusionTiles(message.setup.sheets.width), OcclusionTiles(message.setup.sheets.height));
   message.setup.front = Front(message.setup);
+  message.pictures = PicturesAddress{kLongEndpoint, kKey};
   return message;
 }
 
@@ -186,7 +188,7 @@ std::vector<Message> SamplesOf() = delete;
 template <>
 std::vector<Register> SamplesOf() {
   return {{1, 2, "host", "tcp://127.0.0.1:1", 1, 0},
-          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true, std::string(kKeyTextBytes, 'k')},
+          {kMax64, kMax32, kLongName, kLongEndpoint, kMaxThreads, kMax64, kMax64, true, kKey},
           {0, 0, kUmlaut, kOddEndpoint}};
 }
 
@@ -227,7 +229,9 @@ std::vector<GroupDone> SamplesOf() {
 
 template <>
 std::vector<FrameImage> SamplesOf() {
-  return {{1, 2, 3, 4, 0, 1, NoRuns(), {}}, {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}}};
+  return {{1, 2, 3, 4, 0, 1, NoRuns(), {}},
+          {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}},
+          {1, 2, 3, 4, 1, 1, SomeRuns(), {}, true}};
 }
 
 template <>
@@ -311,6 +315,11 @@ std::vector<ImageReceived> SamplesOf() {
 }
 
 template <>
+std::vector<SentPicture> SamplesOf() {
+  return {{}, {kMax64, kMaxRunsBytes}};
+}
+
+template <>
 std::vector<SubmitFrame> SamplesOf() {
   FrameRequest full;
   full.dataset = kLongName;
@@ -343,7 +352,8 @@ std::vector<SubmitFrame> SamplesOf() {
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
   FrameRequest highlights = layers;
   highlights.labels->mode = LabelMode::kHighlight;
-  return {{0, 1, Request()}, {kMax64, 86400000, full}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers}, {1, 2, highlights}};
+  return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers},
+          {1, 2, highlights}};
 }
 
 template <>
@@ -375,7 +385,7 @@ std::vector<FrameReply> SamplesOf() {
   return {{1, {1, 1}, 0, 1, NoRuns(), {}, {}},
           {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics, of_patient},
           {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, in_metres}};
+          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, in_metres, true}};
 }
 
 template <>
@@ -393,12 +403,12 @@ std::vector<CancelFrame> SamplesOf() {
 
 template <>
 std::vector<ClientPing> SamplesOf() {
-  return {{}, {kMax64, {0, kMax64}, kMax64}};
+  return {{}, {kMax64, {0, kMax64}, kMax64, kMax64}};
 }
 
 template <>
 std::vector<ClientPong> SamplesOf() {
-  return {{}, {kMax64, kMax64, {kMax64, 0}}};
+  return {{}, {kMax64, kMax64, {kMax64, 0}, PictureSenders{kMax64, {kKey, kKey}}}, {1, 2, {}, PictureSenders{}}};
 }
 
 template <>

@@ -54,7 +54,7 @@ TEST(ClusterCases, AreSimulatedAsNearAsTheDocumentSays) {
   for (const Json& recorded : all["cases"]) {
     const FrameCase frame = FrameOf(recorded);
     const LinkModel link = ParseLink("link", recorded["link"].get<std::string>()).value();
-    const FrameFigures figures = RecallFigures(context, frame, link, 1, {.cores = 1, .encrypted = true}).front();
+    const FrameFigures figures = RecallFigures(context, frame, link, 1, {.cores = 1, .encrypted = true, .direct_pictures = false}).front();
     const auto check = [&](const char* what, double seconds) {
       errors.push_back(std::abs(seconds / recorded[what].get<double>() - 1));
       EXPECT_LE(errors.back(), kMostError) << what << " of " << recorded["renderer"] << ", " << recorded["decomposition"]

@@ -57,7 +57,7 @@ TEST(OpaqueFront, IsNeverMoreOpaqueThanThePicture) {
         for (int view = 0; view < 3; ++view) {
           FrameSetup setup = SetupOf(volume, kind, projection, 0.3, random);
           const OpaqueFront front = FrontOf(volume, setup);
-          ASSERT_EQ(front.tile, kOcclusionTile);
+          ASSERT_GE(front.tile, kOcclusionTile);
           SCOPED_TRACE(::testing::Message() << "seed " << seed << ' ' << kind->name() << " view " << view);
           const Axis c = setup.camera.traversal_axis;
           setup.termination = 0;  // all is drawn

@@ -63,7 +63,7 @@ TEST(PaperMachine, ARoundTakesItsShareOfAFrameForTheWholeImage) {
   const MachineModel machine = PaperMachine({10, 1}, 5e-3, 400);
   EXPECT_DOUBLE_EQ(machine.combining.combine_pixel * 400, 5e-4);
   EXPECT_EQ(machine.link.contention, Contention::kNone);
-  EXPECT_TRUE(Validate(machine).ok());
+  EXPECT_EQ(Validate(machine).message(), "");
 }
 
 }  // namespace

@@ -1,0 +1,86 @@
+#include "client/direct_pictures.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "common/base/log.h"
+#include "common/transport/authenticator.h"
+#include "common/transport/endpoint.h"
+#include "common/wire/any_message.h"
+
+namespace slabstream {
+namespace {
+
+// A worker may connect before the coordinator has named it here.
+constexpr Duration kPatience = std::chrono::seconds(3);
+constexpr std::size_t kMaxConnections = 4096;
+
+}  // namespace
+
+std::unique_ptr<DirectPictures> DirectPictures::Open(Context& context, const std::string& service_endpoint) {
+  Result<Endpoint> here = ParseEndpoint(service_endpoint, false);
+  if (!here.ok() || here->scheme != Scheme::kTcp) return nullptr;
+  const KeyPair keys = MakeKeyPair();
+  const std::string plane = "pictures-" + keys.public_key;
+  const SocketOptions options{.max_connections = kMaxConnections,
+                              .server_keys = ServerKeys{.secret_key = keys.secret_key, .plane = plane, .sealed = true}};
+  const auto bound = [&](Socket& socket) -> Result<std::string> {
+    Result<std::string> host = LocalHostTowards(*here);
+    if (!host.ok()) return host.status();
+    here->host = *std::move(host);
+    here->port = 0;
+    return socket.Bind(here->ToString());
+  };
+  Result<Socket> socket = Socket::Router(context, options);
+  const Result<std::string> endpoint = socket.ok() ? bound(*socket) : Result<std::string>(socket.status());
+  if (!endpoint.ok()) {
+    LogDebug("pictures come through the coordinator: " + endpoint.status().message());
+    return nullptr;
+  }
+  context.authenticator().SetPatience(plane, kPatience);
+  const PicturesDoor door{std::uint16_t(ParseEndpoint(*endpoint, true)->port), keys.public_key};
+  return std::unique_ptr<DirectPictures>(new DirectPictures(context, *std::move(socket), door, plane));
+}
+
+DirectPictures::~DirectPictures() { context_.authenticator().Forget(plane_); }
+
+void DirectPictures::Admit(const PictureSenders& senders) {
+  context_.authenticator().AdmitOnly(plane_, {senders.keys.begin(), senders.keys.end()});
+  senders_ = senders.version;
+}
+
+std::uint64_t DirectPictures::Receive() {
+  std::uint64_t received = 0;
+  while (const std::optional<Incoming> incoming = socket_.TryReceive()) {
+    const Bytes payload = incoming->payload();
+    const Result<WorkerToClient> message = Decode<WorkerToClient>(incoming->header(), payload.size());
+    if (!message.ok()) {
+      LogWarning("pictures plane: dropped a message: " + message.status().message());
+      continue;
+    }
+    received += payload.size();
+    arrived_.emplace_back(std::get<SentPicture>(*message).digest, payload);
+    arrived_bytes_ += payload.size();
+    while (arrived_bytes_ > kMostUnclaimedBytes && arrived_.size() > 1) {
+      arrived_bytes_ -= arrived_.front().second.size();
+      arrived_.pop_front();
+    }
+  }
+  return received;
+}
+
+void DirectPictures::DropAll() {
+  arrived_.clear();
+  arrived_bytes_ = 0;
+}
+
+std::optional<Bytes> DirectPictures::Take(std::uint64_t digest, std::uint64_t bytes) {
+  const auto found = std::ranges::find_if(arrived_, [&](const auto& each) { return each.first == digest && each.second.size() == bytes; });
+  if (found == arrived_.end()) return std::nullopt;
+  Bytes payload = std::move(found->second);
+  arrived_bytes_ -= bytes;
+  arrived_.erase(found);
+  return payload;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,54 @@
+// DirectPictures: the client's end of the pictures plane (common/wire/picture_messages.h). Workers bring the runs of pictures here, and the
+// coordinator says with each FrameReply which of them are its own. For one thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/base/bytes.h"
+#include "common/transport/socket.h"
+#include "common/wire/picture_messages.h"
+
+namespace slabstream {
+
+class DirectPictures {
+ public:
+  // Listens on the way to a service with keys. Null: pictures come through the coordinator, since the service is not reached over tcp, or
+  // nobody can listen here.
+  static std::unique_ptr<DirectPictures> Open(Context& context, const std::string& service_endpoint);
+  ~DirectPictures();
+  DirectPictures(const DirectPictures&) = delete;
+  DirectPictures& operator=(const DirectPictures&) = delete;
+
+  const PicturesDoor& door() const { return door_; }
+  std::uint64_t senders() const { return senders_; }  // PictureSenders::version
+  Socket& socket() { return socket_; }
+
+  void Admit(const PictureSenders& senders);
+
+  // Takes what has come; returns the bytes of it.
+  std::uint64_t Receive();
+  // The runs with this digest, if they have come.
+  std::optional<Bytes> Take(std::uint64_t digest, std::uint64_t bytes);
+  void DropAll();
+
+ private:
+  static constexpr std::uint64_t kMostUnclaimedBytes = std::uint64_t{128} << 20;  // the oldest ones beyond are dropped
+
+  DirectPictures(Context& context, Socket socket, PicturesDoor door, std::string plane)
+      : context_(context), socket_(std::move(socket)), door_(std::move(door)), plane_(std::move(plane)) {}
+
+  Context& context_;
+  Socket socket_;
+  const PicturesDoor door_;
+  const std::string plane_;
+  std::uint64_t senders_ = 0;
+  std::deque<std::pair<std::uint64_t, Bytes>> arrived_;  // by digest, oldest first
+  std::uint64_t arrived_bytes_ = 0;
+};
+
+}  // namespace slabstream
