@@ -1,7 +1,7 @@
 // The latency of a frame beside rendering: request to last byte, less the time from the first worker's start of rendering to the last one's
-// end, and less making the picture from the frame (resampling or resolving, which an embedded renderer would have to do too). One frame in
-// flight, a turning view; embedded, and with a coordinator and workers as processes over ipc and tcp, the latter also with keys. With one
-// frame in flight nothing overlaps: this is the user's wait between two pictures.
+// end, and less making the picture from the frame (resampling or resolving, which an embedded renderer would have to do too). The view
+// turns. The service is embedded, or a coordinator and workers as processes over ipc, over tcp, and over tcp with keys. One frame is in
+// flight, so nothing overlaps: this is the user's wait between two pictures.
 //
 // A line a transport: medians and 95th percentiles of the frames after a warm-up. "Before render" is the part of this latency before the
 // first worker begins.

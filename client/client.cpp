@@ -88,12 +88,6 @@ std::string Milliseconds(Duration duration) {
   return std::to_string(std::chrono::duration_cast<std::chrono::milliseconds>(duration).count()) + " ms";
 }
 
-// A reply whose runs come straight from a worker.
-struct AwaitedPicture {
-  FrameReply reply;
-  Time until;  // then they are taken for lost
-};
-
 constexpr std::uint64_t kTellBytes = std::uint64_t{1} << 20;
 
 }  // namespace
@@ -160,7 +154,6 @@ struct Client::Impl {
   std::map<std::uint64_t, std::vector<RequestId>> pinged;  // requests of each unanswered ping, by nonce
   std::unique_ptr<DirectPictures> direct;                  // from the first frame on; null: there is no such way
   bool direct_opened = false;                              // or tried
-  std::vector<AwaitedPicture> awaited;                     // in the order of their replies
   std::deque<Event> events;
   Time next_ping;
   std::optional<Time> unanswered_since;  // time of the first ping since the last message
@@ -206,7 +199,7 @@ bool Client::Impl::Pump(Time limit) {
     limit = std::min(limit, next_ping);
     if (unanswered_since && !same_process) limit = std::min(limit, *unanswered_since + timing.silence);
     for (const auto& [nonce, question] : questions) limit = std::min(limit, question.deadline);
-    for (const AwaitedPicture& picture : awaited) limit = std::min(limit, picture.until);
+    if (direct) limit = std::min(limit, direct->NextLoss());
   }
   if (ready) return false;  // this may be what the caller waits for
   std::vector<Socket*> sockets = {&socket};
@@ -264,24 +257,12 @@ void Client::Impl::OpenDirectPictures() {
 
 void Client::Impl::MatchPictures() {
   if (!direct) return;
-  if (open.empty()) direct->DropAll();  // of requests that were cancelled
-  std::vector<std::pair<FrameReply, Bytes>> come;
-  std::erase_if(awaited, [&](AwaitedPicture& picture) {
-    if (!open.contains(picture.reply.request)) return true;  // cancelled
-    std::optional<Bytes> payload = direct->Take(picture.reply.runs.digest, picture.reply.runs.encoded_bytes);
-    if (payload) come.emplace_back(std::move(picture.reply), *std::move(payload));
-    return payload.has_value();
-  });
-  for (auto& [reply, payload] : come) Handle(reply, payload);
+  if (open.empty()) return direct->Clear();  // what has come is of requests that were cancelled
+  for (auto& [reply, payload] : direct->TakeCome()) Handle(reply, payload);
 }
 
 bool Client::Impl::ExpirePictures(Time now) {
-  std::vector<FrameReply> lost;
-  std::erase_if(awaited, [&](AwaitedPicture& picture) {
-    if (now < picture.until) return false;
-    lost.push_back(std::move(picture.reply));
-    return true;
-  });
+  const std::vector<FrameReply> lost = direct ? direct->TakeLost(now) : std::vector<FrameReply>();
   for (const FrameReply& reply : lost) {
     const auto found = open.find(reply.request);
     if (found == open.end() || reply.groups_done < reply.group_count) continue;  // previews are not repeated
@@ -301,8 +282,7 @@ void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
     constexpr std::uint64_t kSlowBytesPerMillisecond = 1000;  // over a slower link, pictures come twice
     const Time until =
         MonotonicNow() + timing.lost_picture + std::chrono::milliseconds(reply.runs.encoded_bytes / kSlowBytesPerMillisecond);
-    awaited.push_back({std::move(reply), until});
-    return;
+    return direct->Await(std::move(reply), until);
   }
   Result<Picture> picture = DecodePicture(reply, payload, found->second.message.frame.size);
   if (!picture.ok()) {
@@ -372,7 +352,7 @@ void Client::Impl::FailAll(const std::string& reason) {
   while (!questions.empty()) End(questions.begin()->first, Status::Unavailable(reason));
   while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
   pinged.clear();
-  awaited.clear();
+  if (direct) direct->Clear();
   unanswered_since.reset();
 }
 

@@ -69,9 +69,36 @@ std::uint64_t DirectPictures::Receive() {
   return received;
 }
 
-void DirectPictures::DropAll() {
+std::vector<std::pair<FrameReply, Bytes>> DirectPictures::TakeCome() {
+  std::vector<std::pair<FrameReply, Bytes>> come;
+  std::erase_if(awaited_, [&](Awaited& awaited) {
+    std::optional<Bytes> payload = Take(awaited.reply.runs.digest, awaited.reply.runs.encoded_bytes);
+    if (payload) come.emplace_back(std::move(awaited.reply), *std::move(payload));
+    return payload.has_value();
+  });
+  return come;
+}
+
+std::vector<FrameReply> DirectPictures::TakeLost(Time now) {
+  std::vector<FrameReply> lost;
+  std::erase_if(awaited_, [&](Awaited& awaited) {
+    if (now < awaited.until) return false;
+    lost.push_back(std::move(awaited.reply));
+    return true;
+  });
+  return lost;
+}
+
+Time DirectPictures::NextLoss() const {
+  Time next = Time::max();
+  for (const Awaited& awaited : awaited_) next = std::min(next, awaited.until);
+  return next;
+}
+
+void DirectPictures::Clear() {
   arrived_.clear();
   arrived_bytes_ = 0;
+  awaited_.clear();
 }
 
 std::optional<Bytes> DirectPictures::Take(std::uint64_t digest, std::uint64_t bytes) {

@@ -8,10 +8,12 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/time.h"
 #include "common/transport/socket.h"
-#include "common/wire/picture_messages.h"
+#include "common/wire/client_messages.h"
 
 namespace slabstream {
 
@@ -32,12 +34,24 @@ class DirectPictures {
 
   // Takes what has come; returns the bytes of it.
   std::uint64_t Receive();
-  // The runs with this digest, if they have come.
-  std::optional<Bytes> Take(std::uint64_t digest, std::uint64_t bytes);
-  void DropAll();
+
+  // A reply without its runs. They are lost if they do not come until then.
+  void Await(FrameReply reply, Time until) { awaited_.push_back({std::move(reply), until}); }
+  // The awaited replies whose runs have come, with these, in the order in which they were awaited.
+  std::vector<std::pair<FrameReply, Bytes>> TakeCome();
+  std::vector<FrameReply> TakeLost(Time now);
+  Time NextLoss() const;  // Time::max(): nothing is awaited
+  void Clear();           // nobody waits for anything any more
 
  private:
+  struct Awaited {
+    FrameReply reply;
+    Time until;
+  };
   static constexpr std::uint64_t kMostUnclaimedBytes = std::uint64_t{128} << 20;  // the oldest ones beyond are dropped
+
+  // The runs with this digest, if they have come.
+  std::optional<Bytes> Take(std::uint64_t digest, std::uint64_t bytes);
 
   DirectPictures(Context& context, Socket socket, PicturesDoor door, std::string plane)
       : context_(context), socket_(std::move(socket)), door_(std::move(door)), plane_(std::move(plane)) {}
@@ -49,6 +63,7 @@ class DirectPictures {
   std::uint64_t senders_ = 0;
   std::deque<std::pair<std::uint64_t, Bytes>> arrived_;  // by digest, oldest first
   std::uint64_t arrived_bytes_ = 0;
+  std::vector<Awaited> awaited_;
 };
 
 }  // namespace slabstream

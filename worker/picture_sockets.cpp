@@ -16,6 +16,7 @@ void PictureSockets::Prepare(const PicturesAddress& to, Time now) {
     known->second.last_used = now;
     return;
   }
+  if (connections_.size() >= kMostConnections) return;
   Result<Socket> socket = Socket::Dealer(context_, {.client_keys = ClientKeys{.server_key = to.key, .own = *own_, .sealed = true}});
   const Status connected = socket.ok() ? socket->Connect(to.endpoint) : socket.status();
   if (!connected.ok()) return LogDebug("pictures plane: " + connected.message());

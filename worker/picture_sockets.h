@@ -5,8 +5,9 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "common/base/bytes.h"
 #include "common/base/time.h"
@@ -17,14 +18,18 @@ namespace slabstream {
 
 class PictureSockets {
  public:
+  // A client may name one key after another. Beyond so many, clients get their pictures through the coordinator.
+  static constexpr std::size_t kMostConnections = 256;
+
   // `own`: the keys of this worker's images plane.
   PictureSockets(Context& context, std::optional<KeyPair> own) : context_(context), own_(std::move(own)) {}
 
-  // Begins to connect, if it has not. Without keys nothing happens.
+  // Begins to connect, if it has not. Nothing happens without keys, or if there are kMostConnections already.
   void Prepare(const PicturesAddress& to, Time now);
   // False: there is no connection, or too much is queued for it.
   bool Send(const PicturesAddress& to, const SentPicture& message, const Bytes& payload, Time now);
   void CloseIdle(Time now);
+  std::size_t size() const { return connections_.size(); }
 
  private:
   struct Connection {

@@ -3,17 +3,13 @@
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <string>
+#include <string_view>
+#include <utility>
 
 #include "common/transport/socket_cookie.h"
 
 namespace slabstream {
-
-bool ConnectionTable::Connection::open() const { return cookie != 0 && SocketCookie(descriptor) == cookie; }
-
-void ConnectionTable::Connection::ShutDown() const {
-  if (open()) (void)::shutdown(descriptor, SHUT_RDWR);
-}
-
 namespace {
 
 std::string Property(zmq::message_t& part, const char* name) {
@@ -30,7 +26,13 @@ std::string HostOf(std::string address) {
 
 }  // namespace
 
-ConnectionTable::Sender ConnectionTable::Heard(const std::string& identity, zmq::message_t& part) {
+bool ConnectionTable::Connection::open() const { return cookie != 0 && SocketCookie(descriptor) == cookie; }
+
+void ConnectionTable::Connection::ShutDown() const {
+  if (open()) (void)::shutdown(descriptor, SHUT_RDWR);
+}
+
+const ConnectionTable::Sender& ConnectionTable::Heard(const std::string& identity, zmq::message_t& part) {
   if (const auto known = connections_.find(identity); known != connections_.end()) return known->second.sender;
   if (connections_.size() >= next_sweep_) {
     std::erase_if(connections_, [](const auto& entry) { return !entry.second.open(); });

@@ -15,8 +15,8 @@ class ConnectionTable {
     std::string user;  // as it was admitted; empty: the connection is not encrypted
     std::string host;  // its address, as the host of an endpoint; empty: not tcp
   };
-  // Who is at the other end of the connection `identity`, of which this message part has come.
-  Sender Heard(const std::string& identity, zmq::message_t& part);
+  // Who is at the other end of the connection `identity`, of which this message part has come. Valid until the next call.
+  const Sender& Heard(const std::string& identity, zmq::message_t& part);
 
   // Shut down the user's connections, or the one of this identity, if they are still there; ZeroMQ then closes them.
   void End(const std::string& user);

@@ -45,9 +45,9 @@ struct Socket::Impl {
 
   // Says of what is coming who has sent it. `part`: any of it.
   void Name(Incoming& incoming, zmq::message_t& part) {
-    ConnectionTable::Sender sender = connections.Heard(incoming.identity, part);
-    incoming.user = std::move(sender.user);
-    incoming.host = std::move(sender.host);
+    const ConnectionTable::Sender& sender = connections.Heard(incoming.identity, part);
+    incoming.user = sender.user;
+    incoming.host = sender.host;
   }
 
   // Names and files are free again when the socket is gone; ZeroMQ alone would free them some time later.

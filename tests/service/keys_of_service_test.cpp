@@ -16,6 +16,7 @@
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"
+#include "worker/picture_sockets.h"
 #include "worker/service.h"
 
 namespace slabstream {
@@ -143,6 +144,18 @@ TEST_F(KeysOfServiceTest, PicturesComeThroughTheCoordinatorIfNobodyListensAtTheD
     return;
   }
   FAIL() << "no picture";
+}
+
+TEST(PictureSockets, AClientThatNamesManyKeysTakesFewSockets) {
+  Context context;
+  PictureSockets sockets(context, MakeKeyPair());
+  const Time now = MonotonicNow();
+  for (std::size_t i = 0; i < PictureSockets::kMostConnections + 10; ++i) {
+    sockets.Prepare({"tcp://127.0.0.1:9", MakeKeyPair().public_key}, now);
+  }
+  EXPECT_EQ(sockets.size(), PictureSockets::kMostConnections);
+  sockets.CloseIdle(now + seconds(3600));
+  EXPECT_EQ(sockets.size(), 0U);
 }
 
 TEST_F(KeysOfServiceTest, WhoeverHasNoKeyOfTheRoleIsRefused) {

@@ -23,7 +23,8 @@ bool MayComeFirst(const Camera& camera, const Box& near, const Box& far) {
   });
 }
 
-// Whether `seen`, a pixel of the frame, is `expected` without some boxes that lie behind an opaque one or may be left out there.
+// Whether `seen`, a pixel of the frame, shows all boxes of `expected` but those that may be missing: a box behind an opaque one, or one
+// that a mask hides at this pixel.
 bool LacksHiddenBoxesOnly(const SymbolicPixel& seen, const SymbolicPixel& expected, const std::map<BoxId, OcclusionMask>& left_out,
                           std::int32_t x, std::int32_t y) {
   auto at = seen.begin();
