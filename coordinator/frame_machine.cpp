@@ -340,7 +340,7 @@ void FrameMachine::State::HandOut(RunningFrame& frame) {
   if (const Member* display = roster.Find(out.assignment.display); display != nullptr && !display->description.images_key.empty()) {
     out.assignment.pictures = frame.request().pictures;
   }
-  for (const WorkerId worker : out.workers) SendWorker(worker, out.assignment);
+  SendWorkers(out.workers, std::move(out.assignment));
 }
 
 void FrameMachine::State::StopAll(const CoordinatorToWorker& goodbye, const std::string& reason) {

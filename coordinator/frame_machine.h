@@ -111,8 +111,9 @@ using FrameEvent = std::variant<FromWorker, FromClient, ClientHeard, WorkerGone,
                                 CoordinatorStopRequested, CoordinatorTick>;
 
 // ---- actions
-struct ToWorker {
-  PeerToken to = 0;
+// The same message to each of them.
+struct TellWorkers {
+  std::vector<PeerToken> to;
   CoordinatorToWorker message;
 };
 // -> OccupiedCounted: counts the voxels of the volume that its renderer draws (DrawnTable, CountOccupied). The dataset was loaded.
@@ -133,8 +134,8 @@ struct StopService {};  // everything was sent; end
 struct DropClient {
   PeerToken client = 0;
 };
-using FrameAction = std::variant<ToWorker, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, ClientLeft, FrameMeasured,
-                                 Note, StopService>;
+using FrameAction = std::variant<TellWorkers, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, ClientLeft,
+                                 FrameMeasured, Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).

@@ -11,6 +11,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -160,9 +161,14 @@ struct FrameMachine::State {
     if (level < config.log_level) return;
     actions.emplace_back(Note{about, level, fmt::format(format, std::forward<Values>(values)...)});
   }
-  void SendWorker(WorkerId worker, CoordinatorToWorker message) {
-    if (const Member* member = roster.Find(worker)) actions.emplace_back(ToWorker{.to = member->peer, .message = std::move(message)});
+  void SendWorkers(std::span<const WorkerId> workers, CoordinatorToWorker message) {
+    std::vector<PeerToken> to;
+    for (const WorkerId worker : workers) {
+      if (const Member* const member = roster.Find(worker)) to.push_back(member->peer);
+    }
+    if (!to.empty()) actions.emplace_back(TellWorkers{.to = std::move(to), .message = std::move(message)});
   }
+  void SendWorker(WorkerId worker, CoordinatorToWorker message) { SendWorkers(std::span(&worker, 1), std::move(message)); }
   void SendClient(PeerToken client, CoordinatorToClient message, Bytes payload = {}) {
     clients.Sent(client, payload.size());
     actions.emplace_back(ToClient{.to = client, .message = std::move(message), .payload = std::move(payload)});

@@ -35,7 +35,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const Heartbe
     }
     SendWorker(message.worker, MakePing(message.worker));
   } else if (!news.stale) {
-    actions.emplace_back(ToWorker{.to = event.from, .message = Retire{.epoch = config.epoch}});
+    actions.emplace_back(TellWorkers{.to = {event.from}, .message = Retire{.epoch = config.epoch}});
   }
 }
 

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <deque>
 #include <random>
+#include <span>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -79,7 +80,9 @@ struct CoordinatorService::Impl {
   // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
   std::optional<Role> RoleOf(const Incoming& incoming) const { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
   bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
-  void Send(Socket& socket, PeerTable& peers, PeerToken to, MessageView message, const Bytes& payload, const CoordinatorEvent& gone);
+  // The same to each of them. Who cannot be told is Gone.
+  template <class Gone>
+  void Send(Socket& socket, PeerTable& peers, std::span<const PeerToken> to, MessageView message, const Bytes& payload);
 
   template <class Event>
   auto& MachineOf(const Event&) {
@@ -94,8 +97,8 @@ struct CoordinatorService::Impl {
   // One for each kind of action.
   void Perform(ToDatasets& action) { Step(datasets, action); }
   void Perform(DatasetNews& action) { Step(frames, action); }
-  void Perform(ToWorker& action) { Send(control, worker_peers, action.to, action.message, {}, WorkerGone{action.to}); }
-  void Perform(ToClient& action) { Send(clients, client_peers, action.to, action.message, action.payload, ClientGone{action.to}); }
+  void Perform(TellWorkers& action) { Send<WorkerGone>(control, worker_peers, action.to, action.message, {}); }
+  void Perform(ToClient& action) { Send<ClientGone>(clients, client_peers, std::span(&action.to, 1), action.message, action.payload); }
   void Perform(DropClient& action) {
     if (const std::string* identity = client_peers.IdentityOf(action.client)) clients.EndConnection(*identity);
   }
@@ -204,15 +207,21 @@ void CoordinatorService::Impl::CountFrames(const std::vector<FrameAction>& actio
 
 // A peer is gone if it cannot be reached, does not take its messages, or cannot be sent one for want of memory. The machine hears of it
 // after the actions at hand, not between them.
-void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, PeerToken to, MessageView message, const Bytes& payload,
-                                    const CoordinatorEvent& gone) {
-  const std::string* identity = peers.IdentityOf(to);
-  const Status sent = identity == nullptr ? Status::Unavailable("forgotten connection")
-                                          : Guarded("send", [&] { return socket.Send(*identity, Encode(message), payload); });
-  if (sent.ok()) return;
-  LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
-  peers.Forget(to);
-  following.push_back(gone);
+template <class Gone>
+void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, std::span<const PeerToken> to, MessageView message,
+                                    const Bytes& payload) {
+  std::vector<std::byte> header;
+  const Status encoded = Guarded("encoding", [&] { header = Encode(message); });
+  for (const PeerToken peer : to) {
+    const std::string* const identity = peers.IdentityOf(peer);
+    Status sent = encoded;
+    if (sent.ok() && identity == nullptr) sent = Status::Unavailable("forgotten connection");
+    if (sent.ok()) sent = Guarded("send", [&] { return socket.Send(*identity, header, payload); });
+    if (sent.ok()) continue;
+    LogDebug(std::string(NameOf(message)) + " not sent: " + sent.message());
+    peers.Forget(peer);
+    following.push_back(Gone{peer});
+  }
 }
 
 void CoordinatorService::Impl::ReceiveFromWorkers() {

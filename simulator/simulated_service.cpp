@@ -102,16 +102,22 @@ void SimulatedService::WakeCoordinator(std::uint64_t generation) {
   if (!held) CountSpin(CoordinatorWake() <= time());
 }
 
-void SimulatedService::Perform(ToWorker& action) {
-  const std::optional<Node> node = NodeOf(action.to);
+void SimulatedService::Perform(TellWorkers& action) {
+  for (std::size_t i = 0; i < action.to.size(); ++i) {
+    SendWorker(action.to[i], i + 1 < action.to.size() ? action.message : std::move(action.message));
+  }
+}
+
+void SimulatedService::SendWorker(PeerToken to, CoordinatorToWorker sent) {
+  const std::optional<Node> node = NodeOf(to);
   if (!node) return;
   coordinator_free_ += machine_.message_seconds;
-  const bool wakes = std::holds_alternative<GroupAssignment>(action.message);  // pings do not change any time
-  const Arrivals arrivals = conditions_.ToWorker(*node, action.message, coordinator_free_);
-  if (arrivals.nobody) TellCoordinator(now(), WorkerGone{action.to});
+  const bool wakes = std::holds_alternative<GroupAssignment>(sent);  // pings do not change any time
+  const Arrivals arrivals = conditions_.ToWorker(*node, sent, coordinator_free_);
+  if (arrivals.nobody) TellCoordinator(now(), WorkerGone{to});
   for (int i = 0; i < arrivals.count; ++i) {
     const double arrival = wakes ? threads_.Begin(Threads::Machine(*node), arrivals.times[i]) : arrivals.times[i];
-    CoordinatorToWorker message = i + 1 < arrivals.count ? action.message : std::move(action.message);
+    CoordinatorToWorker message = i + 1 < arrivals.count ? sent : std::move(sent);
     queue_.At(arrival, [this, to = *node, received = MessageReceived{Widen<MessageToWorker>(std::move(message)), {}}]() mutable {
       StepWorker(to, std::move(received));
     });

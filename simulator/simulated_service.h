@@ -89,7 +89,8 @@ class SimulatedService {
   void WakeWorker(Node node);
   void CountSpin(bool due) { spins_ = due ? spins_ + 1 : 0; }
 
-  void Perform(ToWorker& action);
+  void Perform(TellWorkers& action);
+  void SendWorker(PeerToken to, CoordinatorToWorker sent);
   void Perform(AnyOf<DropPlan, ClientLeft, DropClient, Note> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }

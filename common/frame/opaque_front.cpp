@@ -60,18 +60,44 @@ double TileBeam::LeastLength(const SliceAxes& axes, const Vec3& spacing) const {
   return distance / (cos_least * cos_across + sine(cos_least) * sine(cos_across));
 }
 
-std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile) {
-  const PixelBounds frame = FrameBounds(setup);
-  const std::int32_t columns = (frame.width() - 1) / tile + 1, rows = (frame.height() - 1) / tile + 1;
+std::optional<double> TileBeam::FirstIn(const Area& area, double begin, bool ascending) const {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr int kRounds = 4;  // few beams need more than two; a place that is too near is right as well
+  const double sign = ascending ? 1 : -1;
+  double k = begin;
+  // Moves k to where the first ray passes `limit`: upwards if `up` is 1, downwards if it is -1. False: none does.
+  const auto pass = [&](double limit, double up, double Ray::*at_0, double Ray::*slope) {
+    double nearest = kInfinity;  // slices from k on
+    for (const Ray& ray : corners_) {
+      const double missing = up * (limit - (ray.*at_0 + k * ray.*slope)), speed = up * sign * ray.*slope;
+      if (missing <= 0) return true;
+      if (speed > 0) nearest = std::min(nearest, missing / speed);
+    }
+    k += sign * nearest;
+    return nearest < kInfinity;
+  };
+  for (int round = 0; round < kRounds; ++round) {
+    const double before = k;
+    if (!pass(area.u_begin, 1, &Ray::u_0, &Ray::u_k) || !pass(area.u_end, -1, &Ray::u_0, &Ray::u_k) ||
+        !pass(area.v_begin, 1, &Ray::v_0, &Ray::v_k) || !pass(area.v_end, -1, &Ray::v_0, &Ray::v_k)) {
+      return std::nullopt;
+    }
+    if (k == before) break;
+  }
+  return k;
+}
+
+std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile, const PixelBounds& tiles) {
+  const auto columns = std::size_t(tiles.width());
   std::vector<std::optional<TileBeam::Ray>> corners;
-  for (std::int32_t y = 0; y <= rows; ++y) {
-    for (std::int32_t x = 0; x <= columns; ++x) corners.push_back(RayOf(setup, double(x) * tile, double(y) * tile));
+  for (std::int32_t y = tiles.y_begin; y <= tiles.y_end; ++y) {
+    for (std::int32_t x = tiles.x_begin; x <= tiles.x_end; ++x) corners.push_back(RayOf(setup, double(x) * tile, double(y) * tile));
   }
   std::vector<std::optional<TileBeam>> beams;
-  for (std::int32_t y = 0; y < rows; ++y) {
-    for (std::int32_t x = 0; x < columns; ++x) {
-      const auto corner = [&](std::int32_t dx, std::int32_t dy) -> const std::optional<TileBeam::Ray>& {
-        return corners[std::size_t(y + dy) * std::size_t(columns + 1) + std::size_t(x + dx)];
+  for (std::size_t y = 0; y < std::size_t(tiles.height()); ++y) {
+    for (std::size_t x = 0; x < columns; ++x) {
+      const auto corner = [&](std::size_t dx, std::size_t dy) -> const std::optional<TileBeam::Ray>& {
+        return corners[(y + dy) * (columns + 1) + x + dx];
       };
       const bool all = corner(0, 0) && corner(1, 0) && corner(0, 1) && corner(1, 1);
       beams.push_back(all ? std::optional(TileBeam({*corner(0, 0), *corner(1, 0), *corner(0, 1), *corner(1, 1)})) : std::nullopt);
@@ -82,8 +108,8 @@ std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int
 
 std::int32_t FrontTile(const FrameSetup& setup) {
   const PixelBounds frame = FrameBounds(setup);
-  constexpr std::int32_t kLeastSide = kOcclusionTile * OpaqueFront::kMostTiles;
-  return ((std::max(frame.width(), frame.height()) - 1) / kLeastSide + 1) * kOcclusionTile;
+  constexpr std::int32_t kLeast = 2 * kOcclusionTile;
+  return ((std::max(frame.width(), frame.height()) - 1) / (kLeast * OpaqueFront::kMostTiles) + 1) * kLeast;
 }
 
 Status CheckFits(const OpaqueFront& front, const FrameSetup& setup) {
@@ -100,41 +126,37 @@ Status CheckFits(const OpaqueFront& front, const FrameSetup& setup) {
 OcclusionMask MaskBefore(const Box& box, const FrameSetup& setup) {
   const OpaqueFront& front = setup.front;
   if (front.empty()) return {};
-  constexpr std::int32_t kStride = 4;  // slices that are looked at together
   const SliceAxes axes = AxesOf(setup.camera.traversal_axis);
   const bool ascending = setup.camera.ascending;
-  const std::int32_t slices = setup.description.geometry.size[axes.c];
-  // Samples of the box lie up to half a voxel beyond it, and on the volume's rim as far as footprints reach.
   const Index3& size = setup.description.geometry.size;
-  const auto low_end = [&](Axis axis) { return box.begin[axis] - 1 - (box.begin[axis] == 0 ? setup.halo : 0); };
-  const auto high_end = [&](Axis axis) { return box.end[axis] + (box.end[axis] == size[axis] ? setup.halo : 0); };
-  const auto after = [&](std::int32_t slice) { return ascending ? slice : slices - 1 - slice; };  // slices before this one
-  const std::int32_t nearest = after(ascending ? box.begin[axes.c] : box.end[axes.c] - 1);
-  const std::int32_t farthest = after(ascending ? box.end[axes.c] - 1 : box.begin[axes.c]);
+  const std::int32_t slices = size[axes.c];
+  // Samples of the box lie up to half a voxel beyond it, and on the volume's rim as far as footprints reach.
+  const auto low_end = [&](Axis axis) { return double(box.begin[axis] - 1 - (box.begin[axis] == 0 ? setup.halo : 0)); };
+  const auto high_end = [&](Axis axis) { return double(box.end[axis] + (box.end[axis] == size[axis] ? setup.halo : 0)); };
+  const TileBeam::Area area = {low_end(axes.u), low_end(axes.v), high_end(axes.u), high_end(axes.v)};
+  const double nearest = ascending ? box.begin[axes.c] - 1 : box.end[axes.c];
+  const double deepest = box.end[axes.c] - box.begin[axes.c] + 1;  // slices behind the nearest one
   const PixelBounds frame = FrameBounds(setup);
   OcclusionMask mask{OcclusionTiles(frame.width()), OcclusionTiles(frame.height()), {}};
-  mask.steps.resize(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y));
-  const std::vector<std::optional<TileBeam>> beams = TileBeams(setup, front.tile);
-  const std::int32_t inside = front.tile / kOcclusionTile;
+  mask.steps.assign(std::size_t(mask.tiles_x) * std::size_t(mask.tiles_y), kOcclusionSteps);
   const PixelBounds reach = ReachOf(box, setup);
-  for (std::int32_t y = 0; y < front.tiles_y; ++y) {
-    for (std::int32_t x = 0; x < front.tiles_x; ++x) {
-      const std::size_t number = std::size_t(y) * std::size_t(front.tiles_x) + std::size_t(x);
-      if (!beams[number]) continue;
-      std::uint8_t steps = kOcclusionSteps;
-      const PixelBounds pixels = {x * front.tile, y * front.tile, (x + 1) * front.tile, (y + 1) * front.tile};
-      const bool reached = !Intersection(reach, pixels).empty();
-      for (std::int32_t first = nearest - 1; reached && first <= farthest + 1; first += kStride) {
-        const double k = after(first), next = after(first + kStride);
-        const TileBeam::Area area = beams[number]->Between(k, next);
-        if (area.u_end < low_end(axes.u) || area.u_begin > high_end(axes.u) || area.v_end < low_end(axes.v) ||
-            area.v_begin > high_end(axes.v)) {
-          continue;
-        }
-        const auto done = [&](std::uint8_t depth) { return depth != OpaqueFront::kNever && depth * front.unit <= first; };
-        steps = std::uint8_t(std::ranges::count_if(front.tiles[number], done));
-        break;
-      }
+  if (reach.empty()) return mask;
+  // Rays of a smaller tile come to the box at places that differ less.
+  const std::int32_t tile = front.tile / 2, inside = tile / kOcclusionTile;
+  const PixelBounds tiles = {reach.x_begin / tile, reach.y_begin / tile, (reach.x_end - 1) / tile + 1, (reach.y_end - 1) / tile + 1};
+  const std::vector<std::optional<TileBeam>> beams = TileBeams(setup, tile, tiles);
+  const auto steps_of = [&](const std::optional<TileBeam>& beam, const OpaqueFront::Depths& depths) {
+    if (!beam) return std::uint8_t{0};
+    const std::optional<double> first = beam->FirstIn(area, nearest, ascending);
+    if (!first || std::abs(*first - nearest) > deepest) return kOcclusionSteps;
+    const double before = std::floor(ascending ? *first : slices - 1 - *first);  // slices
+    return std::uint8_t(std::ranges::count_if(
+        depths, [&](std::uint8_t depth) { return depth != OpaqueFront::kNever && double(depth) * front.unit <= before; }));
+  };
+  std::size_t number = 0;
+  for (std::int32_t y = tiles.y_begin; y < tiles.y_end; ++y) {
+    for (std::int32_t x = tiles.x_begin; x < tiles.x_end; ++x, ++number) {
+      const std::uint8_t steps = steps_of(beams[number], front.tiles[std::size_t(y / 2) * std::size_t(front.tiles_x) + std::size_t(x / 2)]);
       for (std::int32_t ty = y * inside; ty < std::min((y + 1) * inside, mask.tiles_y); ++ty) {
         for (std::int32_t tx = x * inside; tx < std::min((x + 1) * inside, mask.tiles_x); ++tx) {
           mask.steps[std::size_t(ty) * std::size_t(mask.tiles_x) + std::size_t(tx)] = steps;

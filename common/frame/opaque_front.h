@@ -24,7 +24,7 @@ struct OpaqueFront {
   static constexpr std::uint8_t kNever = 255;     // of `depths`
   using Depths = std::array<std::uint8_t, kOcclusionSteps>;
 
-  std::int32_t tile = 0;  // side of a tile in pixels of the frame: a multiple of kOcclusionTile, or 0: nothing is known
+  std::int32_t tile = 0;  // side of a tile in pixels of the frame: FrontTile, or 0: nothing is known
   std::int32_t tiles_x = 0, tiles_y = 0;
   std::int32_t unit = 1;      // slices
   std::vector<Depths> tiles;  // [y][x]: [n]: units from the volume's nearest slice on until n + 1 steps (OcclusionMask) are done
@@ -47,6 +47,9 @@ class TileBeam {
 
   const Ray& corner() const { return corners_.front(); }
 
+  // From slice `begin` on, against or along k: the first place at which a ray may be in `area`. Nothing: none will be.
+  std::optional<double> FirstIn(const Area& area, double begin, bool ascending) const;
+
   // A rectangle that holds where all rays meet the slices between j and k.
   Area Between(double j, double k) const;
   // Least physical length of a ray from slice to slice. `axes` and `spacing` of the volume.
@@ -56,10 +59,11 @@ class TileBeam {
   std::array<Ray, 4> corners_;
 };
 
-// The beams of tiles of so many pixels a side, [y][x]. A tile whose rays do not all meet all slices in the camera's order has none.
-std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile);
+// The beams of tiles of so many pixels a side, [y][x]: of those in `tiles`, which counts in tiles. A tile whose rays do not all meet all
+// slices in the camera's order has none.
+std::vector<std::optional<TileBeam>> TileBeams(const FrameSetup& setup, std::int32_t tile, const PixelBounds& tiles);
 
-// The side of the tiles of a frame's OpaqueFront.
+// The side of the tiles of a frame's OpaqueFront: a multiple of two tiles of masks.
 std::int32_t FrontTile(const FrameSetup& setup);
 
 // InvalidArgument: a front in a frame that uses no masks, or with other tiles than the frame's.

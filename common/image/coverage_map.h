@@ -5,14 +5,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/image/occlusion_mask.h"
 #include "common/image/pixel_bounds.h"
 
 namespace slabstream {
 
 struct LocalImage;
 
-inline constexpr std::int32_t kCoverageTile = kOcclusionTile;  // pixels of the rendered frame, along x and y
+inline constexpr std::int32_t kCoverageTile = 16;  // pixels of the rendered frame, along x and y
 
 struct CoverageMap {
   std::int32_t frame_width = 0, frame_height = 0;  // pixels
@@ -27,6 +26,9 @@ struct CoverageMap {
   double pixels() const;  // not empty, in all
   friend bool operator==(const CoverageMap&, const CoverageMap&) = default;
 };
+
+// Tiles along an axis of so many pixels.
+constexpr std::int32_t CoverageTiles(std::int32_t pixels) { return (pixels + kCoverageTile - 1) / kCoverageTile; }
 
 // For images as renderers make them, with all pixels stored (no LocalImage::rows).
 //

@@ -15,12 +15,12 @@ namespace slabstream {
 
 struct LocalImage;
 
-inline constexpr std::int32_t kOcclusionTile = 16;  // pixels of the rendered frame, along x and y
+inline constexpr std::int32_t kOcclusionTile = 8;  // pixels of the rendered frame, along x and y
 // All pixels of a tile with n steps transmit at most termination^(n / kOcclusionSteps). With all steps it is hidden.
-inline constexpr std::uint8_t kOcclusionSteps = 8;
+inline constexpr std::uint8_t kOcclusionSteps = 16;
 
 struct OcclusionMask {
-  // Tile (x, y) covers the pixels [16 x, 16 x + 16) x [16 y, 16 y + 16) of the frame, cut at its border. 0 x 0: nothing is known.
+  // Tile (x, y) covers the pixels [8 x, 8 x + 8) x [8 y, 8 y + 8) of the frame, cut at its border. 0 x 0: nothing is known.
   std::int32_t tiles_x = 0, tiles_y = 0;
   std::vector<std::uint8_t> steps;  // [y][x], [0, kOcclusionSteps]; tiles_x * tiles_y of them
 
@@ -38,12 +38,6 @@ struct OcclusionMask {
 
 // Tiles along an axis of so many pixels.
 constexpr std::int32_t OcclusionTiles(std::int32_t pixels) { return (pixels + kOcclusionTile - 1) / kOcclusionTile; }
-
-// The pixels of tile (x, y) of a frame of width x height pixels.
-constexpr PixelBounds OcclusionTileBounds(std::int32_t x, std::int32_t y, std::int32_t width, std::int32_t height) {
-  return Intersection(PixelBounds{x * kOcclusionTile, y * kOcclusionTile, (x + 1) * kOcclusionTile, (y + 1) * kOcclusionTile},
-                      {0, 0, width, height});
-}
 
 // What either of two masks of a frame knows.
 OcclusionMask Union(const OcclusionMask& a, const OcclusionMask& b);

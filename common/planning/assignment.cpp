@@ -75,6 +75,8 @@ const std::vector<AssignmentEntry>& Assignments() {
   static const std::vector<AssignmentEntry> entries = {
       {"cyclic", "boxes to workers in turn", AssignCyclic},
       {"zigzag", "boxes to workers in turn and back: each has some in front and some behind", AssignZigzag},
+      {"alternating", "boxes to workers in turn, in every other frame from the last one on: front and back change hands", AssignCyclic,
+       false, true},
       {"contiguous", "neighbouring boxes to the same worker", AssignContiguous},
       {"random", "boxes to workers as if by chance, the same every time; to compare with", AssignRandom},
       {"greedy", "the costliest remaining box to the worker with the least work", AssignGreedy, true},

@@ -18,6 +18,8 @@ struct AssignmentEntry {
   std::string_view purpose;                                        // one line for --help
   std::vector<std::uint32_t> (*assign)(const AssignmentRequest&);  // by box: its slot, in [0, slots)
   bool by_cost = false;                                            // it uses costs: the better they are known, the better it is
+  // In every other frame the last slot renders the first one's boxes, and so on: each worker holds the voxels of two slots.
+  bool alternates = false;
 };
 
 // The only list.

@@ -94,6 +94,7 @@ Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, cons
   plan.slots = std::uint32_t(roster.slots.size());
   plan.slab_axis = policy.axis;
   plan.combine = policy.combine;
+  plan.alternates = policy.assignment->alternates;
   plan.pixel_error = policy.pixel_error;
   PlaceBoxes(plan);
   // Nothing is in front of a single box.

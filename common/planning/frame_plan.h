@@ -58,6 +58,7 @@ struct FramePlan {
   Axis slab_axis = Axis::kZ;
   double pixel_error = 0;         // as in the policy
   std::string combine;            // the combining scheme, as in the policy
+  bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
   Turn turn;
   WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible

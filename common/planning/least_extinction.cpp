@@ -164,7 +164,7 @@ OpaqueFront FindOpaqueFront(const LeastExtinction& extinction, const FrameSetup&
   front.unit = (slices - 1) / (OpaqueFront::kNever - 1) + 1;
   const double a_step = -std::log(setup.termination) / kOcclusionSteps;
   bool any = false;
-  for (const std::optional<TileBeam>& beam : TileBeams(setup, front.tile)) {
+  for (const std::optional<TileBeam>& beam : TileBeams(setup, front.tile, {0, 0, front.tiles_x, front.tiles_y})) {
     OpaqueFront::Depths& depths = front.tiles.emplace_back();
     depths.fill(OpaqueFront::kNever);
     if (!beam) continue;

@@ -86,15 +86,15 @@ Roster RosterOf(std::uint32_t workers) {
   return roster;
 }
 
-std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster) {
+std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool reversed) {
   const std::vector<WorkerId> present = Present(roster);
   std::vector<WorkerId> owners(layout.owners.size());
   if (present.empty()) return owners;
   std::vector<std::size_t> lent(roster.slots.size());  // boxes of each slot so far
   for (std::size_t box = 0; box < owners.size(); ++box) {
-    const std::uint32_t slot = layout.owners[box];
-    if (slot == kNoSlot) continue;
-    CHECK_LT(slot, roster.slots.size());
+    if (layout.owners[box] == kNoSlot) continue;
+    CHECK_LT(layout.owners[box], roster.slots.size());
+    const std::uint32_t slot = reversed ? std::uint32_t(roster.slots.size()) - 1 - layout.owners[box] : layout.owners[box];
     // Lent: the boxes of one lost slot, and the first boxes of several lost slots, go to different workers.
     owners[box] = roster.slots[slot] != 0 ? roster.slots[slot] : present[(lent[slot]++ + slot) % present.size()];
   }
@@ -116,7 +116,7 @@ void PlaceBoxes(FramePlan& plan) {
 Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apart) {
   std::vector<WorkerId> present = Present(roster);
   if (present.empty()) return Status::Unavailable("the frame needs a worker, but none is registered");
-  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster);
+  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster, plan.alternates && plan.turn.number % 2 == 1);
   for (GroupPlan& group : plan.groups) {
     for (Placement& placement : group.placements) placement.worker = owners[placement.id];
   }

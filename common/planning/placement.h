@@ -32,7 +32,8 @@ Result<FramePlan> Replan(const FramePlan& plan, const Roster& roster, const SetA
 FramePlan TakeTurn(const FramePlan& plan, const Roster& roster, const Turn& turn);
 
 // The worker of each box: its slot's, or the one that it is lent to; 0 if the box belongs to nobody, or if the roster has no worker.
-std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster);
+// `reversed`: the last slot renders the boxes of the first one, and so on (AssignmentEntry::alternates).
+std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool reversed = false);
 
 // The rank where the group's image should end: the display worker's, so that it need not travel; 0 if it has none.
 Rank RootOf(const GroupPlan& group, WorkerId display);

@@ -7,7 +7,7 @@
 #include "common/base/check.h"
 #include "common/calibration/calibration.h"
 #include "common/combining/schemes.h"
-#include "common/image/occlusion_mask.h"
+#include "common/image/coverage_map.h"
 #include "common/planning/placement.h"
 #include "simulator/simulate_frames.h"
 
@@ -32,7 +32,7 @@ std::int32_t ChoosePixelSide(const FrameSetup& setup, std::uint32_t slots) {
   const std::int64_t most = std::clamp<std::int64_t>(FramePredictor::kMostTiles / slots, 1, FramePredictor::kMostFrameTiles);
   std::int32_t side = 1;
   const auto tiles = [&] {
-    return std::int64_t{OcclusionTiles(CoarsePixels(frame.width(), side))} * OcclusionTiles(CoarsePixels(frame.height(), side));
+    return std::int64_t{CoverageTiles(CoarsePixels(frame.width(), side))} * CoverageTiles(CoarsePixels(frame.height(), side));
   };
   while (tiles() > most) ++side;
   return side;

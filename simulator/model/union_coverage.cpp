@@ -21,7 +21,7 @@ UnionCoverage::Amount& UnionCoverage::Amount::operator+=(const Amount& more) {
 }
 
 UnionCoverage::UnionCoverage(std::span<const CoverageMap* const> ranks, std::int32_t width, std::int32_t height)
-    : width_(width), height_(height), tiles_x_(OcclusionTiles(width)), tiles_y_(OcclusionTiles(height)) {
+    : width_(width), height_(height), tiles_x_(CoverageTiles(width)), tiles_y_(CoverageTiles(height)) {
   const std::size_t tiles = std::size_t(tiles_x_) * std::size_t(tiles_y_);
   log_empty_.assign((ranks.size() + 1) * tiles, 0.0);
   single_.resize(ranks.size() * std::size_t(tiles_y_));

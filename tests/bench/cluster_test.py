@@ -5,6 +5,7 @@ import contextlib
 import importlib.machinery
 import importlib.util
 import io
+import json
 import os
 import pathlib
 import subprocess
@@ -26,7 +27,8 @@ def load_program(name: str):
     return module
 
 
-cluster, cluster_paper, cluster_balance = (load_program(name) for name in ("cluster", "cluster_paper", "cluster_balance"))
+PROGRAMS = ("cluster", "cluster_paper", "cluster_balance", "cluster_trace")
+cluster, cluster_paper, cluster_balance, cluster_trace = (load_program(name) for name in PROGRAMS)
 
 
 def options(*arguments: str, program=cluster):
@@ -81,6 +83,8 @@ class Options(unittest.TestCase):
             (cluster_paper, "--repeats", "0"): "--repeats 0: must be from 1 to 1000",
             (cluster_balance, "--repeats", "101"): "--repeats 101: must be from 1 to 100",
             (cluster_balance, "--workers", "17"): "--workers 17: must be from 1 to 16",
+            (cluster_trace, "--frames", "0"): "--frames 0: must be from 1 to 1000",
+            (cluster_trace, "--link", "1000"): "--link 1000: must be from 0.01 to 100",
         }
         for (program, *arguments), says in cases.items():
             told = io.StringIO()
@@ -98,6 +102,28 @@ class Options(unittest.TestCase):
             self.assertEqual(list(matrix.data), ["class2-128", dataset])
             self.assertNotIn("workers", matrix.served)
             self.assertEqual(matrix.here["hosts"], {"cores": 1, "traffic": "encrypted"})
+
+
+class Timelines(unittest.TestCase):
+    def test_the_parts_of_a_frame_are_what_was_planted_and_add_up_to_its_latency(self) -> None:
+        def event(worker: int, name: str, begin: float, end: float) -> dict:
+            return {"ph": "X", "pid": worker, "name": name, "ts": 1e6 * begin, "dur": 1e6 * (end - begin)}
+
+        earlier = [event(0, "frame 0", 0, 100), event(1, "render", 0, 90)]
+        frame = [event(0, "frame 1", 100, 200)]
+        renders = [event(1, "render", 110, 130), event(2, "render", 120, 140), event(2, "render", 140, 150)]  # two boxes of worker 2
+        combines = [event(2, "encode", 150, 151), event(1, "combine", 135, 136), event(1, "combine", 160, 165)]
+        picture = [event(1, "resolve", 165, 175), event(1, "encode", 175, 180)]
+        with tempfile.TemporaryDirectory() as name:
+            file = pathlib.Path(name) / "timeline.json"
+            meta = [{"ph": "M", "pid": 1, "name": "process_name"}]
+            file.write_text(json.dumps({"traceEvents": meta + earlier + frame + renders + combines + picture}), encoding="utf-8")
+            (parts,) = cluster_trace.parts_of_frames(file, 1)
+        expected = {"begins": 15, "renders": 25, "waits": 10, "combines": 15, "picture": 10, "encodes": 5, "travels": 20}
+        self.assertEqual(parts.keys(), expected.keys())
+        for part, seconds in expected.items():
+            self.assertAlmostEqual(parts[part], seconds, msg=part)
+        self.assertAlmostEqual(sum(parts.values()), 100)
 
 
 class Repeats(unittest.TestCase):

@@ -89,8 +89,9 @@ template <class M>
 std::vector<Sent<M>> ToWorkers(const Actions& actions) {
   std::vector<Sent<M>> sent;
   for (const CoordinatorAction& action : actions) {
-    const auto* send = Get<ToWorker>(action);
-    if (send != nullptr && std::holds_alternative<M>(send->message)) sent.push_back({send->to, std::get<M>(send->message), {}});
+    const auto* send = Get<TellWorkers>(action);
+    if (send == nullptr || !std::holds_alternative<M>(send->message)) continue;
+    for (const PeerToken to : send->to) sent.push_back({to, std::get<M>(send->message), {}});
   }
   return sent;
 }

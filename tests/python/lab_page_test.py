@@ -119,10 +119,12 @@ class Answers(InAFolder):
         self.assertAlmostEqual(efficiency(value(1.0), value(1.0), 8, 8).value, 100)  # weak, ideal
 
     def test_scaling_is_told_for_both_outcomes(self) -> None:
-        for answer in self.answers("scaling", ideal=True):
+        *series, many = self.answers("scaling", ideal=True)
+        for answer in series:
             self.assertIn("at least 50 % up to p = 8: every series", answer)
             self.assertIn("a tie", answer)
-        for answer in self.answers("scaling", ideal=False):
+        self.assertEqual(many, "At p = 64 the coordinator's time is 50 % with fan-in and 50 % with radix-k of the latency of a frame.")
+        for answer in self.answers("scaling", ideal=False)[:-1]:
             self.assertIn("below 50 % from p = 8 on: every series", answer)
 
     def test_combining_leaders_ties_and_reversals(self) -> None:
@@ -159,7 +161,8 @@ class Answers(InAFolder):
 
     def test_one_repeat_ranks_nothing(self) -> None:
         for experiment in ("combining", "scaling", "sweep"):
-            for answer in self.answers(experiment, repeats=1):
+            answers = self.answers(experiment, repeats=1)
+            for answer in answers[:-1] if experiment == "scaling" else answers:
                 self.assertIn("not ranked", answer)
 
 

@@ -11,7 +11,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "python"))
 from slabstream_lab.value import interval_of  # noqa: E402
 
 REPEATS = 16
-UNITS = {"imbalance": "1", "idle_share": "1", "image_bytes": "B", "memory": "B", "count": "1", "other_load": "1", "drift": "1"}
+UNITS = {"imbalance": "1", "idle_share": "1", "image_bytes": "B", "assignment_bytes": "B", "memory": "B", "count": "1", "other_load": "1", "drift": "1"}
 FIGURES = ("latency", "preview", "period", "imbalance", "idle_share", "image_bytes")
 
 
@@ -96,7 +96,20 @@ def scaling(folder: pathlib.Path, repeats: int = REPEATS, ideal: bool = True) ->
         work = (n / 20) ** 3
         of = {"part": part, "renderer": renderer, "variant": variant, "workers": p, "volume": f"class1-{n}", "n": n, "pixels": 77}
         rows += figures(work / (p if ideal else 1), repeats, link="10gbit", **of)
-    return write(folder, rows, "scaling", repeats=repeats)
+    return write(folder, rows + many_workers(), "scaling", repeats=repeats)
+
+
+def many_workers() -> list[dict]:
+    """At p = 64 the coordinator's time is half of the latency, and the latency without it three quarters."""
+    rows = []
+    for scheme, p in itertools.product(("fan-in", "radix-k"), (16, 64)):
+        of = {"part": "many workers", "combine": scheme, "workers": p, "volume": "class1-20", "n": 20, "pixels": 77, "link": "10gbit"}
+        one, no_time = of | {"variant": "one coordinator"}, of | {"variant": "a coordinator that takes no time"}
+        rows += [row("latency", 0.4, repeats=1, **one), row("latency", 0.3, repeats=1, **no_time)]
+        rows.append(row("hand_out_time", 0.2 * p / 64, repeats=1, **one))
+        rows += [row(metric, 1e-3, origin="measured", **one) for metric in ("plan_time", "assignment_time", "hearing_time")]
+        rows.append(row("assignment_bytes", 100.0 * p, repeats=1, origin="measured", **one))
+    return rows
 
 
 def sweep(folder: pathlib.Path, repeats: int = REPEATS, times: dict[str, float] | None = None) -> pathlib.Path:

@@ -1,7 +1,10 @@
 // RenderTiles: the frame of an image-order renderer, tile by tile.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include "common/base/time.h"
@@ -24,22 +27,42 @@ void ForEachTile(std::int32_t count, const RenderControl& control, RankReport& r
   report.stage_ns[std::size_t(Stage::kSample)] += ns;
 }
 
-// Calls render(tile, its steps, first, floats a row) for the parts of the image's bounds in each tile of the frame that `hidden` does not
-// hide, as ForEachTile does; `first` is where the tile's first pixel is stored.
+// Calls render(part, its steps, first, floats a row) for parts that together are what `hidden` does not hide of the image, each within
+// pixels of one number of steps; `first` is where the part's first pixel is stored. A piece (ForEachPiece) has 2 x 2 tiles of the mask:
+// what is kept for voxels that rays of neighbouring tiles meet is found again.
 template <class Render>
 void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const RenderControl& control, RankReport& report, Render&& render) {
+  constexpr std::int32_t kSide = 2 * kOcclusionTile;
   const PixelBounds& bounds = image.bounds;
   if (bounds.empty()) return;
-  const std::int32_t first_x = bounds.x_begin / kOcclusionTile, first_y = bounds.y_begin / kOcclusionTile;
-  const std::int32_t columns = (bounds.x_end - 1) / kOcclusionTile + 1 - first_x, rows = (bounds.y_end - 1) / kOcclusionTile + 1 - first_y;
+  const std::int32_t first_x = bounds.x_begin / kSide, first_y = bounds.y_begin / kSide;
+  const std::int32_t columns = (bounds.x_end - 1) / kSide + 1 - first_x, rows = (bounds.y_end - 1) / kSide + 1 - first_y;
   const auto width = std::size_t(bounds.width());
-  ForEachTile(columns * rows, control, report, [&](std::int32_t number) {
-    const std::int32_t x = (first_x + number % columns) * kOcclusionTile, y = (first_y + number / columns) * kOcclusionTile;
-    const std::uint8_t steps = hidden.StepsAt(x, y);
+  const auto render_part = [&](const PixelBounds& part, std::uint8_t steps) {
     if (steps == kOcclusionSteps) return;
-    const PixelBounds tile = Intersection(bounds, {x, y, x + kOcclusionTile, y + kOcclusionTile});
-    const std::size_t pixel = std::size_t(tile.y_begin - bounds.y_begin) * width + std::size_t(tile.x_begin - bounds.x_begin);
-    render(tile, steps, &image.rgba[4 * pixel], 4 * width);
+    const std::size_t pixel = std::size_t(part.y_begin - bounds.y_begin) * width + std::size_t(part.x_begin - bounds.x_begin);
+    render(part, steps, &image.rgba[4 * pixel], 4 * width);
+  };
+  ForEachTile(columns * rows, control, report, [&](std::int32_t number) {
+    const std::int32_t x = (first_x + number % columns) * kSide, y = (first_y + number / columns) * kSide;
+    const PixelBounds piece = Intersection(bounds, {x, y, x + kSide, y + kSide});
+    std::array<PixelBounds, 4> tiles;
+    std::array<std::uint8_t, 4> steps;
+    std::size_t count = 0;
+    for (const std::int32_t tile_y : {y, y + kOcclusionTile}) {
+      for (const std::int32_t tile_x : {x, x + kOcclusionTile}) {
+        const PixelBounds tile = Intersection(piece, {tile_x, tile_y, tile_x + kOcclusionTile, tile_y + kOcclusionTile});
+        if (tile.empty()) continue;
+        tiles[count] = tile;
+        steps[count++] = hidden.StepsAt(tile.x_begin, tile.y_begin);
+      }
+    }
+    // Rays of a packet march together, so a pixel keeps its bits only if packets begin where they do in a tile alone.
+    const bool whole = piece.x_begin % kOcclusionTile == 0 && piece.y_begin % kOcclusionTile == 0;
+    if (whole && std::all_of(steps.begin(), steps.begin() + count, [&](std::uint8_t of) { return of == steps[0]; })) {
+      return render_part(piece, steps[0]);
+    }
+    for (std::size_t i = 0; i < count; ++i) render_part(tiles[i], steps[i]);
   });
 }
 

@@ -17,7 +17,68 @@ def page(run: Run) -> Page:
     return Page(
         "Strong and weak scaling",
         "How far more workers help: with one volume for all of them, and with as many voxels for each.",
-        [_section(run, part, renderer) for part in ("strong", "weak") for renderer in run.distinct("renderer", part=part)],
+        [_section(run, part, renderer) for part in ("strong", "weak") for renderer in run.distinct("renderer", part=part)]
+        + ([_many_workers(run)] if run.distinct("workers", part=MANY) else []),
+    )
+
+
+MANY = "many workers"
+ONE, NO_TIME = "one coordinator", "a coordinator that takes no time"
+
+
+def _many_workers(run: Run) -> Section:
+    case = {"part": MANY}
+    schemes, workers = run.distinct("combine", **case), sorted(run.distinct("workers", **case))
+
+    def of(metric: str, variant: str, **where) -> Value:
+        return run.value(metric, variant=variant, **case, **where)
+
+    rows = []
+    for scheme in schemes:
+        for p in workers:
+            where = {"combine": scheme, "workers": p}
+            message, hand_out = of("assignment_bytes", ONE, **where), of("hand_out_time", ONE, **where)
+            rows.append(
+                [scheme, p]
+                + [of(metric, ONE, **where) for metric in ("plan_time", "assignment_time", "hearing_time")]
+                + [message, message.times(p), hand_out, of("latency", NO_TIME, **where), of("latency", ONE, **where)]
+            )
+    most = max(workers)
+    shares = [
+        f"{of('hand_out_time', ONE, **where).over(of('latency', ONE, **where)).percent().text()} with {scheme}"
+        for scheme in schemes
+        for where in [{"combine": scheme, "workers": most}]
+    ]
+    return Section(
+        "One coordinator, many workers",
+        "From how many workers on does the coordinator hold a frame up?",
+        f"Sphere {run.only('volume', **case)}, splatting over a kd-tree, one group, one frame alone. Boxes are rendered alone, and frames are "
+        f"simulated on a network ({run.only('link', **case)}). Planning, encoding and decoding are measured. The coordinator sends the same "
+        "message to every worker, one after the other, over one wire: all boxes of the group and the addresses of all its workers. So its "
+        "time for a frame grows with the square of the number of workers.",
+        f"At p = {most} the coordinator's time is {' and '.join(shares)} of the latency of a frame.",
+        [
+            plots.lines(
+                "many-workers-latency",
+                "Latency of a frame alone",
+                {
+                    f"{scheme}, {variant}": [(p, of("latency", variant, combine=scheme, workers=p)) for p in workers]
+                    for scheme in schemes
+                    for variant in (ONE, NO_TIME)
+                },
+                "workers",
+                "time",
+                "Both axes logarithmic.",
+                log_x=True,
+                log_y=True,
+                marks=True,
+            ),
+            Table(
+                "One frame, many workers",
+                ["scheme", "p", "plan", "encode", "decode, each worker", "message", "messages of a frame", "coordinator", "latency without it", "latency"],
+                rows,
+            ),
+        ],
     )
 
 

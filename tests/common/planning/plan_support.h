@@ -25,7 +25,7 @@ inline void ExpectSound(const FramePlan& plan, const Roster& roster) {
   ASSERT_EQ(plan.layout->owners.size(), order.size());
   std::erase_if(order, [&](BoxId box) { return plan.layout->owners[box] == kNoSlot; });
   EXPECT_EQ(plan.groups.size(), std::max<std::size_t>(1, (order.size() + plan.slots - 1) / plan.slots));
-  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster);
+  const std::vector<WorkerId> owners = OwnersOf(*plan.layout, roster, plan.alternates && plan.turn.number % 2 == 1);
 
   // The placements of all groups are the boxes that show something, in visibility order, each in the group where it belongs.
   std::map<BoxId, std::size_t> position;

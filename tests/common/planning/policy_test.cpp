@@ -81,7 +81,8 @@ TEST(PlanFrame, NamesWhatItDoesNotKnow) {
   EXPECT_EQ(status([](auto& r) { r.policy.balance_by = "hairs"; }, FullRoster(1)),
             Status::InvalidArgument("policy.balance_by is 'hairs', but must be one of: auto, voxels, occupied, cost"));
   EXPECT_EQ(status([](auto& r) { r.policy.assignment = "lots"; }, FullRoster(1)),
-            Status::InvalidArgument("policy.assignment is 'lots', but must be one of: auto, cyclic, zigzag, contiguous, random, greedy"));
+            Status::InvalidArgument(
+                "policy.assignment is 'lots', but must be one of: auto, cyclic, zigzag, alternating, contiguous, random, greedy"));
   EXPECT_EQ(status([](auto& r) { r.policy.balance = "act"; }, FullRoster(1)),
             Status::InvalidArgument("policy.balance is 'act', but must be one of: static, dynamic, planes, handover"));
   EXPECT_EQ(

@@ -152,5 +152,43 @@ TEST(OwnersOf, LendsTheBoxesOfVacantSlotsEvenly) {
   }
 }
 
+// Whatever turn it is, all boxes are rendered once, and two frames in a row give each worker the boxes of two slots: its own and, of a
+// partition along the volume, those on the other side.
+TEST(AlternatingBoxes, ChangeHandsInEveryOtherFrame) {
+  for (const std::uint32_t slots : {1U, 2U, 5U, 16U}) {
+    for (const int groups : {1, 3}) {
+      FrameRequest request = SomeRequest();
+      request.policy.groups = groups;
+      request.policy.assignment = "alternating";
+      const Roster roster = RosterOf(slots);
+      const FramePlan first = Plan(request, FullSummary({96, 96, 96}), roster);
+      const FramePlan second = TakeTurn(first, roster, {.number = 1}), third = TakeTurn(first, roster, {.number = 2});
+      for (const FramePlan* plan : {&first, &second, &third}) ExpectSound(*plan, roster);
+      for (std::size_t group = 0; group < first.groups.size(); ++group) {
+        for (std::size_t rank = 0; rank < first.groups[group].placements.size(); ++rank) {
+          const auto worker = [&](const FramePlan& plan) { return plan.groups[group].placements[rank].worker; };
+          EXPECT_EQ(worker(second), slots + 1 - worker(first)) << slots << " slots";
+          EXPECT_EQ(worker(third), worker(first));
+        }
+      }
+      // Whoever takes a lost worker's place in a frame, the others keep what they have in this turn.
+      Roster rest = roster;
+      rest.slots[0] = 0;
+      const Result<FramePlan> again = Replan(second, rest);
+      if (slots == 1) continue;
+      ASSERT_TRUE(again.ok());
+      ExpectSound(*again, rest);
+      for (std::size_t group = 0; group < first.groups.size(); ++group) {
+        for (std::size_t rank = 0; rank < first.groups[group].placements.size(); ++rank) {
+          const WorkerId before = second.groups[group].placements[rank].worker;
+          if (before != 1) {
+            EXPECT_EQ(again->groups[group].placements[rank].worker, before);
+          }
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -183,9 +183,9 @@ TEST(FieldChecks, HiddenTiles) {
       {[&](auto& e) { mask(e)->set_hidden("\xFF"); }, "GroupDone.hidden.hidden: a text of 1 bytes, expected 2 to 2"},
       {[&](auto& e) { mask(e)->set_hidden("123"); }, "GroupDone.hidden.hidden: a text of 3 bytes, expected 2 to 2"},
       {[&](auto& e) { mask(e)->clear_hidden(); }, "GroupDone.hidden.hidden: a text of 0 bytes, expected 2 to 2"},
-      {[&](auto& e) { mask(e)->set_tiles_x(8193); }, "GroupDone.hidden.tiles_x: 8193 is not in [0, 8192]"},
-      {[&](auto& e) { mask(e)->set_tiles_y(8193); }, "GroupDone.hidden.tiles_y: 8193 is not in [1, 8192]"},
-      {[&](auto& e) { mask(e)->set_tiles_y(0); }, "GroupDone.hidden.tiles_y: 0 is not in [1, 8192]"},
+      {[&](auto& e) { mask(e)->set_tiles_x(16385); }, "GroupDone.hidden.tiles_x: 16385 is not in [0, 16384]"},
+      {[&](auto& e) { mask(e)->set_tiles_y(16385); }, "GroupDone.hidden.tiles_y: 16385 is not in [1, 16384]"},
+      {[&](auto& e) { mask(e)->set_tiles_y(0); }, "GroupDone.hidden.tiles_y: 0 is not in [1, 16384]"},
       {[&](auto& e) { mask(e)->set_tiles_x(0); }, "GroupDone.hidden.tiles_y: 3 is not in [0, 0]"},
       {[&](auto& e) { e.mutable_group_done()->clear_hidden(); }, ""},
   });
