@@ -159,11 +159,11 @@ void AddFrameOfMany(ExperimentContext& context, const FrameCase& frame, Results&
   for (const auto& [variant, model] : {std::pair("one coordinator", &machine), std::pair("a coordinator that takes no time", &at_once)}) {
     const Timeline timeline = Simulate(measured, *model);
     const SimulatedFrame& alone = timeline.frames.front();
-    results.Add(columns(variant), "latency", alone.latency(), Origin::kSimulated);
-    results.Add(columns(variant), "idle_share", alone.idle_share, Origin::kSimulated);
-    results.Add(columns(variant), "image_bytes", alone.image_bytes, Origin::kSimulated);
+    results.Add(columns(variant), "latency", std::vector{alone.latency()}, Origin::kSimulated);
+    results.Add(columns(variant), "idle_share", std::vector{alone.idle_share}, Origin::kSimulated);
+    results.Add(columns(variant), "image_bytes", std::vector{alone.image_bytes}, Origin::kSimulated);
   }
-  results.Add(columns("one coordinator"), "hand_out_time", frame.workers * machine.message_seconds + machine.plan_seconds,
+  results.Add(columns("one coordinator"), "hand_out_time", std::vector{frame.workers * machine.message_seconds + machine.plan_seconds},
               Origin::kSimulated);
   for (const auto& [metric, number] : {std::pair("plan_time", "plan_seconds"), std::pair("assignment_time", "encode_seconds"),
                                        std::pair("hearing_time", "decode_seconds"), std::pair("assignment_bytes", "message_bytes")}) {

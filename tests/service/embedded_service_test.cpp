@@ -153,6 +153,18 @@ TEST_F(EmbeddedServiceTest, SecondFrameMovesNoVoxels) {
   EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, TestRequest(ZBuffer(), 251))), 0U);
 }
 
+// Every other frame workers swap the volume's front and back. Each then holds both.
+TEST_F(EmbeddedServiceTest, AlternatingFramesAreRightAndMoveNoVoxelsFromTheThirdOn) {
+  Start(4);
+  Client client = Connect();
+  FrameRequest request = TestRequest(&DefaultRenderer(), 30, 1);
+  request.policy.assignment = "alternating";
+  EXPECT_GT(VoxelBytes(ExpectRightPicture(client, request)), 0U);
+  EXPECT_GT(VoxelBytes(ExpectRightPicture(client, request)), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, request)), 0U);
+  EXPECT_EQ(VoxelBytes(ExpectRightPicture(client, request)), 0U);
+}
+
 TEST_F(EmbeddedServiceTest, SeveralClientsAtOnce) {
   Start(2);
   std::vector<std::jthread> threads;

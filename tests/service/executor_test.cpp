@@ -136,7 +136,7 @@ TEST_F(ExecutorTest, DamagedRunsAreRefused) {
 
 TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   FrameSetup setup;
-  setup.sheets.width = 40;  // 3 x 1 tiles
+  setup.sheets.width = 40;  // 5 x 1 tiles
   setup.sheets.height = 8;
   const auto shared = std::make_shared<const FrameSetup>(setup);
   const PixelBounds frame = FrameBounds(setup);
@@ -155,9 +155,9 @@ TEST_F(ExecutorTest, HiddenTilesAreThoseOfWhatWasCombinedBefore) {
   const auto first = outputs_.NextEvent<HiddenFound>();
   EXPECT_EQ(first.image, 1U);
   EXPECT_EQ(first.key, kKey);
-  EXPECT_EQ(first.hidden, (OcclusionMask{3, 1, {kOcclusionSteps, 0, 0}}));
+  EXPECT_EQ(first.hidden, (OcclusionMask{5, 1, {kOcclusionSteps, kOcclusionSteps, 0, 0, 0}}));
   EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
-  EXPECT_EQ(outputs_.NextEvent<HiddenFound>().hidden, (OcclusionMask{3, 1, {kOcclusionSteps, 0, kOcclusionSteps}}));
+  EXPECT_EQ(outputs_.NextEvent<HiddenFound>().hidden, (OcclusionMask{5, 1, {kOcclusionSteps, kOcclusionSteps, 0, 0, kOcclusionSteps}}));
 }
 
 TEST_F(ExecutorTest, AnImageWithDepthHidesNothing) {
