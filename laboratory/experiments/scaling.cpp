@@ -25,7 +25,6 @@ namespace {
 
 constexpr int kTeam = 2;                 // workers that share a frame, in series with teams
 constexpr int kMostDynamicWorkers = 64;  // measuring more boxes frame after frame takes long
-constexpr int kMostSimulated = 1024;     // each worker hears of all others: a frame of 4096 takes 3 GB and minutes
 
 FrameCase FrameOf(const BenchCase& volume, int pixels, const Policy& policy, int workers) {
   return {volume, {pixels, pixels}, BenchView(Projection::kOrthographic, 1, 12), policy, workers};
@@ -150,6 +149,7 @@ void AddFrameOfMany(ExperimentContext& context, const FrameCase& frame, Results&
     of.update(Json{{"part", "many workers"}, {"variant", variant}, {"teams", 1}, {"link", kLink}});
     return of;
   };
+  const MeasuredFrame measured = Recall(context, frame);
   MachineModel machine = Cluster(context, Link(kLink));
   MachineModel at_once = machine;
   at_once.plan_seconds = at_once.message_seconds = 0;
@@ -157,8 +157,7 @@ void AddFrameOfMany(ExperimentContext& context, const FrameCase& frame, Results&
   machine.plan_seconds = of_coordinator("plan_seconds").median + of_coordinator("encode_seconds").median;
   machine.message_seconds += of_coordinator("message_bytes").median / machine.link.bytes_per_second;
   for (const auto& [variant, model] : {std::pair("one coordinator", &machine), std::pair("a coordinator that takes no time", &at_once)}) {
-    if (frame.workers > kMostSimulated) continue;
-    const Timeline timeline = Simulate(Recall(context, frame), *model);
+    const Timeline timeline = Simulate(measured, *model);
     const SimulatedFrame& alone = timeline.frames.front();
     results.Add(columns(variant), "latency", std::vector{alone.latency()}, Origin::kSimulated);
     results.Add(columns(variant), "idle_share", std::vector{alone.idle_share}, Origin::kSimulated);
@@ -189,10 +188,8 @@ void RunScaling(ExperimentContext& context, Results& results) {
   }
   const std::vector<FrameCase> of_many = FramesOfMany(context);
   for (const FrameCase& frame : of_many) {
-    if (frame.workers <= kMostSimulated) {
-      trials.push_back(CostTrial(context, frame));
-      trials.push_back(FinishTrial(context, frame));
-    }
+    trials.push_back(CostTrial(context, frame));
+    trials.push_back(FinishTrial(context, frame));
     trials.push_back(ForHandOut(context, frame)
                          .MakeTrial(
                              context, [&context, frame] { return MeasureHandOut(context, frame); }, 0.1));

@@ -29,7 +29,6 @@ ONE, NO_TIME = "one coordinator", "a coordinator that takes no time"
 def _many_workers(run: Run) -> Section:
     case = {"part": MANY}
     schemes, workers = run.distinct("combine", **case), sorted(run.distinct("workers", **case))
-    simulated = sorted(run.distinct("workers", metric="latency", **case))
 
     def of(metric: str, variant: str, **where) -> Value:
         return run.value(metric, variant=variant, **case, **where)
@@ -42,10 +41,9 @@ def _many_workers(run: Run) -> Section:
             rows.append(
                 [scheme, p]
                 + [of(metric, ONE, **where) for metric in ("plan_time", "assignment_time", "hearing_time")]
-                + [message, message.times(p), hand_out]
-                + [run.find("latency", variant=variant, **case, **where) or "" for variant in (NO_TIME, ONE)]
+                + [message, message.times(p), hand_out, of("latency", NO_TIME, **where), of("latency", ONE, **where)]
             )
-    most = max(simulated)
+    most = max(workers)
     shares = [
         f"{of('hand_out_time', ONE, **where).over(of('latency', ONE, **where)).percent().text()} with {scheme}"
         for scheme in schemes
@@ -64,7 +62,7 @@ def _many_workers(run: Run) -> Section:
                 "many-workers-latency",
                 "Latency of a frame alone",
                 {
-                    f"{scheme}, {variant}": [(p, of("latency", variant, combine=scheme, workers=p)) for p in simulated]
+                    f"{scheme}, {variant}": [(p, of("latency", variant, combine=scheme, workers=p)) for p in workers]
                     for scheme in schemes
                     for variant in (ONE, NO_TIME)
                 },
