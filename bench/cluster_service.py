@@ -7,6 +7,7 @@ import statistics
 import subprocess
 import sys
 import time
+from typing import NoReturn
 
 from dilated_cluster import ClusterError, Host
 
@@ -18,6 +19,36 @@ GIGABIT = 1e9 / 8  # bytes
 def link_text(rate: float) -> str:
     """As experiments call it: no latency but the kernel's."""
     return f"10gbit:0,{rate:g}"
+
+
+def core_share(workers: int) -> float:
+    """Of a core, for each of so many hosts that work."""
+    return min(1.0, CORES_USED / workers)
+
+
+def make_sphere(path: pathlib.Path, programs: pathlib.Path, sphere_class: int, size: int, occupancy: float) -> None:
+    """The file is there whole or not at all."""
+    if path.exists():
+        return
+    made = path.with_name("new-" + path.name)
+    sphere = ["--class", str(sphere_class), "--size", str(size), "--occupancy", str(occupancy)]
+    subprocess.run([programs / "slabstream", "sphere", *sphere, "-o", made], check=True, stdout=subprocess.DEVNULL)
+    made.rename(path)
+
+
+def run_program(name: str, main, interrupted: str = "interrupted; the same command continues") -> NoReturn:
+    """Ends the process with main's status. What goes wrong is one line."""
+    try:
+        sys.exit(main())
+    except ClusterError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        sys.exit(1)
+    except subprocess.CalledProcessError as error:
+        print(f"{name}: `{error.cmd[0]}` ended with status {error.returncode}", file=sys.stderr)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        print(f"{name}: {interrupted}", file=sys.stderr)
+        sys.exit(130)
 
 
 class Service:

@@ -62,10 +62,10 @@ double TileBeam::LeastLength(const SliceAxes& axes, const Vec3& spacing) const {
 
 std::optional<double> TileBeam::FirstIn(const Area& area, double begin, bool ascending) const {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
-  constexpr int kRounds = 4;  // few beams need more than two; a place that is too near is right as well
+  constexpr int kRounds = 4;  // a place that is too near is right as well
   const double sign = ascending ? 1 : -1;
   double k = begin;
-  // Moves k to where the first ray passes `limit`: upwards if `up` is 1, downwards if it is -1. False: none does.
+  // Moves k on until a coordinate of one of the rays is at least `limit` (`up` 1) or at most `limit` (-1). False: no ray comes there.
   const auto pass = [&](double limit, double up, double Ray::*at_0, double Ray::*slope) {
     double nearest = kInfinity;  // slices from k on
     for (const Ray& ray : corners_) {

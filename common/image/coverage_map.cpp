@@ -5,6 +5,7 @@
 
 #include "common/base/check.h"
 #include "common/image/local_image.h"
+#include "common/image/tile_bounds.h"
 
 namespace slabstream {
 namespace {
@@ -15,12 +16,6 @@ CoverageMap EmptyMap(std::int32_t width, std::int32_t height) {
   CoverageMap map{width, height, CoverageTiles(width), CoverageTiles(height), {}};
   map.share.assign(std::size_t(map.tiles_x) * std::size_t(map.tiles_y), 0.0F);
   return map;
-}
-
-// The pixels of tile (x, y) of a frame of width x height pixels.
-PixelBounds TileBounds(std::int32_t x, std::int32_t y, std::int32_t width, std::int32_t height) {
-  return Intersection(PixelBounds{x * kCoverageTile, y * kCoverageTile, (x + 1) * kCoverageTile, (y + 1) * kCoverageTile},
-                      {0, 0, width, height});
 }
 
 bool Filled(const LocalImage& image, std::size_t pixel) {
@@ -48,7 +43,7 @@ std::uint64_t SamplePixels(const LocalImage& image) {
 }
 
 std::int32_t CoverageMap::TilePixels(std::int32_t x, std::int32_t y) const {
-  return std::int32_t(TileBounds(x, y, frame_width, frame_height).pixel_count());
+  return std::int32_t(TileBounds(kCoverageTile, x, y, frame_width, frame_height).pixel_count());
 }
 
 double CoverageMap::pixels() const {
@@ -84,7 +79,7 @@ CoverageMap UniformCoverage(const PixelBounds& bounds, double pixels, std::int32
   const double density = std::clamp(pixels / double(inside.pixel_count()), 0.0, 1.0);
   for (std::int32_t y = inside.y_begin / kCoverageTile; y * kCoverageTile < inside.y_end; ++y) {
     for (std::int32_t x = inside.x_begin / kCoverageTile; x * kCoverageTile < inside.x_end; ++x) {
-      const PixelBounds tile = TileBounds(x, y, width, height);
+      const PixelBounds tile = TileBounds(kCoverageTile, x, y, width, height);
       map.at(x, y) = float(density * double(Intersection(tile, inside).pixel_count()) / double(tile.pixel_count()));
     }
   }

@@ -6,15 +6,10 @@
 
 #include "common/base/check.h"
 #include "common/image/local_image.h"
+#include "common/image/tile_bounds.h"
 
 namespace slabstream {
 namespace {
-
-// The pixels of tile (x, y) of a frame of width x height pixels.
-PixelBounds TileBounds(std::int32_t x, std::int32_t y, std::int32_t width, std::int32_t height) {
-  return Intersection(PixelBounds{x * kOcclusionTile, y * kOcclusionTile, (x + 1) * kOcclusionTile, (y + 1) * kOcclusionTile},
-                      {0, 0, width, height});
-}
 
 bool Opaque(const LocalImage& image, const PixelBounds& tile, float least_alpha) {
   for (std::int32_t y = tile.y_begin; y < tile.y_end; ++y) {
@@ -67,7 +62,7 @@ OcclusionMask FindHiddenTiles(const LocalImage& image, std::int32_t width, std::
   for (std::int32_t y = 0; y < mask.tiles_y; ++y) {
     for (std::int32_t x = 0; x < mask.tiles_x; ++x) {
       std::uint8_t& steps = mask.steps[std::size_t(y) * std::size_t(mask.tiles_x) + std::size_t(x)];
-      const PixelBounds tile = TileBounds(x, y, width, height);
+      const PixelBounds tile = TileBounds(kOcclusionTile, x, y, width, height);
       if (steps < kOcclusionSteps && image.bounds.Contains(tile) && Opaque(image, tile, float(1 - termination))) steps = kOcclusionSteps;
     }
   }

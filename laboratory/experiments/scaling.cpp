@@ -142,7 +142,7 @@ KeyedFrame ForHandOut(ExperimentContext& context, const FrameCase& frame) { retu
 
 // Of a frame that is alone, and of the coordinator's part in it.
 void AddFrameOfMany(ExperimentContext& context, const FrameCase& frame, Results& results) {
-  const Json& hand_out = ForHandOut(context, frame).key;
+  const Json hand_out = ForHandOut(context, frame).key;
   const auto of_coordinator = [&](const char* number) { return EstimateOf(context.log(), hand_out, number); };
   const auto columns = [&](std::string_view variant) {
     Json of = ColumnsOf(frame);

@@ -28,8 +28,8 @@ void ForEachTile(std::int32_t count, const RenderControl& control, RankReport& r
 }
 
 // Calls render(part, its steps, first, floats a row) for parts that together are what `hidden` does not hide of the image, each within
-// pixels of one number of steps; `first` is where the part's first pixel is stored. A piece (ForEachPiece) has 2 x 2 tiles of the mask:
-// what is kept for voxels that rays of neighbouring tiles meet is found again.
+// pixels of one number of steps; `first` is where the part's first pixel is stored. A piece (ForEachPiece) has 2 x 2 tiles of the mask,
+// since rays of neighbouring tiles need the same gradients soon after each other.
 template <class Render>
 void RenderTiles(LocalImage& image, const OcclusionMask& hidden, const RenderControl& control, RankReport& report, Render&& render) {
   constexpr std::int32_t kSide = 2 * kOcclusionTile;

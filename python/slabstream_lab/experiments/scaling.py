@@ -5,7 +5,7 @@ import dataclasses
 from typing import Collection
 
 from .. import plots
-from ..page import Page, Section, Table
+from ..page import Figure, Page, Section, Table
 from ..ranking import rankings
 from ..results import Run
 from ..value import Value
@@ -20,6 +20,10 @@ def page(run: Run) -> Page:
         [_section(run, part, renderer) for part in ("strong", "weak") for renderer in run.distinct("renderer", part=part)]
         + ([_many_workers(run)] if run.distinct("workers", part=MANY) else []),
     )
+
+
+def _times(name: str, title: str, series: dict[str, list[tuple[int, Value]]]) -> Figure:
+    return plots.lines(name, title, series, "workers", "time", "Both axes logarithmic.", log_x=True, log_y=True, marks=True)
 
 
 MANY = "many workers"
@@ -58,7 +62,7 @@ def _many_workers(run: Run) -> Section:
         "time for a frame grows with the square of the number of workers.",
         f"At p = {most} the coordinator's time is {' and '.join(shares)} of the latency of a frame.",
         [
-            plots.lines(
+            _times(
                 "many-workers-latency",
                 "Latency of a frame alone",
                 {
@@ -66,12 +70,6 @@ def _many_workers(run: Run) -> Section:
                     for scheme in schemes
                     for variant in (ONE, NO_TIME)
                 },
-                "workers",
-                "time",
-                "Both axes logarithmic.",
-                log_x=True,
-                log_y=True,
-                marks=True,
             ),
             Table(
                 "One frame, many workers",
@@ -168,16 +166,10 @@ def _section(run: Run, part: str, renderer: str) -> Section:
         f"At p = {common}, the greatest that all series have, least time from picture to picture: "
         f"{least['period'].sentence()}; least latency: {least['latency'].sentence()}.",
         [
-            plots.lines(
+            _times(
                 f"{name}-period",
                 "From picture to picture",
                 {label: [(x.workers, x.period) for x in points] for label, points in series.items()},
-                "workers",
-                "time",
-                "Both axes logarithmic.",
-                log_x=True,
-                log_y=True,
-                marks=True,
             ),
             *(
                 plots.lines(
