@@ -193,7 +193,7 @@ class Coordinator {
       assignment.group.placements.push_back({rank, {{0, 0, z}, {16, 16, z + 8}}, rank + 1});
       assignment.peers.push_back({rank + 1, workers_[rank].endpoint, workers_[rank].memory_scope, workers_[rank].key});
     }
-    assignment.group.schedule = {scheme, config_.ranks, 0};
+    assignment.group.schedule = {scheme, config_.ranks, {0}};
     assignment.group.color = config_.color;
     assignment.display = 1;
     Times times;

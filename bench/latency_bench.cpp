@@ -25,6 +25,7 @@ constexpr int kWarmUpFrames = 20;
 struct Options {
   int volume = 64, size = 512, frames = 200, workers = 2, threads = 1;
   double zoom = 1;  // at 3 the object fills the picture
+  bool straight8 = false;
   const RendererKind* renderer = &DefaultRenderer();
 };
 
@@ -41,6 +42,7 @@ FrameRequest RequestOf(const Options& options, const std::string& dataset, int f
   request.view.azimuth_degrees = frame * 360.0 / options.frames;
   request.view.elevation_degrees = 20;
   request.view.zoom = options.zoom;
+  request.straight8 = options.straight8;
   return request;
 }
 
@@ -138,6 +140,7 @@ int main(int argc, char** argv) {
   AddInteger(app, "--workers", options.workers, 1, 64, "Workers");
   AddInteger(app, "--threads", options.threads, 1, 64, "Render threads of each worker");
   AddNumber(app, "--zoom", options.zoom, {0.01, kMaxZoom}, "Magnification; at 3 the sphere fills the picture");
+  app.add_flag("--straight8", options.straight8, "Ask for the codes of a PNG of 8 bits, a quarter of the bytes");
   AddRenderer(app, options.renderer);
   return RunProgram(app, argc, argv, [&options] { return Run(options); });
 }

@@ -8,13 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include "client/decode_picture.h"
 #include "client/direct_pictures.h"
 #include "common/base/any_of.h"
 #include "common/base/log.h"
 #include "common/base/overloaded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
-#include "common/wire/payload.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -33,29 +33,6 @@ struct OpenRequest {
   bool cancelled = false;       // by the caller; the service has not answered yet
   bool awaits_picture = false;  // the service has done its part, and need not know it any more
 };
-
-// The checked picture of a reply: whoever answers at the endpoint may send anything.
-Result<Picture> DecodePicture(FrameReply& reply, const Bytes& payload, ImageSize expected) {
-  if (reply.size != expected) {
-    return Status::DataLoss("FrameReply.size is " + std::to_string(reply.size.width) + "x" + std::to_string(reply.size.height) +
-                            ", asked for was " + std::to_string(expected.width) + "x" + std::to_string(expected.height));
-  }
-  const Result<Bytes> runs = UnpackRuns(reply.runs, payload);
-  if (!runs.ok()) return runs.status();
-  const PixelBounds frame = {0, 0, expected.width, expected.height};
-  Result<LocalImage> image = ReadRuns(reply.runs.image, runs->span(), frame);
-  if (!image.ok()) return Status::DataLoss(image.status().message());
-  Picture picture;
-  picture.size = reply.size;
-  picture.geometry = reply.geometry;
-  picture.image = std::move(*image);
-  picture.final = reply.groups_done == reply.group_count;
-  picture.groups_done = reply.groups_done;
-  picture.group_count = reply.group_count;
-  picture.statistics = std::move(reply.statistics);
-  picture.direct = reply.direct;
-  return picture;
-}
 
 // A question or an order that has no answer yet.
 struct OpenQuestion {
@@ -127,6 +104,7 @@ struct Client::Impl {
   }
   void Handle(CoordinatorToClient& message, const Bytes& payload);
   void Handle(FrameReply& reply, const Bytes& payload);
+  void Handle(DirectPictures::Reply reply);
   void OpenDirectPictures();
   void MatchPictures();           // hands over the awaited ones that have come
   bool ExpirePictures(Time now);  // asks for those that are lost; true: there are some
@@ -258,7 +236,7 @@ void Client::Impl::OpenDirectPictures() {
 void Client::Impl::MatchPictures() {
   if (!direct) return;
   if (open.empty()) return direct->Clear();  // what has come is of requests that were cancelled
-  for (auto& [reply, payload] : direct->TakeCome()) Handle(reply, payload);
+  for (DirectPictures::Reply& reply : direct->TakeCome()) Handle(std::move(reply));
 }
 
 bool Client::Impl::ExpirePictures(Time now) {
@@ -276,15 +254,26 @@ bool Client::Impl::ExpirePictures(Time now) {
 void Client::Impl::Handle(FrameReply& reply, const Bytes& payload) {
   const auto found = open.find(reply.request);
   if (found == open.end()) return;  // cancelled, or a duplicate
-  if (reply.direct && payload.empty()) {
-    if (!direct) return End(reply.request, Status::DataLoss("the service sent a picture on a way that this client does not have"));
-    if (reply.groups_done == reply.group_count) found->second.awaits_picture = true;
-    constexpr std::uint64_t kSlowBytesPerMillisecond = 1000;  // over a slower link, pictures come twice
-    const Time until =
-        MonotonicNow() + timing.lost_picture + std::chrono::milliseconds(reply.runs.encoded_bytes / kSlowBytesPerMillisecond);
-    return direct->Await(std::move(reply), until);
+  std::vector<Bytes> runs;
+  std::uint64_t relayed_bytes = 0, direct_bytes = 0;
+  for (const PictureShare& share : reply.shares) {
+    const std::uint64_t bytes = share.runs.encoded_bytes;
+    runs.push_back(share.direct ? Bytes() : payload.Part(relayed_bytes, bytes));
+    (share.direct ? direct_bytes : relayed_bytes) += bytes;
   }
-  Result<Picture> picture = DecodePicture(reply, payload, found->second.message.frame.size);
+  if (direct_bytes == 0) return Handle(DirectPictures::Reply{std::move(reply), std::move(runs)});
+  if (!direct) return End(reply.request, Status::DataLoss("the service sent a picture on a way that this client does not have"));
+  if (reply.groups_done == reply.group_count) found->second.awaits_picture = true;
+  constexpr std::uint64_t kSlowBytesPerMillisecond = 1000;  // over a slower link, pictures come twice
+  const Time until = MonotonicNow() + timing.lost_picture + std::chrono::milliseconds(direct_bytes / kSlowBytesPerMillisecond);
+  direct->Await({std::move(reply), std::move(runs)}, until);
+}
+
+void Client::Impl::Handle(DirectPictures::Reply complete) {
+  FrameReply& reply = complete.message;
+  const auto found = open.find(reply.request);
+  if (found == open.end()) return;
+  Result<Picture> picture = DecodePicture(reply, complete.runs, found->second.message.frame.size);
   if (!picture.ok()) {
     End(reply.request, picture.status());
     return;

@@ -30,7 +30,7 @@ struct Picture {
   std::uint32_t groups_done = 1, group_count = 1;
   FrameStatistics statistics;  // final only
   Duration latency{};          // request to last byte, measured here; final only
-  bool direct = false;         // it came straight from a worker, not through the coordinator
+  bool direct = false;         // all of it came straight from workers, nothing through the coordinator
 };
 
 struct ClientEvent {

@@ -69,12 +69,12 @@ std::uint64_t DirectPictures::Receive() {
   return received;
 }
 
-std::vector<std::pair<FrameReply, Bytes>> DirectPictures::TakeCome() {
-  std::vector<std::pair<FrameReply, Bytes>> come;
+std::vector<DirectPictures::Reply> DirectPictures::TakeCome() {
+  std::vector<Reply> come;
   std::erase_if(awaited_, [&](Awaited& awaited) {
-    std::optional<Bytes> payload = Take(awaited.reply.runs.digest, awaited.reply.runs.encoded_bytes);
-    if (payload) come.emplace_back(std::move(awaited.reply), *std::move(payload));
-    return payload.has_value();
+    if (!Complete(awaited.reply)) return false;
+    come.push_back(std::move(awaited.reply));
+    return true;
   });
   return come;
 }
@@ -83,7 +83,7 @@ std::vector<FrameReply> DirectPictures::TakeLost(Time now) {
   std::vector<FrameReply> lost;
   std::erase_if(awaited_, [&](Awaited& awaited) {
     if (now < awaited.until) return false;
-    lost.push_back(std::move(awaited.reply));
+    lost.push_back(std::move(awaited.reply.message));
     return true;
   });
   return lost;
@@ -99,6 +99,20 @@ void DirectPictures::Clear() {
   arrived_.clear();
   arrived_bytes_ = 0;
   awaited_.clear();
+}
+
+bool DirectPictures::Complete(Reply& reply) {
+  bool complete = true;
+  for (std::size_t share = 0; share < reply.runs.size(); ++share) {
+    const PictureShare& wanted = reply.message.shares[share];
+    if (!wanted.direct || !reply.runs[share].empty()) continue;
+    if (std::optional<Bytes> runs = Take(wanted.runs.digest, wanted.runs.encoded_bytes)) {
+      reply.runs[share] = *std::move(runs);
+    } else {
+      complete = false;
+    }
+  }
+  return complete;
 }
 
 std::optional<Bytes> DirectPictures::Take(std::uint64_t digest, std::uint64_t bytes) {

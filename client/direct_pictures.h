@@ -1,5 +1,5 @@
-// DirectPictures: the client's end of the pictures plane (common/wire/picture_messages.h). Workers bring the runs of pictures here, and the
-// coordinator says with each FrameReply which of them are its own. For one thread.
+// DirectPictures: the client's end of the pictures plane (common/wire/picture_messages.h). Workers send the runs of a picture, or of
+// its shares, here. The coordinator sends a FrameReply that names the runs of its picture by their digests. For one thread.
 #pragma once
 
 #include <cstdint>
@@ -35,21 +35,27 @@ class DirectPictures {
   // Takes what has come; returns the bytes of it.
   std::uint64_t Receive();
 
-  // A reply without its runs. They are lost if they do not come until then.
-  void Await(FrameReply reply, Time until) { awaited_.push_back({std::move(reply), until}); }
-  // The awaited replies whose runs have come, with these, in the order in which they were awaited.
-  std::vector<std::pair<FrameReply, Bytes>> TakeCome();
+  struct Reply {
+    FrameReply message;
+    std::vector<Bytes> runs;  // of each share; empty: they are direct and have not come, or there are none
+  };
+  // A reply without some of its runs. They are lost if they do not come until then.
+  void Await(Reply reply, Time until) { awaited_.push_back({std::move(reply), until}); }
+  // The awaited replies of which all runs have come, in the order in which they were awaited.
+  std::vector<Reply> TakeCome();
   std::vector<FrameReply> TakeLost(Time now);
   Time NextLoss() const;  // Time::max(): nothing is awaited
   void Clear();           // nobody waits for anything any more
 
  private:
   struct Awaited {
-    FrameReply reply;
+    Reply reply;
     Time until;
   };
   static constexpr std::uint64_t kMostUnclaimedBytes = std::uint64_t{128} << 20;  // the oldest ones beyond are dropped
 
+  // Fills in the direct runs that have come. False: some are missing.
+  bool Complete(Reply& reply);
   // The runs with this digest, if they have come.
   std::optional<Bytes> Take(std::uint64_t digest, std::uint64_t bytes);
 

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "common/base/log.h"
+#include "common/base/url.h"
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
@@ -101,8 +102,7 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
 Status AddNamed(FoundData& found, const DataArgument& argument) {
   const Result<SourceText> source = ParseSourceText(argument.path);
   if (!source.ok()) return source.status();
-  std::error_code error;
-  if (!fs::exists(source->path, error)) return Status::NotFound("does not exist");
+  if (!MayBeThere(*source)) return Status::NotFound("does not exist");
   const auto add = [&](const std::string& name, const std::string& path) {
     return found.datasets.emplace(name, DataSource(path, "", argument.layers)).second ? Status::Ok() : Repeated(name);
   };
@@ -235,7 +235,7 @@ Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layer
 
 // Other processes may run in other folders.
 std::string PlaceOf(const DataSource& data, const SourceText& text) {
-  return fs::absolute(text.path).string() + data.path.substr(text.path.size());
+  return (IsUrl(text.path) ? text.path : fs::absolute(text.path).string()) + data.path.substr(text.path.size());
 }
 
 // Of a source that its format can read in parts.
@@ -280,7 +280,7 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   if (!data.layers.any()) {
     const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
     const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };
-    if (FindSourceFormat(text->path, text->options) != nullptr) {
+    if (IsReadInParts(text->path, text->options)) {
       const Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
       if (!source.ok()) return source.status();
       return WayOf(*source, data, *text, (*source)->info().levels.size() > 1 || is_large((*source)->info()));
@@ -307,7 +307,7 @@ Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, con
 
 const std::string* DataArgument::RelativePath() const {
   for (const std::string* file : {&path, &layers.labels, &layers.label_colors, &layers.overlay}) {
-    if (!file->empty() && !file->starts_with('/')) return file;
+    if (!file->empty() && !file->starts_with('/') && !IsUrl(*file)) return file;
   }
   return nullptr;
 }
@@ -392,7 +392,7 @@ void CheckFiles(FoundData& found) {
 Result<IndexFile> IndexFileOf(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
-  if (FindSourceFormat(parsed->path, parsed->options) == nullptr) {
+  if (!IsReadInParts(parsed->path, parsed->options)) {
     return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
   }
   return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));

@@ -136,6 +136,9 @@ void FrameMachine::State::PlanAhead() {
 }
 
 PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
+  // Shares shorten a frame that is waited for. Where frames follow one another, their messages cost more than they save.
+  const bool alone = queue.size() + frames.size() == 1;
+  const bool in_shares = alone && request.pictures && !request.submit.frame.previews;
   Team team = TeamOf(roster.slots(), std::uint32_t(request.submit.frame.policy.teams), last_plan);
   PlanRequest ask{.plan = last_plan,
                   .client = request.client,
@@ -143,6 +146,7 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
                   .occupied = std::move(occupied),
                   .roster = std::move(team.roster),
                   .turn = team.turn,
+                  .share_pixels = in_shares ? config.share_pixels : 0,
                   .limits = WorkerLimits()};
   if (const OpenRequest::HasDataset& dataset = *request.dataset(); dataset.levels != nullptr) {
     ask.frame = std::make_shared<const FrameRequest>(request.submit.frame);

@@ -187,7 +187,8 @@ void FrameMachine::State::SendAnswer(PeerToken client, Answer& answer) {
 void FrameMachine::State::EndRequest(PeerToken client, RequestId request, CoordinatorToClient message, Bytes payload) {
   SendClient(client, message, payload);
   // What went straight to the client cannot be sent again: if it asks again, the frame is made anew.
-  if (const auto* reply = std::get_if<FrameReply>(&message); reply != nullptr && reply->direct) return;
+  const auto* const reply = std::get_if<FrameReply>(&message);
+  if (reply != nullptr && std::ranges::any_of(reply->shares, &PictureShare::direct)) return;
   clients.Keep(client, {.request = request, .message = std::move(message), .payload = std::move(payload), .sent = now});
 }
 

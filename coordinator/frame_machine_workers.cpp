@@ -50,30 +50,32 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   if (!IsFrom(event, message.epoch, message.worker)) return;
   roster.Touch(message.worker, now);
   RunningFrame* frame = frames.Find(message.frame);
-  if (frame == nullptr || (message.direct && !frame->request().pictures)) return;
+  if (frame == nullptr || (message.picture.direct && !frame->request().pictures)) return;
   const std::uint32_t groups_before = frame->groups_done();
-  const RunningFrame::Use use = frame->OnImage(message, now);
+  const RunningFrame::Use use = frame->OnImage(message, event.payload, now);
   if (frame->groups_done() > groups_before) AfterGroupDone(*frame);
   if (use == RunningFrame::Use::kNothing) return;
 
   const OpenRequest& request = frame->request();
+  auto [shares, payload] = frame->TakePicture();
   FrameReply reply{.request = request.submit.request,
                    .size = request.submit.frame.size,
                    .groups_done = message.groups_done,
                    .group_count = message.group_count,
-                   .runs = message.runs,
+                   .shares = std::move(shares),
                    .statistics = {},
-                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry),
-                   .direct = message.direct};
-  if (message.direct) clients.Sent(request.client, message.runs.encoded_bytes);
+                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry)};
+  for (const PictureShare& share : reply.shares) {
+    if (share.direct) clients.Sent(request.client, share.runs.encoded_bytes);
+  }
   if (use == RunningFrame::Use::kPreview) {
     if (clients.IsBehind(request.client)) return;
-    SendClient(request.client, std::move(reply), event.payload);
+    SendClient(request.client, std::move(reply), std::move(payload));
     return;
   }
   reply.statistics = frame->Statistics(now);
   if (frame->planned()->teaches()) actions.emplace_back(FrameMeasured{frame->planned(), reply.statistics.reports});
-  EndRequest(request.client, request.submit.request, std::move(reply), event.payload);
+  EndRequest(request.client, request.submit.request, std::move(reply), std::move(payload));
   ++frames_done;
   EndFrame(message.frame, "done");
 }

@@ -5,6 +5,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/planning/balance.h"
 #include "common/planning/clipped_cells.h"
 #include "coordinator/learning_table.h"
 
@@ -23,7 +24,38 @@ std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankRepo
   return seconds;
 }
 
+// What the first frame of a layout tells of it.
+MoveSeconds MoveSecondsOf(const Layout& layout, std::int64_t bytes_per_voxel, std::span<const RankReport> reports) {
+  double fetch_seconds = 0, moved = 0;
+  MoveSeconds move;
+  for (const RankReport& report : reports) {
+    const auto seconds = [&report](Stage stage) { return 1e-9 * double(report.stage_ns[std::size_t(stage)]); };
+    if (report.box >= layout.owners.size()) continue;
+    if (report.voxel_bytes > 0) {
+      fetch_seconds = std::max(fetch_seconds, seconds(Stage::kFetch));
+      moved += double(report.voxel_bytes) / double(bytes_per_voxel);
+    }
+    // A worker may have had a box before, and then takes only a moment. A new one takes longest.
+    const double prepare = seconds(Stage::kPrepare) / double(layout.partition.boxes()[report.box].voxel_count());
+    if (prepare > 0) move.prepare = std::max(move.prepare.value_or(0), prepare);
+  }
+  if (moved > 0) move.fetch = fetch_seconds / moved;
+  return move;
+}
+
+void Follow(std::optional<double>& known, const std::optional<double>& seen) {
+  constexpr double kWeight = 0.5;  // of the newest: changes are few
+  if (seen) known = known ? *known + kWeight * (*seen - *known) : *seen;
+}
+
 }  // namespace
+
+LayoutTable::Entry* LayoutTable::FindEntry(const Key& key) {
+  const auto found = std::ranges::find(entries_, key, &Entry::key);
+  if (found == entries_.end()) return nullptr;
+  entries_.splice(entries_.begin(), entries_, found);
+  return &*found;
+}
 
 LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
   const auto found = std::ranges::find(learnt_, volume, &Learnt::volume);
@@ -47,8 +79,6 @@ LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
 }
 
 std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
-  const ResolvedPolicy& policy = *request.policy;
-  const BalanceEntry& balance = *policy.balance;
   const Key key = KeyOf(request, request.occupied != nullptr);
   std::unique_lock lock(mutex_);
   if (request.occupied != nullptr && FindLearnt(key.volume) == nullptr) {
@@ -62,62 +92,35 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
-  const Learnt* const learnt = request.occupied == nullptr ? nullptr : FindLearnt(key.volume);
-  const bool known = learnt != nullptr && learnt->cost.any();
-
   if (key.by_bricks) {  // a layout by counted voxels is better, and its voxels are where it wants them
     Key counted = key;
     counted.by_bricks = false;
-    if (const auto better = std::ranges::find(entries_, counted, &Entry::key); better != entries_.end()) return better->layout;
+    if (const Entry* better = FindEntry(counted)) return better->layout;
   }
-  std::shared_ptr<const Layout> present;  // null: none is made
-  std::vector<double> seconds;            // of its boxes
-  int frames_seen = 0;
-  if (const auto found = std::ranges::find(entries_, key, &Entry::key); found != entries_.end()) {
-    entries_.splice(entries_.begin(), entries_, found);
-    const bool rebalance = known && balance.change != nullptr && found->frames_seen > 0;
-    const bool remake = known && balance.change == nullptr && !found->by_cost && policy.balance_by == BalanceBy::kCost;
-    if (!rebalance && !remake) return found->layout;
-    present = found->layout;
-    seconds = found->seconds;
-    frames_seen = found->frames_seen;
-  }
+  if (const Entry* found = FindEntry(key)) return found->layout;
   lock.unlock();
 
-  std::optional<WorkField> cost;
-  if (known) {
-    if (const std::optional<MeasuredCost> copy = CopyLearnt(key.volume)) cost.emplace(copy->Field());
-  }
-  if (present != nullptr && !cost) return present;  // what was known was dropped meanwhile
-  const LayoutRequest make{.summary = request.summary,
-                           .volume = request.volume,
-                           .policy = &policy,
-                           .slots = request.slots,
-                           .box_bytes_target = request.box_bytes_target,
-                           .map = request.map.get(),
-                           .coarser = request.coarser,
-                           .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
-                           .stop = request.stop};
-  const bool rebalance = present != nullptr && balance.change != nullptr;
-  std::optional<Layout> made = rebalance ? balance.change({present.get(), seconds, &make, frames_seen}) : MakeLayout(make);
+  const std::optional<WorkField> cost = request.occupied != nullptr ? KnownCost(key.volume) : std::nullopt;
+  auto made = std::make_shared<const Layout>(MakeLayout(MakingOf(request, cost)));
   if (request.stop.stop_requested()) return nullptr;
 
   lock.lock();
-  const auto found = std::ranges::find(entries_, key, &Entry::key);
-  if (found == entries_.end()) {
-    entries_.push_front({key, made ? std::make_shared<const Layout>(*std::move(made)) : present, cost.has_value(), 0, {}});
-    KeepFirst(entries_, kMaxKept);
-    return entries_.front().layout;
-  }
-  Entry& entry = *found;
-  if (entry.layout != present) return entry.layout;  // another thread was quicker
-  entry.by_cost = entry.by_cost || cost.has_value();
-  if (made && *made != *present) {
-    entry.layout = std::make_shared<const Layout>(*std::move(made));
-    entry.frames_seen = 0;
-    entry.seconds.clear();
-  }
-  return entry.layout;
+  if (const Entry* found = FindEntry(key)) return found->layout;  // another thread was quicker
+  entries_.push_front({.key = key, .layout = std::move(made), .by_cost = cost.has_value()});
+  KeepFirst(entries_, kMaxKept);
+  return entries_.front().layout;
+}
+
+LayoutRequest LayoutTable::MakingOf(const Request& request, const std::optional<WorkField>& cost) {
+  return {.summary = request.summary,
+          .volume = request.volume,
+          .policy = request.policy,
+          .slots = request.slots,
+          .box_bytes_target = request.box_bytes_target,
+          .map = request.map.get(),
+          .coarser = request.coarser,
+          .known = {.occupied = request.occupied.get(), .cost = cost ? &*cost : nullptr},
+          .stop = request.stop};
 }
 
 bool LayoutTable::HasMade(const Request& request) {
@@ -130,14 +133,10 @@ bool LayoutTable::HasMade(const Request& request) {
 }
 
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
-  const ResolvedPolicy& policy = *request.policy;
   const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock || policy.balance->change != nullptr) return nullptr;
-  const auto found = std::ranges::find(entries_, KeyOf(request, true), &Entry::key);
-  if (found == entries_.end()) return nullptr;
-  if (policy.balance_by == BalanceBy::kCost && !found->by_cost) return nullptr;
-  entries_.splice(entries_.begin(), entries_, found);
-  return entries_.front().layout;
+  if (!lock) return nullptr;
+  const Entry* const found = FindEntry(KeyOf(request, true));
+  return found == nullptr ? nullptr : found->layout;
 }
 
 bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
@@ -151,33 +150,89 @@ std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) 
   return learnt ? std::optional(learnt->Field()) : std::nullopt;
 }
 
-void LayoutTable::Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy,
-                        std::span<const RankReport> reports) {
+void LayoutTable::Learn(const Request& request, const FramePlan& plan, std::span<const RankReport> reports) {
+  const Key key = KeyOf(request, true);
+  if (LearnCosts(request, key, plan, reports) && request.occupied != nullptr) ChangeLayout(request, key);
+}
+
+bool LayoutTable::LearnCosts(const Request& request, const Key& key, const FramePlan& plan, std::span<const RankReport> reports) {
   const std::map<BoxId, double> seconds = SecondsOf(*plan.layout, reports);
-  if (seconds.empty()) return;
-  Key key = KeyOf({.policy = &policy, .volume = &volume, .slots = plan.slots}, true);
+  if (seconds.empty()) return false;
   const std::lock_guard lock(mutex_);
-  Learnt* const learnt = FindLearnt(volume);
-  if (learnt == nullptr) return;
-  const auto is_of = [&](const Entry& e) {
-    key.box_bytes_target = e.key.box_bytes_target;  // the layout tells
-    return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout);
-  };
-  const auto entry = std::ranges::find_if(entries_, is_of);
+  Learnt* const learnt = FindLearnt(key.volume);
+  if (learnt == nullptr) return false;
+  const auto entry = std::ranges::find_if(
+      entries_, [&](const Entry& e) { return e.key == key && (e.layout == plan.layout || *e.layout == *plan.layout); });
+  const bool present = entry != entries_.end();
   // The first frame of a layout counts most; a frame of a layout that has been changed since counts as an average one.
   double weight = kLeastWeight;
-  if (entry != entries_.end()) {
+  if (present) {
     weight = std::max(weight, 1.0 / ++entry->frames_seen);
     entry->seconds.resize(plan.layout->owners.size());
   }
   std::vector<BoxSeconds> boxes;
+  std::vector<double> deviations;
   for (const auto& [box, time] : seconds) {
     boxes.push_back({plan.layout->partition.boxes()[box], time});
-    if (entry == entries_.end()) continue;
+    if (!present) continue;
     double& known = entry->seconds[box];
+    if (known > 0) deviations.push_back(time / known - 1);
     known = known == 0 ? time : known + weight * (time - known);
   }
+  static_assert(kMostFramesAveraged == int((2 - kLeastWeight) / kLeastWeight + 0.5), "the mean's variance over that of a frame");
+  if (!deviations.empty()) learnt->noise.Learn(deviations, std::clamp(entry->frames_seen - 1, 1, kMostFramesAveraged));
   learnt->cost.Learn(boxes, weight);
+  if (!present) return false;
+  if (entry->frames_seen == 1) {
+    const MoveSeconds seen = MoveSecondsOf(*plan.layout, std::int64_t(request.summary->types().bytes_per_voxel()), reports);
+    Follow(learnt->move.fetch, seen.fetch);
+    Follow(learnt->move.prepare, seen.prepare);
+  }
+  std::vector<double> of_frame(plan.layout->owners.size());
+  for (const auto& [box, time] : seconds) of_frame[box] = time;
+  entry->lost += LostSeconds(*plan.layout, request.slots, of_frame);
+  return true;
+}
+
+void LayoutTable::ChangeLayout(const Request& request, const Key& key) {
+  const ResolvedPolicy& policy = *request.policy;
+  std::shared_ptr<const Layout> present;
+  std::vector<double> seconds;
+  BalanceRequest balanced;
+  {
+    const std::lock_guard lock(mutex_);
+    const Learnt* const learnt = FindLearnt(key.volume);
+    Entry* const entry = FindEntry(key);
+    if (learnt == nullptr || entry == nullptr || entry->frames_seen == 0) return;
+    const bool make_by_cost = policy.balance_by == BalanceBy::kCost && !entry->by_cost;
+    if (policy.balance->change == nullptr && !make_by_cost) return;
+    // To weigh a change takes milliseconds. It is done each time that the seconds lost since the layout was made have grown by half.
+    constexpr double kLookAgain = 1.5;
+    if (policy.balance->weighs && entry->lost <= kLookAgain * entry->lost_at_look) return;
+    entry->lost_at_look = entry->lost;
+    present = entry->layout;
+    seconds = entry->seconds;
+    balanced.frames_seen = entry->frames_seen;
+    balanced.noise = learnt->noise.deviation();
+    balanced.move = learnt->move;
+  }
+  const std::optional<WorkField> cost = KnownCost(key.volume);
+  if (!cost) return;  // what was known was dropped meanwhile
+  const LayoutRequest make = MakingOf(request, cost);
+  balanced.now = present.get();
+  balanced.seconds = seconds;
+  balanced.make = &make;
+  std::optional<Layout> made = policy.balance->change != nullptr ? policy.balance->change(balanced) : MakeLayout(make);
+
+  const std::lock_guard lock(mutex_);
+  Entry* const entry = FindEntry(key);
+  if (entry == nullptr || entry->layout != present) return;  // another thread was quicker
+  entry->by_cost = true;
+  if (!made || *made == *present) return;
+  entry->layout = std::make_shared<const Layout>(*std::move(made));
+  entry->frames_seen = 0;
+  entry->seconds.clear();
+  entry->lost = entry->lost_at_look = 0;
 }
 
 }  // namespace slabstream

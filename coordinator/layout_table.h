@@ -3,7 +3,7 @@
 // A layout is made once for a volume, transfer function, renderer, policy and number of slots, and stays for all views. Two things
 // change it. If boxes are split by cost, it is made anew once, when costs are first known. And it changes between frames when the policy's
 // balance says so (common/planning/balances.h). Another number of slots (a worker has joined, a vacancy was given up) has another layout;
-// learnt costs hold for all of them.
+// learnt costs hold for all of them. Changes are made when a frame has taught them; frames that begin meanwhile take what is there.
 //
 // The last few layouts and costs are kept. The least recently used go first.
 //
@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "common/planning/classified_volume.h"
+#include "common/planning/frame_noise.h"
 #include "common/planning/frame_plan.h"
 #include "common/planning/layout.h"
 #include "common/planning/measured_cost.h"
@@ -49,17 +50,16 @@ class LayoutTable {
   std::shared_ptr<const Layout> Find(const Request& request);
   // Whether FindMade may find one, for some box_bytes_target.
   bool HasMade(const Request& request);
-  // That layout if it is made and cannot change now; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone. Does not
-  // wait
-  // for other threads.
+  // That layout if it is made; null: ask Find. Needs policy, volume, slots, box_bytes_target and map alone, and does not wait for other
+  // threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
   // Measured costs: seconds.
   bool KnowsCost(const ClassifiedVolume& volume);
   std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);
 
-  // Learns from a finished frame, unless it was planned without occupied voxels.
-  void Learn(const ClassifiedVolume& volume, const FramePlan& plan, const ResolvedPolicy& policy, std::span<const RankReport> reports);
+  // Learns from a finished frame of this request, unless it was planned without occupied voxels; then the layout changes if it should.
+  void Learn(const Request& request, const FramePlan& plan, std::span<const RankReport> reports);
 
  private:
   struct Key {
@@ -79,13 +79,24 @@ class LayoutTable {
     bool by_cost = false;         // made when costs were known
     int frames_seen = 0;          // of this layout
     std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
+    double lost = 0;              // LostSeconds of these frames
+    double lost_at_look = 0;      // `lost` when a change was weighed last
   };
   struct Learnt {
     ClassifiedVolume volume;
     MeasuredCost cost;
+    FrameNoise noise = {};
+    MoveSeconds move = {};
   };
+  Entry* FindEntry(const Key& key);  // under the lock, like FindLearnt; null: there is none
   Learnt* FindLearnt(const ClassifiedVolume& volume);
   std::optional<MeasuredCost> CopyLearnt(const ClassifiedVolume& volume);  // nothing: no cost is known
+  // Returns whether the frame was of the present layout.
+  bool LearnCosts(const Request& request, const Key& key, const FramePlan& plan, std::span<const RankReport> reports);
+  // Weighs whether the layout should change, and changes it. For requests with occupied voxels.
+  void ChangeLayout(const Request& request, const Key& key);
+  // The result points at both.
+  static LayoutRequest MakingOf(const Request& request, const std::optional<WorkField>& cost);
 
   std::mutex mutex_;          // guards what follows
   std::list<Entry> entries_;  // most recently used first

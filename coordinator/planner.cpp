@@ -113,15 +113,9 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   } else {
     planned.policy = *resolved.policy;
   }
-  std::shared_ptr<const Layout> layout = layouts_.Find({.policy = &planned.policy,
-                                                        .volume = &resolved.volume,
-                                                        .summary = resolved.summary.get(),
-                                                        .occupied = planned.asked.occupied,
-                                                        .slots = std::uint32_t(slots),
-                                                        .box_bytes_target = BoxTarget(*setup, request.workers),
-                                                        .map = resolved.map,
-                                                        .coarser = resolved.coarser,
-                                                        .stop = request.stop});
+  LayoutTable::Request wanted = WantedLayout(planned.asked, planned.policy, *setup);
+  wanted.stop = request.stop;
+  std::shared_ptr<const Layout> layout = layouts_.Find(wanted);
   if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
   Result<PlannedFrame> with_layout = WithLayout(std::move(planned), *std::move(setup), std::move(layout));
   if (!with_layout.ok()) return with_layout.status();
@@ -129,9 +123,21 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   return std::make_shared<const PlannedFrame>(*std::move(with_layout));
 }
 
+LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const ResolvedPolicy& policy, const FrameSetup& setup) {
+  const ResolvedRequest& resolved = *request.resolved;
+  return {.policy = &policy,
+          .volume = &resolved.volume,
+          .summary = resolved.summary.get(),
+          .occupied = request.occupied,
+          .slots = std::uint32_t(request.roster.slots.size()),
+          .box_bytes_target = BoxTarget(setup, request.workers),
+          .map = resolved.map,
+          .coarser = resolved.coarser};
+}
+
 Result<PlannedFrame> Planner::WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout) {
   const PlanRequest& asked = planned.asked;
-  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn);
+  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn, asked.share_pixels);
   if (!plan.ok()) return plan.status();
   planned.plan = *std::move(plan);
   planned.fit = FramesThatFit(planned.plan, *asked.resolved->summary, asked.limits);
@@ -140,7 +146,7 @@ Result<PlannedFrame> Planner::WithLayout(PlannedFrame planned, FrameSetup setup,
 
 void Planner::Learn(const FrameMeasured& measured) {
   const PlannedFrame& frame = *measured.frame;
-  layouts_.Learn(frame.asked.resolved->volume, frame.plan, frame.policy, measured.reports);
+  layouts_.Learn(WantedLayout(frame.asked, frame.policy, frame.plan.setup), frame.plan, measured.reports);
   policies_.Learn(frame, measured.reports);
 }
 

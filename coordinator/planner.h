@@ -24,19 +24,20 @@ class Planner {
   // Errors as of MakeFrameSetup and PlanFrame; Cancelled: it was stopped; ResourceExhausted or Internal for exceptions.
   Result<std::shared_ptr<const PlannedFrame>> Plan(const PlanRequest& request);
 
-  // The same if that takes less time than to wake another thread: the policy is not open, and its layout is made and stays. Nothing: ask
-  // Plan.
+  // The same if that takes less time than to wake another thread: the policy is not open, and its layout is made. Nothing: ask Plan.
   std::optional<Result<std::shared_ptr<const PlannedFrame>>> PlanAtHand(const PlanRequest& request);
 
   // Whether open policies of this client's frames are to be chosen; makes one such choice, unless it is told to stop.
   bool WantsChoice(PeerToken client) { return policies_.WantsChoice(client); }
   void Choose(PeerToken client, const std::stop_token& stop) { policies_.Choose(client, layouts_, stop); }
 
-  // Learns from a finished frame.
+  // Learns from a finished frame. May take as long as a plan.
   void Learn(const FrameMeasured& measured);
 
  private:
   Result<std::shared_ptr<const PlannedFrame>> TryPlan(const PlanRequest& request);
+  // The result points at the request and the policy.
+  static LayoutTable::Request WantedLayout(const PlanRequest& request, const ResolvedPolicy& policy, const FrameSetup& setup);
   // Plan and fit.
   static Result<PlannedFrame> WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout);
 

@@ -38,7 +38,8 @@ RunningFrame::RunningFrame(FrameId id, OpenRequest request, const FrameLimits& l
       attempt_begin_(now),
       displays_{plan_.display},
       last_progress_(now),
-      reports_(plan_.groups.size()) {
+      reports_(plan_.groups.size()),
+      shares_(share_count()) {
   CHECK(!plan_.groups.empty()) << "frame " << id_;
 }
 
@@ -48,7 +49,7 @@ std::uint32_t RunningFrame::unfinished_groups() const {
 
 bool RunningFrame::waiting() const { return !between_attempts() && (next_group_ > groups_done_ || groups_done_ == group_count()); }
 
-bool RunningFrame::HasPart(WorkerId worker) const { return worker == plan_.display || RendersFrom(groups_done_, worker); }
+bool RunningFrame::HasPart(WorkerId worker) const { return IsDisplay(worker) || RendersFrom(groups_done_, worker); }
 
 bool RunningFrame::RendersFrom(std::uint32_t group, WorkerId worker) const {
   return std::any_of(plan_.groups.begin() + group, plan_.groups.end(), [worker](const GroupPlan& of_frame) {
@@ -110,6 +111,7 @@ RunningFrame::HandOut RunningFrame::NextGroup(Time now) {
                              .group_count = group_count(),
                              .first_group = first_group_,
                              .previews = request_.submit.frame.previews,
+                             .straight8 = request_.submit.frame.straight8,
                              .display = plan_.display,
                              .setup = plan_.setup,
                              .group = plan_.groups[number],
@@ -128,11 +130,18 @@ Status RunningFrame::BeginAttempt(const Roster& roster, const std::set<WorkerId>
     if (!CanRender(worker)) worker = 0;
   }
   // A display worker that is leaving stays one only for what it has accumulated.
-  if (groups_done_ == 0 || display_in_doubt()) able.leaving.clear();
+  if (groups_done_ == 0 || display_in_doubt() || share_count() > 1) able.leaving.clear();
   Result<FramePlan> plan = Replan(plan_, able, {suspects_.boxes(), WorkerForTrial(able, busy)});
   if (!plan.ok()) return unable_.empty() ? plan.status() : inability_;
-  const bool keeps_accumulated = plan->display == plan_.display && !display_in_doubt();
+  const bool was_divided = share_count() > 1;
+  const WorkerId display_before = plan_.display;
   plan_ = std::move(plan).value();
+  shares_.assign(share_count(), {});
+  if (was_divided) {  // each share has added its own
+    reports_.front().clear();
+    display_reports_.clear();
+  }
+  const bool keeps_accumulated = plan_.display == display_before && !display_in_doubt() && !was_divided && share_count() == 1;
   roster_ = std::move(able);
   displays_.push_back(plan_.display);
   if (!keeps_accumulated) {
@@ -150,7 +159,7 @@ Status RunningFrame::BeginAttempt(const Roster& roster, const std::set<WorkerId>
 }
 
 bool RunningFrame::Accept(std::uint32_t of_attempt, WorkerId sender) const {
-  return sender == plan_.display && of_attempt >= accumulating_since_ && of_attempt <= attempt();
+  return IsDisplay(sender) && of_attempt >= accumulating_since_ && of_attempt <= attempt();
 }
 
 bool RunningFrame::Finish(std::uint32_t groups, Time now) {
@@ -168,6 +177,12 @@ bool RunningFrame::Finish(std::uint32_t groups, Time now) {
 
 bool RunningFrame::OnGroupDone(const GroupDone& message, Time now) {
   if (!Accept(message.key.attempt, message.worker) || message.key.group >= group_count()) return false;
+  if (share_count() > 1) {  // each tells of some ranks
+    Share& share = shares_[*ShareOf(LastGroup(), plan_.display, message.worker)];
+    if (std::exchange(share.group_done, true)) return false;
+    reports_.front().insert(reports_.front().end(), message.reports.begin(), message.reports.end());
+    return std::ranges::all_of(shares_, &Share::group_done) && Finish(1, now);
+  }
   if (!message.reports.empty()) reports_[message.key.group] = message.reports;
   KeepHidden(message);
   return Finish(message.key.group + 1, now);
@@ -181,18 +196,46 @@ void RunningFrame::KeepHidden(const GroupDone& message) {
   hidden_by_ = groups;
 }
 
-RunningFrame::Use RunningFrame::OnImage(const FrameImage& message, Time now) {
+RunningFrame::Use RunningFrame::OnShare(const FrameImage& message, const Bytes& payload, Time now) {
+  const bool expected = message.attempt == attempt() && message.share_count == share_count() && message.groups_done == group_count() &&
+                        message.share == ShareOf(LastGroup(), plan_.display, message.worker);
+  if (!expected || between_attempts() || shares_[message.share].picture) return Use::kNothing;
+  shares_[message.share].picture = message.picture;
+  shares_[message.share].payload = payload;
+  display_reports_.insert(display_reports_.end(), message.reports.begin(), message.reports.end());
+  last_progress_ = now;
+  if (!std::ranges::all_of(shares_, [](const Share& share) { return share.picture.has_value(); })) return Use::kNothing;
+  groups_done_ = group_count();
+  return Use::kFinal;
+}
+
+std::pair<std::vector<PictureShare>, Bytes> RunningFrame::TakePicture() {
+  std::vector<PictureShare> shares;
+  std::vector<Bytes> payloads;
+  for (Share& share : shares_) {
+    shares.push_back(*std::exchange(share.picture, std::nullopt));
+    if (!share.payload.empty()) payloads.push_back(std::exchange(share.payload, {}));
+  }
+  return {std::move(shares), Concatenated(payloads)};
+}
+
+RunningFrame::Use RunningFrame::OnImage(const FrameImage& message, const Bytes& payload, Time now) {
+  if (share_count() > 1) return OnShare(message, payload, now);
   if (message.attempt == 0 || message.attempt > attempt() || message.worker != displays_[message.attempt - 1]) return Use::kNothing;
-  if (message.group_count != group_count() || message.groups_done > group_count()) return Use::kNothing;
+  if (message.group_count != group_count() || message.groups_done > group_count() || message.share_count != 1) return Use::kNothing;
+  const auto use = [&](Use what) {
+    shares_.front() = {.picture = message.picture, .payload = payload};
+    return what;
+  };
   if (message.groups_done == group_count()) {
     groups_done_ = group_count();
     display_reports_ = message.reports;
-    return Use::kFinal;
+    return use(Use::kFinal);
   }
   if (Accept(message.attempt, message.worker)) Finish(message.groups_done, now);
   if (!request_.submit.frame.previews || message.groups_done <= groups_shown_) return Use::kNothing;
   groups_shown_ = message.groups_done;
-  return Use::kPreview;
+  return use(Use::kPreview);
 }
 
 void RunningFrame::OnHeartbeat(WorkerId worker, bool progressed, Time now) {
@@ -212,14 +255,14 @@ Status RunningFrame::OnLoss(WorkerId worker, std::optional<Time> last_word, Time
   // A worker that was not heard since the attempt began may have died before, together with those whose boxes it got.
   const bool died_of_it = last_word && *last_word > attempt_begin_;
   const Status status = died_of_it ? NoteDeath(worker) : Status::Ok();
-  state_ = BetweenAttempts{now, worker == plan_.display || display_in_doubt()};
+  state_ = BetweenAttempts{now, IsDisplay(worker) || display_in_doubt()};
   return status;
 }
 
 // In one attempt each box is in the hands of one worker, so deaths at the same time are never the same way.
 Status RunningFrame::NoteDeath(WorkerId worker) {
   std::vector<Suspects::Part> held;
-  if (worker == plan_.display && groups_done_ == group_count()) held.emplace_back();
+  if (IsDisplay(worker) && groups_done_ == group_count()) held.emplace_back();
   for (std::uint32_t group = groups_done_; group < next_group_; ++group) {
     for (const Placement& placement : plan_.groups[group].placements) {
       if (placement.worker == worker) held.emplace_back(placement.id);
@@ -246,7 +289,7 @@ void RunningFrame::OnReconnection(WorkerId worker, Time now) {
 }
 
 Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
-  const bool no_picture = message.worker == plan_.display && groups_done_ == group_count();
+  const bool no_picture = IsDisplay(message.worker) && groups_done_ == group_count();
   if (message.key.attempt != attempt() || (message.key.group < groups_done_ && !no_picture)) return Status::Ok();
   const Status reason(message.status.code(), WorkerName(message.worker) + ": " + message.status.message());
   if (message.elsewhere) {
@@ -264,7 +307,7 @@ Status RunningFrame::OnTrouble(const WorkerTrouble& message, Time now) {
     return Status::Ok();
   }
   const Duration pause = message.elsewhere ? Duration::zero() : limits_.pause * stalls_;
-  return CountStall(reason, {now + pause, message.worker == plan_.display});
+  return CountStall(reason, {now + pause, IsDisplay(message.worker)});
 }
 
 Status RunningFrame::Expire(Time now) {

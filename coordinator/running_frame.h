@@ -20,6 +20,9 @@
 // display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so messages of older attempts count if their
 // sender proves them.
 //
+// A picture in shares (FramePlan::share_pixels) has a display worker for each share. It has one group, which is done when all of them have
+// said so, and is finished when all shares are there. Those of one attempt count: the next one divides the picture among other workers.
+//
 // What is hidden (common/planning/frame_occlusion.h): each GroupDone of the present display worker may bring the mask of what it has
 // accumulated; the mask of most groups is kept. The assignment of group g, in any attempt, carries it only if it was made from groups in
 // front of g. When an attempt begins again with group 0, the mask is dropped. A mask that is missing or late costs work and no more.
@@ -29,9 +32,11 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 #include <variant>
 #include <vector>
 
+#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
@@ -66,7 +71,7 @@ class RunningFrame {
   std::uint32_t group_count() const { return std::uint32_t(plan_.groups.size()); }
   std::uint32_t groups_done() const { return groups_done_; }
   std::uint32_t unfinished_groups() const;  // handed out and not done; 0 while a new attempt is due
-  bool HasPart(WorkerId worker) const;      // in groups that are not done yet
+  bool HasPart(WorkerId worker) const;      // in groups that are not done yet, or in the picture
   std::vector<WorkerId> Renderers(std::uint32_t group) const;
   // Those of them that rendered a box of the group, as far as is known: hidden boxes are left out, before older work is done.
   std::vector<WorkerId> HaveRendered(std::uint32_t group) const;
@@ -97,7 +102,10 @@ class RunningFrame {
   // ---- what workers say
   bool OnGroupDone(const GroupDone& message, Time now);  // true: groups_done() rose
   enum class Use { kNothing, kPreview, kFinal };
-  Use OnImage(const FrameImage& message, Time now);  // what the picture is used for; a preview reports groups done, too
+  // What the picture is used for; a preview reports groups done, too. `payload` comes with the message.
+  Use OnImage(const FrameImage& message, const Bytes& payload, Time now);
+  // The picture that OnImage has found a use for, once: its shares, and what has come with them.
+  std::pair<std::vector<PictureShare>, Bytes> TakePicture();
   void OnHeartbeat(WorkerId worker, bool progressed, Time now);
   // These workers have rendered a group of a younger frame of the same client. They render a client's frames in order, so what they do now
   // is no progress of this frame.
@@ -136,7 +144,11 @@ class RunningFrame {
   UnderWay* under_way() { return std::get_if<UnderWay>(&state_); }  // null: between attempts
   const UnderWay* under_way() const { return std::get_if<UnderWay>(&state_); }
   bool display_in_doubt() const { return between_attempts() && std::get<BetweenAttempts>(state_).display_in_doubt; }
+  const GroupPlan& LastGroup() const { return plan_.groups.back(); }
+  std::size_t share_count() const { return LastGroup().schedule.roots.size(); }
+  bool IsDisplay(WorkerId worker) const { return ShareOf(LastGroup(), plan_.display, worker).has_value(); }
   bool Accept(std::uint32_t attempt, WorkerId sender) const;
+  Use OnShare(const FrameImage& message, const Bytes& payload, Time now);
   bool Finish(std::uint32_t groups, Time now);
   void KeepHidden(const GroupDone& message);
   bool CanRender(WorkerId worker) const { return worker != 0 && !unable_.contains(worker); }
@@ -175,6 +187,12 @@ class RunningFrame {
   std::set<WorkerId> moved_on_;                   // workers that have rendered all that is handed out of this frame
   std::vector<std::vector<RankReport>> reports_;  // by group
   std::vector<RankReport> display_reports_;       // sent with the finished picture
+  struct Share {
+    bool group_done = false;  // its worker has said so
+    std::optional<PictureShare> picture;
+    Bytes payload;
+  };
+  std::vector<Share> shares_;  // of this attempt
 };
 
 }  // namespace slabstream

@@ -21,8 +21,10 @@ HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
 
 }  // namespace
 
-void PictureRequests::MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
+void PictureRequests::MakePng(std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode, ReplyFunction reply,
                               const Gone& gone, RequestTracePointer trace) {
+  const Annotations& annotations = format.annotations;
+  for (FrameRequest& frame : frames) frame.straight8 = HoldsStraight8(format);
   if (const Status status = CheckCanDraw(annotations); !status.ok()) return reply(Failure(status));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
     const auto done = [this, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
@@ -59,7 +61,7 @@ void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, c
                              .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
     return PngFile(picture.image, picture.size, request.format, notes);
   };
-  MakePng({render->frame}, render->format.annotations, encode, std::move(reply), gone, std::move(trace));
+  MakePng({render->frame}, render->format, encode, std::move(reply), gone, std::move(trace));
 }
 
 void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
@@ -76,7 +78,7 @@ void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, co
     }
     return PngFile(SideBySide(images, request.frame.size), request.size(), request.format, notes);
   };
-  MakePng(*std::move(frames), slice->format.annotations, encode, std::move(reply), gone, std::move(trace));
+  MakePng(*std::move(frames), slice->format, encode, std::move(reply), gone, std::move(trace));
 }
 
 void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {

@@ -25,8 +25,8 @@ class PictureRequests {
  private:
   // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.
   using EncodeFunction = std::function<Result<std::vector<std::byte>>(ServiceLink::Rendered)>;
-  void MakePng(std::vector<FrameRequest> frames, const Annotations& annotations, EncodeFunction encode, ReplyFunction reply,
-               const Gone& gone, RequestTracePointer trace);
+  void MakePng(std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode, ReplyFunction reply, const Gone& gone,
+               RequestTracePointer trace);
 
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;

@@ -4,6 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "client/image_io/composed_picture.h"
 #include "client/report/status_text.h"
 #include "common/base/version.h"
 
@@ -152,6 +153,7 @@ void ViewSession::Render(const ViewAction& action) {
   }
   const bool shadowed = std::ranges::any_of(job->frames, [](const FrameRequest& frame) { return frame.shading.needs_light_volume(); });
   for (FrameRequest& frame : job->frames) {
+    frame.straight8 = HoldsStraight8(job->format);
     if (action.plain) frame.shading.shadows = frame.shading.ambient_occlusion = 0;
     frame.size = {Scaled(frame.size.width, scale), Scaled(frame.size.height, scale)};
     if (coarseness > 1) frame.detail = std::min((frame.detail == 0 ? 1 : frame.detail) * coarseness, kMostDetail);

@@ -188,6 +188,7 @@ void FrameSimulation::BeforeStep(const FrameEvent& event) {
   const auto* heard = std::get_if<FromWorker>(&event);
   const auto* done = heard == nullptr ? nullptr : std::get_if<GroupDone>(&heard->message);
   if (done == nullptr) return;
+  if (--GroupOf(done->key).shares_left > 0) return;
   timeline_.frames[FrameOf(done->key)].groups_done.push_back(now() + machine_.message_seconds);
   frames_.at(FrameOf(done->key)).groups.erase(done->key.group);
 }
@@ -202,8 +203,8 @@ void FrameSimulation::BeginGroup(const GroupAssignment& assignment) {
   for (const Placement& placement : assignment.group.placements) coverage.push_back(inputs_[number].boxes[placement.id].coverage);
   const PixelBounds bounds = FrameBounds(assignment.setup);
   const SharedSchedule schedule = DeriveSchedule(assignment.group.schedule, WholeFrame(assignment.setup)).value();
-  groups.emplace(assignment.key.group,
-                 Group{UnionCoverage(coverage, bounds.width(), bounds.height()), std::uint32_t(schedule->steps().size())});
+  groups.emplace(assignment.key.group, Group{UnionCoverage(coverage, bounds.width(), bounds.height()),
+                                             std::uint32_t(schedule->steps().size()), assignment.group.schedule.roots.size()});
 }
 
 // ---------------------------------------------------------------- work
@@ -258,7 +259,7 @@ auto FrameSimulation::CostOf(Job& job, const SendPartial& action) -> Cost {
 auto FrameSimulation::CostOf(const Job&, const SendFrame& action) const -> Cost {
   const FrameInput& input = inputs_[frame_of_.at(action.message.frame)];
   const double cipher = input.picture_bytes * machine_.picture.cipher_byte;
-  return {{input.finish_seconds + cipher, std::max(machine_.threads, machine_.picture_threads)}};
+  return {{(input.finish_seconds + cipher) / action.message.share_count, std::max(machine_.threads, machine_.picture_threads)}};
 }
 
 void FrameSimulation::OnWorked(const Job& job, const LaneTask& task) {
@@ -302,8 +303,9 @@ Arrivals FrameSimulation::ToCoordinator(Node, WorkerToCoordinator& message) {
   double arrival = service_.now() + machine_.link.latency_seconds;
   if (const auto* picture = std::get_if<FrameImage>(&message)) {
     const std::uint32_t frame = frame_of_.at(picture->frame);
-    const double whole = arrival + inputs_[frame].picture_bytes * machine_.picture.link_byte;
-    (machine_.picture.direct ? frames_.at(frame).picture_there : arrival) = whole;
+    // Shares follow one another on the client's link.
+    double& there = machine_.picture.direct ? frames_.at(frame).picture_there : arrival;
+    there = std::max(there, arrival) + inputs_[frame].picture_bytes / picture->share_count * machine_.picture.link_byte;
   }
   return Arrivals::At(arrival);
 }

@@ -29,7 +29,8 @@ class FrameSimulation : private Conditions {
  private:
   struct Group {
     UnionCoverage coverage;
-    std::uint32_t steps = 0;  // of its schedule
+    std::uint32_t steps = 0;      // of its schedule
+    std::size_t shares_left = 1;  // not done as far as the coordinator knows
   };
   struct Frame {
     std::map<std::uint32_t, Group> groups;  // handed out, and not done as far as the coordinator knows

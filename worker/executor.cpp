@@ -375,7 +375,7 @@ void Executor::Perform(SendFrame&& action) {
   });
 }
 
-void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena) {
+void Executor::MakePicture(LocalImage& frame, SendFrame& send, tbb::task_arena& arena) {
   const GroupKey key = KeyOf(send.message);
   RankReport& report = send.message.reports.emplace_back();
   report.worker = send.message.worker;
@@ -384,15 +384,23 @@ void Executor::MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& 
   std::int64_t resolved_ns = begin;
   RunImage runs = WithAllThreads(arena, [&] {
     const RendererKind& renderer = *send.setup->renderer;
-    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image);
+    LocalImage share;
+    const bool whole = send.pixels == WholeFrame(*send.setup);
+    if (!whole) share = CopyOf(ViewOf(frame, send.pixels, FrameBounds(*send.setup).width()));
+    LocalImage& image = whole ? frame : share;
+    // At the seams of shares that are resampled, pixels are sums, and codes of their parts would not add up.
+    const bool straight8 = send.straight8 && (whole || renderer.FrameIsPicture(*send.setup));
+    const ColorCoding color = straight8 ? ColorCoding::kStraight8 : ColorCoding::kFloat32;
+    if (renderer.FrameIsPicture(*send.setup)) return EncodePicture(image, color);
     FillRows(image);
     const LocalImage picture = renderer.Finish(image, *send.setup);
     resolved_ns = NowNs();
-    return EncodePicture(picture);
+    return EncodePicture(picture, color);
   });
   AddStage(report, Stage::kResolve, begin, resolved_ns);
-  send.message.runs.image = runs.header;
-  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, send.message.runs);
+  EncodedRuns& encoded = send.message.picture.runs;
+  encoded.image = runs.header;
+  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), frame_codec_, encoded);
   AddStage(report, Stage::kEncode, resolved_ns, NowNs());
   outbox_.Post(OutgoingFrame{key, std::move(send.message), payload, std::move(send.pictures)});
 }

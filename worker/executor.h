@@ -97,7 +97,7 @@ class Executor {
   void Break();
   // The entry of the table, which exists.
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
-  void MakePicture(LocalImage& image, SendFrame& send, tbb::task_arena& arena);
+  void MakePicture(LocalImage& frame, SendFrame& send, tbb::task_arena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns

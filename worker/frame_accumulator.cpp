@@ -9,16 +9,19 @@
 
 namespace slabstream {
 
-FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names)
+FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names)
     : epoch_(assignment.epoch),
       self_(self),
       client_(assignment.client),
       frame_(assignment.key.frame),
       group_count_(assignment.group_count),
       previews_(assignment.previews),
+      straight8_(assignment.straight8),
       setup_(std::make_shared<const FrameSetup>(assignment.setup)),
       pictures_(assignment.pictures),
-      pixels_(WholeFrame(assignment.setup)),
+      share_(share),
+      share_count_(assignment.group.schedule.roots.size()),
+      pixels_(Share(WholeFrame(assignment.setup), share_, share_count_)),
       names_(names),
       attempt_(assignment.key.attempt) {}
 
@@ -83,7 +86,7 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
                                    .other = piece.image,
                                    .incoming = std::move(piece.incoming),
                                    .side = Side::kBack,
-                                   .pixels = piece.pixels == pixels_ ? PixelRange{} : piece.pixels,
+                                   .pixels = piece.pixels == WholeFrame(*setup_) ? PixelRange{} : piece.pixels,
                                    .frame = FrameBounds(*setup_),
                                    .ranks = piece.ranks});
     ++combining_;
@@ -116,9 +119,16 @@ void FrameAccumulator::ReportDone(std::uint32_t group, WorkerActions& actions) c
 }
 
 void FrameAccumulator::SendPicture(WorkerActions& actions) {
-  FrameImage message{epoch_, self_, frame_, attempt_, groups_done_, group_count_, {}, {}};
-  message.runs.image.format = setup_->format;
-  actions.push_back(SendFrame{client_, std::move(message), image_, setup_, pictures_});
+  FrameImage message{.epoch = epoch_,
+                     .worker = self_,
+                     .frame = frame_,
+                     .attempt = attempt_,
+                     .groups_done = groups_done_,
+                     .group_count = group_count_,
+                     .share = std::uint32_t(share_),
+                     .share_count = std::uint32_t(share_count_)};
+  message.picture.runs.image.format = setup_->format;
+  actions.push_back(SendFrame{client_, std::move(message), image_, pixels_, straight8_, setup_, pictures_});
   if (groups_done_ == group_count_) frame_sent_attempt_ = attempt_;
 }
 

@@ -1,7 +1,8 @@
-// FrameAccumulator: the frame on its display worker. It accumulates group images front to back; early ones wait. After each group it
-// reports GroupDone and sends a preview if wanted; after the last group it sends the frame. If frames use occlusion masks, it first finds
-// the hidden tiles and adds them to the report, except after the last group, when nobody needs them. It outlives attempts: accumulated
-// pixels are right whoever rendered them. It keeps the picture until the frame is over, because the coordinator may ask again (Confirm).
+// FrameAccumulator: a frame, or a share of one, on its display worker. It accumulates the images of groups front to back; an image that
+// comes early waits. After each group it reports GroupDone and sends a preview if wanted; after the last group it sends the frame. If
+// frames use occlusion masks, it first finds the hidden tiles and adds them to the report, except after the last group, when nobody needs
+// them. It outlives attempts: accumulated pixels are right whoever rendered them. It keeps the picture until the frame is over, because the
+// coordinator may ask again (Confirm).
 #pragma once
 
 #include <cstdint>
@@ -16,12 +17,13 @@ namespace slabstream {
 
 class FrameAccumulator {
  public:
-  // `assignment`: of any group of the frame. `names` must outlive the accumulator.
-  FrameAccumulator(const GroupAssignment& assignment, WorkerId self, ImageNames& names);
+  // `assignment`: of any group of the frame, of which this worker gets the share `share`. `names` must outlive the accumulator.
+  FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names);
 
   // True if the group's image is here: accumulated, being combined, or waiting.
   bool Has(std::uint32_t group) const { return group < groups_done_ + (group_started_ ? 1U : 0U) || waiting_.count(group) > 0; }
   std::uint32_t groups_done() const { return groups_done_; }
+  std::size_t share_count() const { return share_count_; }
   const Status& failure() const { return failure_; }  // the picture is lost: drop the accumulator
 
   // Later reports and pictures carry this attempt.
@@ -48,10 +50,11 @@ class FrameAccumulator {
   const ClientId client_;
   const FrameId frame_;
   const std::uint32_t group_count_;
-  const bool previews_;
+  const bool previews_, straight8_;
   const std::shared_ptr<const FrameSetup> setup_;
   const std::optional<PicturesAddress> pictures_;
-  const PixelRange pixels_;
+  const std::size_t share_, share_count_;
+  const PixelRange pixels_;  // of the share
   ImageNames& names_;
 
   std::uint32_t attempt_ = 0;

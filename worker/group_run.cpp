@@ -56,8 +56,13 @@ GroupRun::GroupRun(GroupAssignment assignment, WorkerId self, ImageNames& names)
       names_(names),
       frame_(WholeFrame(assignment_.setup)),
       runner_(MakeRunner()),
+      displayed_(ShareOf(assignment_.group, assignment_.display, self)),
       group_image_{key(), {}, {}} {
   for (const Rank rank : runner_.order().ranks()) ranks_[rank];
+  const std::vector<Rank>& roots = assignment_.group.schedule.roots;
+  for (std::size_t share = 0; share < roots.size(); ++share) {
+    if (Mine(roots[share])) unfinished_.push_back(share);
+  }
 }
 
 // If the schedule does not fit the group: a runner without ranks.
@@ -125,15 +130,15 @@ bool GroupRun::OnCombined(const CombineDone& done, WorkerActions& actions) {
 }
 
 std::optional<GroupImage> GroupRun::TakeGroupImage() {
-  if (!failure_.ok() || group_image_taken_ || assignment_.display != self_) return std::nullopt;
+  if (!failure_.ok() || group_image_taken_ || !displayed_) return std::nullopt;
   const bool empty = assignment_.group.placements.empty();
-  if (!empty && group_pixels_ != PixelCount(frame_)) return std::nullopt;
+  if (!empty && group_pixels_ != PixelCount(PixelsOf(*displayed_))) return std::nullopt;
   group_image_taken_ = true;
   return std::move(group_image_);
 }
 
 bool GroupRun::finished() const {
-  if (!combining_.empty() || (assignment_.display == self_ && !group_image_taken_)) return false;
+  if (!combining_.empty() || (displayed_ && !group_image_taken_)) return false;
   return std::ranges::all_of(runner_.held(), [&](const auto& rank) { return runner_.order().Done(rank.first) && rank.second.empty(); });
 }
 
@@ -156,7 +161,7 @@ void GroupRun::Drop(WorkerActions& actions) {
 void GroupRun::Advance(WorkerActions& actions) {
   while (failure_.ok()) {
     std::optional<Runner::Taken> taken = runner_.TakeNext();
-    if (!taken) return FinishRoot(actions);
+    if (!taken) return FinishShares(actions);
     if (taken->kind == StepOrder::Kind::kReceive) {
       Receive(*taken, actions);
       continue;
@@ -259,31 +264,41 @@ void GroupRun::Start(StartCombine&& combine, Rank rank, WorkerActions& actions) 
   actions.push_back(std::move(combine));
 }
 
-void GroupRun::FinishRoot(WorkerActions& actions) {
-  if (root_done_ || !Mine(root()) || !runner_.order().Done(root())) return;
-  root_done_ = true;
-  const std::vector<Held> parts = runner_.held(root()).Take(frame_);
+PixelRange GroupRun::PixelsOf(std::size_t share) const { return Share(frame_, share, assignment_.group.schedule.roots.size()); }
+
+void GroupRun::FinishShares(WorkerActions& actions) {
+  std::erase_if(unfinished_, [&](std::size_t share) {
+    if (!runner_.order().Done(RootOf(share))) return false;
+    FinishShare(share, actions);
+    return true;
+  });
+}
+
+void GroupRun::FinishShare(std::size_t share, WorkerActions& actions) {
+  const Rank root = RootOf(share);
+  const std::uint64_t expected = PixelCount(PixelsOf(share));
+  const std::vector<Held> parts = runner_.held(root).Take(PixelsOf(share));
   const RankInterval all{0, assignment_.group.schedule.ranks};
   std::uint64_t held = 0;
   for (const Held& part : parts) held += part.value.ranks == all ? PixelCount(part.pixels) : 0;
-  if (held != PixelCount(frame_)) {
-    for (const Held& part : parts) runner_.held(root()).Put(part);  // Drop releases them
-    return Fail(fmt::format("the schedule is over, but the root holds only {} of {} pixels of all ranks", held, PixelCount(frame_)));
+  if (held != expected) {
+    for (const Held& part : parts) runner_.held(root).Put(part);  // Drop releases them
+    return Fail(fmt::format("the schedule is over, but its root {} holds only {} of {} pixels of all ranks", root, held, expected));
   }
-  if (assignment_.display != self_) {
-    SendFragments(root(), parts, step_count(), assignment_.display, TakeReports(root()), actions);
+  if (!displayed_) {
+    SendFragments(root, parts, step_count(), assignment_.display, TakeReports(root), actions);
     ReleaseUnused(parts, actions);
     return;
   }
   for (const Held& part : parts) group_image_.pieces.push_back({part.pixels, part.value.ranks, part.value.image, {}});
-  Append(group_image_.reports, TakeReports(root()));
-  group_pixels_ = held;
+  Append(group_image_.reports, TakeReports(root));
+  group_pixels_ += held;
 }
 
 void GroupRun::CollectGroupPiece(PartialImage&& message, const Bytes& payload) {
-  const bool from_root = WorkerOf(root()) == message.from_worker && !Mine(root());
+  const bool from_root = displayed_ && WorkerOf(RootOf(*displayed_)) == message.from_worker && !Mine(RootOf(*displayed_));
   const bool whole = message.interval == RankInterval{0, assignment_.group.schedule.ranks};
-  if (assignment_.display != self_ || !from_root || !whole || message.pixels.end > frame_.end) return;
+  if (!from_root || !whole || message.pixels.end > frame_.end) return;
   const auto known = [&](const ImagePiece& piece) { return Overlap(piece.pixels, message.pixels); };
   if (group_image_taken_ || std::ranges::any_of(group_image_.pieces, known)) return;
   group_pixels_ += PixelCount(message.pixels);

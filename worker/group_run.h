@@ -28,7 +28,7 @@ struct ImagePiece {
   Rare<IncomingImage> incoming;  // none: an empty image
 };
 
-// All pixels of a group, on the display worker; an empty group has no pieces. The taker owns the images.
+// The pixels of a group, or of a share of it, on the display worker; an empty group has no pieces. The taker owns the images.
 struct GroupImage {
   GroupKey key;
   std::vector<ImagePiece> pieces;
@@ -80,7 +80,6 @@ class GroupRun {
 
   bool Mine(Rank rank) const { return ranks_.contains(rank); }
   WorkerId WorkerOf(Rank rank) const { return workers_[rank]; }
-  Rank root() const { return assignment_.group.schedule.root; }
   std::uint32_t step_count() const { return std::uint32_t(runner_.order().schedule().steps().size()); }
   Runner MakeRunner();
   void Advance(WorkerActions& actions);
@@ -93,7 +92,11 @@ class GroupRun {
   void TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Fills in key and frame.
   void Start(StartCombine&& combine, Rank rank, WorkerActions& actions);
-  void FinishRoot(WorkerActions& actions);
+  // Of each share whose root is one of this worker's ranks, when that rank is done.
+  void FinishShares(WorkerActions& actions);
+  void FinishShare(std::size_t share, WorkerActions& actions);
+  Rank RootOf(std::size_t share) const { return assignment_.group.schedule.roots[share]; }
+  PixelRange PixelsOf(std::size_t share) const;
   void CollectGroupPiece(PartialImage&& message, const Bytes& payload);
   // The messages carry `reports`.
   void SendFragments(Rank rank, std::span<const Held> fragments, std::uint32_t step, WorkerId to, std::vector<RankReport> reports,
@@ -115,9 +118,10 @@ class GroupRun {
   std::map<Rank, RankState> ranks_;                      // of this worker
   std::multimap<std::uint32_t, Arrival> arrivals_;       // by the turn that waits for more of them; of a turn, at most one of any pixel
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
-  bool root_done_ = false;
-  GroupImage group_image_;          // display worker: what has come of it
-  std::uint64_t group_pixels_ = 0;  // in its pieces
+  std::vector<std::size_t> unfinished_;                  // shares that end at this worker's ranks
+  const std::optional<std::size_t> displayed_;           // the share that this worker displays
+  GroupImage group_image_;                               // what has come of it
+  std::uint64_t group_pixels_ = 0;                       // in its pieces
   bool group_image_taken_ = false;
 };
 

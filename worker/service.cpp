@@ -217,7 +217,7 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
       }
     }
     if (const auto* group = std::get_if<GroupAssignment>(&message);
-        group != nullptr && group->display == machine.worker() && group->pictures)
+        group != nullptr && group->pictures && ShareOf(group->group, group->display, machine.worker()))
       pictures.Prepare(*group->pictures, MonotonicNow());
     HandleEvent(MessageReceived{std::move(message), std::move(payload)});
   }
@@ -272,9 +272,10 @@ void WorkerService::Impl::HandleOutput(ExecutorOutput& output) {
 }
 
 Status WorkerService::Impl::Send(OutgoingFrame& frame) {
-  const SentPicture picture{.digest = frame.message.runs.digest, .bytes = frame.payload.size()};
-  frame.message.direct = frame.pictures && !frame.payload.empty() && pictures.Send(*frame.pictures, picture, frame.payload, MonotonicNow());
-  return control.Send({}, Encode(frame.message), frame.message.direct ? Bytes() : frame.payload);
+  PictureShare& share = frame.message.picture;
+  const SentPicture picture{.digest = share.runs.digest, .bytes = frame.payload.size()};
+  share.direct = frame.pictures && !frame.payload.empty() && pictures.Send(*frame.pictures, picture, frame.payload, MonotonicNow());
+  return control.Send({}, Encode(frame.message), share.direct ? Bytes() : frame.payload);
 }
 
 // Lost messages are not sent again here: registration, heartbeats and requests repeat.

@@ -261,8 +261,8 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
     frame.light_bytes = LightBytes(assignment.setup);
   }
 
-  if (assignment.display == worker) {
-    if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, names);
+  if (const std::optional<std::size_t> share = ShareOf(assignment.group, assignment.display, worker)) {
+    if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, *share, names);
     if (frame.accumulator->groups_done() < assignment.first_group) {
       return Trouble(key, Status::DataLoss(fmt::format("the display worker holds {} groups of the frame, expected {}",
                                                        frame.accumulator->groups_done(), assignment.first_group)));
@@ -297,7 +297,9 @@ void WorkerMachine::State::BeginAttempt(FrameId id, Frame& frame, const GroupAss
   frame.attempt = assignment.key.attempt;
   early.Forget([&](const PartialImage& image) { return image.key.frame == id && image.key.attempt < frame.attempt; });
   if (!frame.accumulator) return;
-  if (assignment.display == worker) {
+  // Others may have lost their shares, and need what this worker rendered of them.
+  const bool divided = frame.accumulator->share_count() > 1 || assignment.group.schedule.roots.size() > 1;
+  if (assignment.display == worker && !divided) {
     frame.accumulator->SetAttempt(frame.attempt);
   } else {
     frame.accumulator->Drop(actions);

@@ -284,12 +284,14 @@ struct ForgetGroups {
            (key.frame == next.frame && (key.attempt < next.attempt || key.group < next.group));
   }
 };
-// Makes the picture of `image`, a frame, encodes it, fills message.runs and a report, sends it to the coordinator; the payload
-// straight to the client, if that is possible. -> SendFailed, or nothing.
+// Makes the picture of `pixels` of `image`, a frame or a share of it, encodes it, fills message.picture and a report, sends it to the
+// coordinator; the payload straight to the client, if that is possible. -> SendFailed, or nothing.
 struct SendFrame {
   ClientId client = 0;
   FrameImage message;
   ImageHandle image = 0;
+  PixelRange pixels;       // others of the image may hold anything
+  bool straight8 = false;  // as in FrameRequest
   std::shared_ptr<const FrameSetup> setup;
   std::optional<PicturesAddress> pictures = {};  // where its client takes it; none: through the coordinator
 };

@@ -2,6 +2,7 @@
 
 #include "common/metrics/process_metrics.h"
 #include "common/metrics/service_metrics.h"
+#include "data/stores/http_transfers.h"
 
 namespace slabstream {
 
@@ -63,6 +64,8 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Value(image_bytes_, {{"plane", "images"}});
   out.Value(picture_bytes_, {{"plane", "pictures"}});
   out.Single("worker_unsent_total", MetricType::kCounter, "Images and pictures that could not be sent.", unsent_);
+  const HttpCounts web = HttpTransfers::CountsOfProcess();
+  AddWebRequests(out, "worker_web_requests_total", "worker_web_bytes_total", {web.answered(), web.retries, web.failures, web.bytes});
   AddProcess(out, memory_limit_);
   return out.Take();
 }

@@ -18,7 +18,7 @@ namespace slabstream {
 namespace {
 
 Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& source, const ReadContext::Limits& limits, ProgressBar& bar) {
-  if (FindSourceFormat(source.path, source.options) != nullptr) {
+  if (IsReadInParts(source.path, source.options)) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
     WarnOfChannel(source.path, source.options, FileInfoOf((*opened)->info()));

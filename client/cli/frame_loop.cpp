@@ -64,7 +64,9 @@ class FrameLoop {
   void SubmitAhead() {
     const std::size_t limit = std::size_t(options_.in_flight);
     while (next_ < jobs_.size() && open_.size() < limit && waiting_.size() + tasks_.size() < limit) {
-      open_[client_.Submit(jobs_[next_].request)] = next_;
+      FrameRequest request = jobs_[next_].request;
+      request.straight8 = options_.pictures != nullptr && options_.pictures->TakesStraight8(jobs_[next_]);
+      open_[client_.Submit(request)] = next_;
       ++next_;
     }
   }

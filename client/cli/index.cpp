@@ -45,7 +45,7 @@ Result<BrickIndex> Begun(const IndexFile& file, const std::string& name, const S
 Status RunIndex(const IndexingOptions& options) {
   const Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
-  if (FindSourceFormat(source->path, source->options) == nullptr) {
+  if (!IsReadInParts(source->path, source->options)) {
     if (Status status = CheckInputVolume(*source); !status.ok()) return status;
     return Status::InvalidArgument(
         fmt::format("SOURCE '{}' can have no index: its format cannot be read in parts; `slabstream convert` writes an OME-Zarr, which can",

@@ -30,7 +30,7 @@ Status CheckInputHeaders(const std::string& source) {
 bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes) {
   const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return false;
-  if (FindSourceFormat(parsed->path, parsed->options) != nullptr) return true;
+  if (IsReadInParts(parsed->path, parsed->options)) return true;
   const Result<std::optional<SourceInfo>> stream = DescribeStream(parsed->path, parsed->options);
   return stream.ok() && *stream && std::uint64_t((*stream)->levels.front().description.voxel_bytes()) > most_bytes;
 }

@@ -16,6 +16,7 @@ class PictureFiles : public PictureSink {
       : format_(format), key_(std::move(key)), record_(record), layers_(std::move(layers)) {}
 
   bool in_order() const override { return false; }
+  bool TakesStraight8(const FrameJob& job) const override { return FileHoldsStraight8(job.output, format_); }
   Status Put(const Picture& picture, const FrameJob& job) override;
   Status Skip(const FrameJob&) override { return Status::Ok(); }
   Status Finish() override { return Status::Ok(); }

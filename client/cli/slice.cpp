@@ -25,6 +25,7 @@ Status RunSlice(const SliceOptions& options) {
   Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
   if (!connection.ok()) return connection.status();
   slice.frame.dataset = connection->dataset();
+  slice.frame.straight8 = FileHoldsStraight8(options.output, slice.format);
   const Result<std::vector<FrameRequest>> frames = FramesOf(slice);
   if (!frames.ok()) return frames.status();
   const Result<PictureKey> key = KeyFor(connection->client(), slice.format.annotations, frames->front());

@@ -17,6 +17,7 @@
 #include "client/service/service_state.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
+#include "common/base/url.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
 #include "data/layers/layer_reader.h"
@@ -40,13 +41,13 @@ std::string DatasetName(const std::filesystem::path& path) {
 }
 
 bool IsVolumeFile(const std::string& source) {
-  std::error_code error;
   const Result<SourceText> parsed = ParseSourceText(source);
-  return parsed.ok() && std::filesystem::exists(parsed->path, error);
+  return parsed.ok() && MayBeThere(*parsed);
 }
 
 // The file of a source, or of a layer with what follows its name, with an absolute path.
 std::string AbsoluteSource(const std::string& source) {
+  if (IsUrl(source)) return source;
   const std::size_t options = source.find('?');
   const std::string path = std::filesystem::absolute(source.substr(0, options)).string();
   return options == std::string::npos ? path : path + source.substr(options);

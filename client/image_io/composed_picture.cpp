@@ -4,10 +4,12 @@
 #include <limits>
 
 #include "common/base/check.h"
+#include "common/image/sample_codes.h"
 #include "common/kernels/combine.h"
-#include "common/kernels/sample_codes.h"
 
 namespace slabstream {
+
+bool HoldsStraight8(const PictureFormat& format) { return format.png_bits == 8 && format.background.a == 0 && !format.annotations.any(); }
 
 Result<ComposedPicture> ComposedPicture::Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
                                               std::span<const PictureGeometry> panes, const PictureKey& key) {

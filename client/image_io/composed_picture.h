@@ -24,6 +24,9 @@ struct PictureFormat {
   Annotations annotations;   // drawn onto it
 };
 
+// Whether PNGs of this format hold the codes of the picture itself, so that a picture in these codes (FrameRequest::straight8) is enough.
+bool HoldsStraight8(const PictureFormat& format);
+
 // Rows are made one by one, so that no second copy of the picture is needed. Any thread.
 class ComposedPicture {
  public:

@@ -17,7 +17,7 @@
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/version.h"
-#include "common/kernels/sample_codes.h"
+#include "common/image/sample_codes.h"
 
 namespace slabstream {
 namespace {
@@ -116,6 +116,10 @@ std::string FirstLine(const std::string& reason) {
 }
 
 }  // namespace
+
+bool FileHoldsStraight8(const std::string& path, const PictureFormat& format) {
+  return TypeOf(path) == FileType::kPng && HoldsStraight8(format);
+}
 
 Status CheckPicturePath(const std::string& path) {
   if (TypeOf(path) != FileType::kOther) return Status::Ok();

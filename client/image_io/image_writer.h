@@ -28,6 +28,9 @@ struct PictureNotes {
 };
 inline constexpr char kRecordName[] = "slabstream";
 
+// Whether this file is a PNG that holds the codes of the picture itself: HoldsStraight8 of its format.
+bool FileHoldsStraight8(const std::string& path, const PictureFormat& format);
+
 // InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
 Status CheckPicturePath(const std::string& path);
 

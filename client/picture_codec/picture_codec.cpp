@@ -12,7 +12,7 @@
 
 #include <jpeglib.h>
 
-#include "common/kernels/sample_codes.h"
+#include "common/image/sample_codes.h"
 
 namespace slabstream {
 namespace {

@@ -10,7 +10,7 @@ struct FrameSummary {
   StageTimes stage_ns{};           // worker time, summed over ranks
   std::int64_t render_ns = 0;      // of the worker with the longest render time
   std::int64_t combine_ns = 0;     // combining and encoding of partial images, summed over workers
-  std::int64_t finish_ns = 0;      // making and encoding the picture
+  std::int64_t finish_ns = 0;      // making and encoding the picture, of all its shares
   std::uint64_t voxel_bytes = 0;   // that travelled to workers
   std::uint64_t image_bytes = 0;   // that travelled between workers
   std::uint64_t stored_bytes = 0;  // read from the dataset's source, as they are stored

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/files.h"
+#include "common/base/url.h"
 #include "common/cli/parse.h"
 #include "data/volume_io/read_options.h"
 
@@ -20,8 +21,7 @@ using TransferText = std::variant<std::string, TransferFunction>;
 // Options are checked with the volume.
 bool Exists(const std::string& volume) {
   const Result<SourceText> source = ParseSourceText(volume);
-  std::error_code error;
-  return source.ok() && std::filesystem::exists(source->path, error);
+  return source.ok() && MayBeThere(*source);
 }
 
 bool IsJson(const std::string& text) { return text.starts_with('{') || text.starts_with('['); }
@@ -64,8 +64,11 @@ bool NamesVolumeFile(const std::string& text) { return Exists(text) || Exists(te
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
   const VolumeArgument whole{text, "", {}};
   const std::size_t colon = text.rfind(':');
+  const auto is_port = [](std::string_view after) { return after.find_first_not_of("0123456789") == std::string_view::npos; };
+  const bool of_address =
+      IsUrl(text) && colon != std::string::npos && (colon < text.rfind('/') || is_port(std::string_view(text).substr(colon + 1)));
   std::error_code error;
-  if (colon == std::string::npos || (is_file && std::filesystem::exists(text, error))) return whole;
+  if (colon == std::string::npos || of_address || (is_file && std::filesystem::exists(text, error))) return whole;
   VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
   if (is_file && !Exists(parts.volume)) return whole;
   auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);

@@ -25,11 +25,23 @@ class Bytes {
 
   std::span<const std::byte> span() const { return data_; }
   std::size_t size() const { return data_.size(); }
+  Bytes Part(std::size_t begin, std::size_t bytes) const { return {owner_, data_.subspan(begin, bytes)}; }  // which lies inside
   bool empty() const { return data_.empty(); }
 
  private:
   std::shared_ptr<const void> owner_;
   std::span<const std::byte> data_;
 };
+
+// One after the other; a single one is not copied.
+inline Bytes Concatenated(std::span<const Bytes> parts) {
+  if (parts.size() == 1) return parts.front();
+  std::size_t size = 0;
+  for (const Bytes& part : parts) size += part.size();
+  PooledVector<std::byte> all;
+  all.reserve(size);
+  for (const Bytes& part : parts) all.insert(all.end(), part.span().begin(), part.span().end());
+  return Bytes(std::move(all));
+}
 
 }  // namespace slabstream

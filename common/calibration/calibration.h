@@ -96,7 +96,7 @@ inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;  // of
 inline constexpr double kCipherByte = 0.19e-9;  // of processor time at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench)
 inline constexpr double kCurveByte = 1.2e-9;    // of processor time to encrypt and send, or receive and decrypt, a byte over CURVE
 inline constexpr double kLoopbackRate = 6e9;    // bytes a second between processes of a host: 16 MiB in 2.7 ms (combining_bench)
-inline constexpr double kVoxelRate = 5e8;       // bytes a second of voxels that reach a new owner and are prepared: an order of magnitude
+inline constexpr double kVoxelRate = 5e8;       // bytes a second of voxels that reach a new owner: an order of magnitude
 }  // namespace service
 
 }  // namespace slabstream::calibration

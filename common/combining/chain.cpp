@@ -6,7 +6,7 @@ namespace slabstream {
 
 // Arms of equal length would bring the same strip to the root in one round: there the arm in front comes a round later.
 Schedule MakeChain(const ScheduleRequest& request, std::uint32_t strips) {
-  Schedule whole = {request.ranks, request.root, {}};
+  Schedule whole = {request.ranks, {request.root}, {}};
   if (request.ranks < 2) return whole;
   const Rank last = request.ranks - 1;
   for (Rank from = last; from > request.root; --from) whole.steps.push_back({last - from, from, from - 1, request.pixels});
@@ -16,7 +16,7 @@ Schedule MakeChain(const ScheduleRequest& request, std::uint32_t strips) {
     whole.steps.push_back({from + (meets ? 1U : 0U), from, from + 1, request.pixels});
   }
   std::ranges::stable_sort(whole.steps, {}, &Step::round);
-  return InStrips(std::move(whole), strips);
+  return InStrips(std::move(whole), strips, request.most_steps);
 }
 
 }  // namespace slabstream

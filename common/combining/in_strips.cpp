@@ -4,12 +4,12 @@
 
 namespace slabstream {
 
-Schedule InStrips(Schedule schedule, std::uint32_t strips) {
+Schedule InStrips(Schedule schedule, std::uint32_t strips, std::uint32_t most_steps) {
   if (schedule.steps.empty()) return schedule;
   const PixelRange pixels = schedule.steps.front().pixels;
   const std::uint64_t count =
-      std::max<std::uint64_t>(1, std::min<std::uint64_t>({strips, kMaxSteps / schedule.steps.size(), pixels.end - pixels.begin}));
-  Schedule result = {schedule.ranks, schedule.root, {}};
+      std::max<std::uint64_t>(1, std::min<std::uint64_t>({strips, most_steps / schedule.steps.size(), pixels.end - pixels.begin}));
+  Schedule result = {schedule.ranks, schedule.roots, {}};
   result.steps.reserve(count * schedule.steps.size());
   for (const Step& step : schedule.steps) {
     for (std::uint32_t strip = 0; strip < count; ++strip) {

@@ -72,8 +72,16 @@ Status CheckScheduleName(const ScheduleName& name) {
   if (name.ranks > kMaxRanks) {
     return Status::InvalidArgument(fmt::format("schedule.ranks is {}, but at most {} are allowed", name.ranks, kMaxRanks));
   }
-  if (name.root >= std::max<Rank>(name.ranks, 1)) {
-    return Status::InvalidArgument(fmt::format("schedule.root is {}, but must be below {}", name.root, std::max<Rank>(name.ranks, 1)));
+  if (name.roots.empty() || name.roots.size() > kMaxShares) {
+    return Status::InvalidArgument(fmt::format("schedule.roots are {}, but must be from 1 to {}", name.roots.size(), kMaxShares));
+  }
+  for (const Rank root : name.roots) {
+    if (root < std::max<Rank>(name.ranks, 1)) continue;
+    return Status::InvalidArgument(fmt::format("schedule.roots has {}, but must be below {}", root, std::max<Rank>(name.ranks, 1)));
+  }
+  if (name.roots.size() > 1 && name.roots.size() * name.ranks > kMaxSteps) {
+    return Status::InvalidArgument(fmt::format("schedule.roots are {}, but at most {} are allowed for {} ranks", name.roots.size(),
+                                               kMaxSteps / name.ranks, name.ranks));
   }
   if (name.ranks == 0) return Status::Ok();
   const Result<CombiningChoice> scheme = ParseCombining(name.scheme);
@@ -83,9 +91,9 @@ Status CheckScheduleName(const ScheduleName& name) {
 Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame) {
   static RecentSchedules recent;
   if (Status status = CheckScheduleName(name); !status.ok()) return status;
-  if (name.ranks == 0) return std::make_shared<const IndexedSchedule>(Schedule{.ranks = 0, .root = 0, .steps = {}});
+  if (name.ranks == 0) return std::make_shared<const IndexedSchedule>(Schedule{.ranks = 0, .roots = {0}, .steps = {}});
   if (SharedSchedule known = recent.Find(name, frame)) return known;
-  auto schedule = std::make_shared<const IndexedSchedule>(ParseCombining(name.scheme)->Make({name.ranks, name.root, frame}));
+  auto schedule = std::make_shared<const IndexedSchedule>(ParseCombining(name.scheme)->Make(name.ranks, name.roots, frame));
   recent.Keep(name, frame, schedule);
   return SharedSchedule(std::move(schedule));
 }

@@ -13,14 +13,17 @@
 
 namespace slabstream {
 
+inline constexpr std::size_t kMaxShares = 64;
+
 struct ScheduleName {
   std::string scheme;  // as --combine spells it, for example "radix-k:4x4"
   Rank ranks = 0;      // [0, kMaxRanks]; 0: a group without images, which needs no scheme
-  Rank root = 0;       // below `ranks`; 0 if there are none
+  // As in a Schedule: 1 ... kMaxShares, each below `ranks`, 0 if there are none. Several shares: at most kMaxSteps ranks in all of them.
+  std::vector<Rank> roots = {0};
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };
 
-// InvalidArgument: an unknown scheme, wrong arguments, too many ranks, or a root that is no rank.
+// InvalidArgument: an unknown scheme, wrong arguments, too many ranks, no root or too many, or a root that is no rank.
 Status CheckScheduleName(const ScheduleName& name);
 
 // A schedule and, for each rank, the steps that it sends or receives. Immutable.

@@ -29,7 +29,12 @@ struct CombiningEntry {
   std::string_view arguments;    // what may follow "NAME:", for --help and errors; empty: nothing may
   std::size_t most_factors = 0;  // most factors that it takes
   bool takes_strips = false;
-  Schedule (*make)(const ScheduleRequest&, const CombiningArguments&);  // any arguments that the entry takes
+  // Any arguments that the entry takes.
+  Schedule (*make)(const ScheduleRequest&, const CombiningArguments&);
+  // One share of several, which have a root each. Null: as `make`, since the scheme does not divide the picture by itself.
+  Schedule (*make_share)(const ScheduleRequest&, const CombiningArguments&);
+
+  bool divides() const { return make_share != nullptr; }
 };
 
 // The only list.
@@ -40,6 +45,8 @@ struct CombiningChoice {
   const CombiningEntry* scheme = nullptr;
   CombiningArguments arguments;
   Schedule Make(const ScheduleRequest& request) const { return scheme->make(request, arguments); }
+  // Each of `roots` gets its share of the pixels. At most kMaxSteps / roots.size() ranks.
+  Schedule Make(Rank ranks, const std::vector<Rank>& roots, PixelRange pixels) const;
 };
 
 // InvalidArgument: an unknown name (the message lists the known ones), or arguments that the scheme does not take, with their limits.

@@ -25,6 +25,7 @@ StepOrder::StepOrder(SharedSchedule schedule, std::vector<Rank> ranks)
     turn.missing = PixelCount(StepOf(turn).pixels);
     turn.partner = (turn.sends ? FindReceiving(turn.step) : FindSending(turn.step)).value_or(kElsewhere);
   }
+  sendable_ = IndexSet(turn_count());
   possible_ = IndexSet(turn_count());
   changed_ = IndexSet(std::uint32_t(ranks_.size()));
   FindWaits();
@@ -126,7 +127,7 @@ void StepOrder::Offer(std::uint32_t index) {
   } else if (!turn.sends && !turn.untaken) {
     return;
   }
-  possible_.Insert(index);
+  (turn.sends && turn.partner == kElsewhere ? sendable_ : possible_).Insert(index);
   changed_.Insert(turn.rank);
 }
 
@@ -134,6 +135,7 @@ void StepOrder::Offer(std::uint32_t index) {
 void StepOrder::Close(std::uint32_t index) {
   Turn& turn = turns_[index];
   turn.taken = true;
+  sendable_.Erase(index);
   possible_.Erase(index);
   --ranks_[turn.rank].open_steps;
   const auto wait_less = [&](std::uint32_t waiter) {
@@ -150,12 +152,17 @@ std::optional<StepOrder::Taken> StepOrder::TakeNext() {
   const auto ranks = std::uint32_t(ranks_.size());
   for (std::uint32_t i = changed_.Find(0, ranks); i < ranks; i = changed_.Find(i, ranks)) {
     const RankState& rank = ranks_[i];
-    const std::uint32_t end = rank.free() ? rank.turn_end : rank.first_turn;
+    const std::uint32_t end = rank.rendered ? rank.turn_end : rank.first_turn;
+    if (const std::uint32_t index = sendable_.Find(rank.first_turn, end); rank.free() && index < end) {
+      const Taken taken = {Kind::kSend, turns_[index].step, index, rank.number};
+      Close(index);
+      return taken;
+    }
     for (std::uint32_t index = possible_.Find(rank.first_turn, end); index < end; index = possible_.Find(index + 1, end)) {
       Turn& turn = turns_[index];
       const bool moves = turn.partner != kElsewhere;
-      if (moves && !ranks_[turns_[turn.partner].rank].free()) continue;
-      Taken taken = {moves ? Kind::kMove : turn.sends ? Kind::kSend : Kind::kReceive, turn.step, index, rank.number};
+      if (moves && !(rank.free() && ranks_[turns_[turn.partner].rank].free())) continue;
+      Taken taken = {moves ? Kind::kMove : Kind::kReceive, turn.step, index, rank.number};
       taken.last = taken.kind != Kind::kReceive || turn.missing == 0;
       if (taken.last) {
         Close(index);

@@ -1,8 +1,10 @@
 // StepOrder: which steps of a schedule may be taken next at some of its ranks: those of one worker, or all of them.
 //
-// A step may be taken at a rank when the rank is rendered, nothing is being combined for it, and all its earlier steps on the same pixels
-// are taken. So the same images meet in any order of arrival, and steps of disjoint pixels do not wait for each other. For each step the
-// object counts what it still waits for, so an event costs no scan over the open steps. Memory grows with the steps of its own ranks.
+// A step may be taken at a rank when the rank is rendered and all its earlier steps on the same pixels are taken. Nothing may be combined
+// for the rank meanwhile, unless the step receives: the caller combines in the order of the steps. So the same images meet in any order of
+// arrival, and steps of disjoint pixels do not wait for each other. Of the steps that may be taken at a rank, those that send come first:
+// others wait for what they send, and nobody else for what it combines. For each step the object counts what it still waits for, so an
+// event costs no scan over the open steps. Memory grows with the steps of its own ranks.
 #pragma once
 
 #include <cstdint>
@@ -90,7 +92,8 @@ class StepOrder {
   std::vector<RankState> ranks_;        // of numbers_; most lookups touch only these
   std::vector<Turn> turns_;             // rank by rank, each in order of steps
   std::vector<std::uint32_t> waiters_;  // of turns with many: their number, then they
-  IndexSet possible_;                   // turns that wait only for their ranks to be free
+  IndexSet sendable_;                   // turns that send elsewhere and wait only for their rank to be free
+  IndexSet possible_;                   // other turns that wait only for their ranks to be free
   IndexSet changed_;                    // ranks at which a turn may have become possible
 };
 

@@ -8,12 +8,6 @@
 
 namespace slabstream {
 
-// Part `part` of `parts` equal ones, which tile `pixels` and may be empty.
-constexpr PixelRange Share(const PixelRange& pixels, std::uint64_t part, std::uint64_t parts) {
-  const std::uint64_t size = pixels.end - pixels.begin;
-  return {pixels.begin + size * part / parts, pixels.begin + size * (part + 1) / parts};
-}
-
 // Member `to` of `count` neighbours takes something from each of the others, from the inside out: what it holds stays one interval. Turns
 // [0, InsideOutTurns(count)) are in step for every `to`: no member is asked twice in a turn. Returns the member that is asked, if one is.
 constexpr std::uint32_t InsideOutTurns(std::uint32_t count) { return count < 2 ? 0 : 2 * (count - 1); }
@@ -31,7 +25,7 @@ void ForEachInsideOut(std::uint32_t to, std::uint32_t count, Take&& take) {
 }
 
 // Splits each step of `schedule` into `strips` strips of its pixels, one round after the other; all steps move the same pixels. There are
-// fewer strips if there are too few pixels, or if kMaxSteps allows no more.
-Schedule InStrips(Schedule schedule, std::uint32_t strips);
+// fewer strips if there are too few pixels, or if `most_steps` allows no more.
+Schedule InStrips(Schedule schedule, std::uint32_t strips, std::uint32_t most_steps);
 
 }  // namespace slabstream

@@ -21,8 +21,11 @@ Travel TravelOf(const SharedSchedule& schedule, PixelRange pixels) {
       });
     }
   }
-  for (const Fragment<Travel>& fragment : runner.held(schedule->schedule().root).list()) {
-    most = {std::max(most.hops, fragment.value.hops), std::max(most.transfers, fragment.value.transfers)};
+  const std::vector<Rank>& roots = schedule->schedule().roots;
+  for (std::size_t share = 0; share < roots.size(); ++share) {
+    for (const Fragment<Travel>& fragment : runner.held(roots[share]).Take(Share(pixels, share, roots.size()))) {
+      most = {std::max(most.hops, fragment.value.hops), std::max(most.transfers, fragment.value.transfers)};
+    }
   }
   return most;
 }

@@ -6,30 +6,28 @@
 namespace slabstream {
 
 Schedule MakeTree(const ScheduleRequest& request, std::uint32_t k, std::uint32_t strips) {
-  Schedule whole = {request.ranks, request.root, {}};
-  const std::uint64_t ranks = request.ranks;
-  // An interval is held by the root if that lies in it, else by its first rank.
-  const auto holder = [&](std::uint64_t begin, std::uint64_t end) {
-    return request.root >= begin && request.root < end ? request.root : Rank(begin);
-  };
+  Schedule whole = {request.ranks, {request.root}, {}};
+  std::vector<Rank> holders(request.ranks);  // of the intervals that have met so far, in order
+  for (Rank rank = 0; rank < request.ranks; ++rank) holders[rank] = rank;
   std::uint32_t first_round = 0;
-  for (std::uint64_t width = 1; width < ranks; width *= k) {
+  for (std::uint64_t place = request.root; holders.size() > 1; place /= k) {  // place: of the root's interval
     std::uint32_t next_round = first_round;
-    for (std::uint64_t begin = 0; begin < ranks; begin += k * width) {
-      std::vector<Rank> members;
-      for (std::uint64_t m = begin; m < std::min(begin + k * width, ranks); m += width)
-        members.push_back(holder(m, std::min(m + width, ranks)));
-      const auto to = std::uint32_t(std::ranges::find(members, holder(begin, std::min(begin + k * width, ranks))) - members.begin());
+    std::vector<Rank> met;
+    for (std::size_t begin = 0; begin < holders.size(); begin += k) {
+      const auto count = std::uint32_t(std::min<std::size_t>(k, holders.size() - begin));
+      const auto to = std::min(std::uint32_t(place % k), count - 1);
       std::uint32_t round = first_round;  // one for each image that is taken: a rank takes one whole image at a time
-      ForEachInsideOut(to, std::uint32_t(members.size()), [&](std::uint32_t from) {
-        whole.steps.push_back({round++, members[from], members[to], request.pixels});
+      ForEachInsideOut(to, count, [&](std::uint32_t from) {
+        whole.steps.push_back({round++, holders[begin + from], holders[begin + to], request.pixels});
       });
       next_round = std::max(next_round, round);
+      met.push_back(holders[begin + to]);
     }
+    holders = std::move(met);
     first_round = next_round;
   }
   std::ranges::stable_sort(whole.steps, {}, &Step::round);
-  return InStrips(std::move(whole), strips);
+  return InStrips(std::move(whole), strips, request.most_steps);
 }
 
 }  // namespace slabstream

@@ -100,6 +100,8 @@ struct FrameRequest {
   std::string level{kAutomatic};  // the number of a level, in [0, kMaxLevels); kAutomatic: as `detail` says
   Policy policy;
   bool previews = false;  // a picture after each group
+  // Pictures may come without depths, and in the codes that a PNG of 8 bits has (ColorCoding::kStraight8): a quarter of the bytes.
+  bool straight8 = false;
   friend bool operator==(const FrameRequest&, const FrameRequest&) = default;
 };
 

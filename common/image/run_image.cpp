@@ -12,6 +12,7 @@
 #include "common/image/finite.h"
 #include "common/image/image_view.h"
 #include "common/image/run_payload.h"
+#include "common/image/sample_codes.h"
 
 namespace slabstream {
 namespace {
@@ -42,6 +43,10 @@ class PayloadWriter {
     std::byte* const color = payload_ + layout_.rgba + 4 * BytesPerChannel(header_.color) * first;
     if (header_.color == ColorCoding::kFloat32) {
       std::memcpy(color, view.rgba + 4 * source, kRgbaBytes * count);
+      return true;
+    }
+    if (header_.color == ColorCoding::kStraight8) {
+      StraightCodes(view.rgba + 4 * source, count, reinterpret_cast<std::uint8_t*>(color));
       return true;
     }
     return ToCodes(header_.color, view.rgba + 4 * source, reinterpret_cast<std::uint16_t*>(color), 4 * count);
@@ -75,7 +80,13 @@ bool NoneAbove(std::uint16_t largest, std::span<const std::byte> codes) {
 
 // `colours`: bytes of some pixels.
 bool ColoursAreValid(ColorCoding color, std::span<const std::byte> colours) {
-  return color == ColorCoding::kFloat32 ? AllFinite(colours) : NoneAbove(LargestCode(color), colours);
+  switch (color) {
+    case ColorCoding::kFloat32: return AllFinite(colours);
+    case ColorCoding::kHalf:
+    case ColorCoding::kFixed16: return NoneAbove(LargestCode(color), colours);
+    case ColorCoding::kStraight8: return true;
+  }
+  return false;
 }
 
 // Finds the pixels of one row, [begin, end), that are not empty, as maximal spans: found(begin, end) for each. `plane` has a value each
@@ -189,10 +200,11 @@ RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t fram
   return EncodeRuns(ViewOf(image, range, frame_width));
 }
 
-RunImage EncodePicture(const LocalImage& image) {
+RunImage EncodePicture(const LocalImage& image, ColorCoding color) {
   ImageView view = ViewOf(image);
   if (HasVoxel(view.format)) view.format = PixelFormat::kRgbaDepth;
-  RunImage runs = EncodeRuns(view);
+  if (color == ColorCoding::kStraight8) view.format = PixelFormat::kRgba;
+  RunImage runs = EncodeRuns(view, color);
   CutBounds(runs);
   return runs;
 }
@@ -201,9 +213,9 @@ Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame)
   if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kSum) {
     return Invalid("format is {}, but must be 1 (rgba), 2 (depth), 3 (rgba and depth), 4 (maximum) or 5 (sum)", int(header.format));
   }
-  const bool coded = header.color == ColorCoding::kHalf || header.color == ColorCoding::kFixed16;
+  const bool coded = header.color >= ColorCoding::kHalf && header.color <= ColorCoding::kStraight8;
   if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
-    return Invalid("color is {}, but must be 1 (float32), or for colours alone 2 (half) or 3 (fixed16)", int(header.color));
+    return Invalid("color is {}, but must be 1 (float32), or for colours alone 2 (half), 3 (fixed16) or 4 (straight8)", int(header.color));
   }
   const PixelBounds& bounds = header.bounds;
   // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.

@@ -3,7 +3,7 @@
 // Runs are maximal spans of non-empty pixels within a row, in row-major order; the pixels of all runs follow each other without gaps.
 // Payload layout (little endian), also written down in docs/wire.md:
 //   run_count * { u32 row offset from bounds.y_begin, u32 column offset from bounds.x_begin, u32 pixel count }
-//   pixel_count * 4 * RGBA: f32, or as `color` says (u16)
+//   pixel_count * 4 * RGBA: f32, or as `color` says (u16 or u8)
 //   formats with depths: pixel_count * f32 depth
 //   formats with voxels: pixel_count * u32 voxel
 // Dense: run_count == 0 and pixel_count > 0; the payload has no runs, but all pixels of the bounds, row by row.
@@ -29,8 +29,9 @@ struct RunImage {
 // are encoded in parallel, within the caller's task arena.
 RunImage EncodeRuns(const LocalImage& image, PixelRange range, std::int32_t frame_width);
 
-// All pixels of a finished picture, for a client: without the voxel plane, and with bounds no larger than they must be.
-RunImage EncodePicture(const LocalImage& image);
+// All pixels of a finished picture, for a client: without the voxel plane, and with bounds no larger than they must be. `color`: kFloat32,
+// or kStraight8, which leaves the depths out, too.
+RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding::kFloat32);
 
 // Checks an image from outside and makes its dense form, in one pass over the payload. InvalidArgument unless header and payload agree,
 // runs ascend without touching, stay inside the bounds, and every colour and depth is finite. `frame` is the frame's whole rectangle. Rows

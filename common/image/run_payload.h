@@ -11,6 +11,7 @@
 #include <span>
 
 #include "common/image/run_image.h"
+#include "common/image/sample_codes.h"
 
 namespace slabstream {
 
@@ -69,6 +70,10 @@ class RunPayload {
     const std::byte* const source = rgba(first, count).data();
     if (color_ == ColorCoding::kFloat32) {
       std::memcpy(out, source, kRgbaBytes * count);
+      return;
+    }
+    if (color_ == ColorCoding::kStraight8) {
+      FromStraightCodes(reinterpret_cast<const std::uint8_t*>(source), count, out);
       return;
     }
     constexpr std::size_t kBatch = 4096;  // channels that are copied out at a time

@@ -229,16 +229,16 @@ HWY_INLINE void FetchNext(const LocalImage& frame, const Places& places) {
 template <bool affine>
 void ResampleRowsAs(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
                     LocalImage& picture) {
-  const std::int32_t width = picture.bounds.x_end;
+  const PixelBounds& to = picture.bounds;
   Places places;
   Spline along_x, along_y;
   // Works down columns of batches: neighbouring rows read the same lines of the frame, which leaves time to fetch the next column's.
-  for (std::int32_t x = 0; x < width; x += kBatch) {
-    const std::int32_t count = std::min(kBatch, width - x);
+  for (std::int32_t x = to.x_begin; x < to.x_end; x += kBatch) {
+    const std::int32_t count = std::min(kBatch, to.x_end - x);
     for (std::int32_t y = y_begin; y < y_end; ++y) {
       FindPlaces<affine>(frame_from_picture, frame.bounds, x, y, places);
       if (places.empty) continue;
-      float* out = &picture.rgba[4 * (std::size_t(y) * std::size_t(width) + std::size_t(x))];
+      float* out = &picture.rgba[4 * (std::size_t(y - to.y_begin) * std::size_t(to.width()) + std::size_t(x - to.x_begin))];
       if (places.narrow && places.inside) {
         FetchNext(frame, places);
         ResampleNarrow(frame, places, 0, count, out);

@@ -18,12 +18,16 @@ namespace slabstream {
 
 inline constexpr double kSkewSlack = 0.25;  // pixels
 
-// Fills the rows [y_begin, y_end) of `picture` (kRgba, bounds beginning at (0, 0)) from `frame` (kRgba). `frame_from_picture`: row-major
-// projective map, (X, Y, W) = map (x, y, 1); pixels with W <= 0 are empty. Any thread, disjoint rows.
+// Fills the rows [y_begin, y_end) of `picture` (kRgba), within its bounds, from `frame` (kRgba). `frame_from_picture`: row-major projective
+// map, (X, Y, W) = map (x, y, 1); pixels with W <= 0 are empty. What parts of a frame fill adds up to what the whole frame does. Any
+// thread, disjoint rows.
 using ProjectiveMap = std::array<double, 9>;
 void ResampleRows(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
                   LocalImage& picture);
 void ResampleRowsReference(const LocalImage& frame, const ProjectiveMap& frame_from_picture, std::int32_t y_begin, std::int32_t y_end,
                            LocalImage& picture);
+
+// Bounds of all pixels of a picture of width x height pixels that `frame` reaches, and some more.
+PixelBounds ReachedPixels(const PixelBounds& frame, const ProjectiveMap& frame_from_picture, std::int32_t width, std::int32_t height);
 
 }  // namespace slabstream

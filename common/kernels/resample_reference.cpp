@@ -20,7 +20,7 @@ void ResampleRowsReference(const LocalImage& frame, const ProjectiveMap& frame_f
   const PixelBounds& b = frame.bounds;
   const auto width = std::size_t(picture.bounds.width());
   for (std::int32_t y = y_begin; y < y_end; ++y) {
-    for (std::int32_t x = 0; x < picture.bounds.x_end; ++x) {
+    for (std::int32_t x = picture.bounds.x_begin; x < picture.bounds.x_end; ++x) {
       const ResamplePoint point = ResampleAt(frame_from_picture, x + 0.5, y + 0.5);
       if (!point.seen || !IsNear(point.x, point.y)) continue;
       const Reach columns(point.x, point.scale_x, b.x_begin, b.x_end), rows(point.y, point.scale_y, b.y_begin, b.y_end);
@@ -35,7 +35,7 @@ void ResampleRowsReference(const LocalImage& frame, const ProjectiveMap& frame_f
         }
       }
       const double weights = SplineSum(point.x, point.scale_x) * SplineSum(point.y, point.scale_y);
-      float* out = &picture.rgba[4 * (std::size_t(y) * width + std::size_t(x))];
+      float* out = &picture.rgba[4 * (std::size_t(y - picture.bounds.y_begin) * width + std::size_t(x - picture.bounds.x_begin))];
       for (std::size_t c = 0; c < 4; ++c) out[c] = float(sum[c] / weights);
     }
   }

@@ -1,6 +1,7 @@
 // Families of metrics that several processes of a service have, each under a name of its own. `name`, `help`: as in Exposition::Family.
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 
 #include "common/metrics/exposition.h"
@@ -11,5 +12,13 @@ namespace slabstream {
 
 void AddStageSeconds(Exposition& out, std::string_view name, std::string_view help, const StageTimes& times);    // by `stage`
 void AddRefused(Exposition& out, std::string_view name, std::string_view help, const RefusedRequests& refused);  // by `reason`
+
+// Of web servers that hold volumes.
+struct WebRequests {
+  std::uint64_t answered = 0, again = 0, failed = 0;  // again: after one that failed, tried once more; failed: given up
+  std::uint64_t bytes = 0;                            // that came
+};
+void AddWebRequests(Exposition& out, std::string_view requests_name, std::string_view bytes_name,
+                    const WebRequests& requests);  // by `result`
 
 }  // namespace slabstream

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -15,7 +17,7 @@ namespace slabstream {
 namespace {
 
 constexpr double kLasts = 2;                  // times as long as a layout has lasted it is taken to last
-constexpr double kLeastGain = 0.02;           // share of the frame's render time that a change must save; times 1 + 1/n after n frames
+constexpr double kLeastGain = 0.02;           // share of the frame's render time that a change must save, however certain it is
 constexpr double kLeastGainOfNewBoxes = 0.1;  // share of the frame's render time that new boxes must save beyond resized ones
 
 std::vector<double> SlotSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
@@ -40,6 +42,11 @@ std::vector<double> PredictedSeconds(const Layout& layout, const WorkField& cost
 double FrameSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
   const std::vector<double> sums = SlotSeconds(layout, slots, seconds);
   return *std::max_element(sums.begin(), sums.end());
+}
+
+double LostSeconds(const Layout& layout, std::uint32_t slots, std::span<const double> seconds) {
+  const std::vector<double> sums = SlotSeconds(layout, slots, seconds);
+  return *std::max_element(sums.begin(), sums.end()) - std::accumulate(sums.begin(), sums.end(), 0.0) / double(slots);
 }
 
 std::int64_t MovedVoxels(const Layout& from, const Layout& to) {
@@ -88,25 +95,47 @@ Layout CutByCost(const LayoutRequest& request, const Partition* resized) {
   return MakeLayout(cut);
 }
 
+double ChangeSeconds(const BalanceRequest& request, const Layout& to) {
+  const Layout& from = *request.now;
+  std::set<std::pair<std::uint32_t, Box>> present;
+  for (std::size_t box = 0; box < from.owners.size(); ++box) present.emplace(from.owners[box], from.partition.boxes()[box]);
+  std::vector<double> prepared(request.make->slots);  // voxels of new boxes
+  for (std::size_t box = 0; box < to.owners.size(); ++box) {
+    const Box& voxels = to.partition.boxes()[box];
+    if (to.owners[box] == kNoSlot || present.contains({to.owners[box], voxels})) continue;
+    prepared[to.owners[box]] += double(voxels.voxel_count());
+  }
+  const double by_rate = double(request.make->summary->types().bytes_per_voxel()) / calibration::service::kVoxelRate;
+  return double(MovedVoxels(from, to)) * request.move.fetch.value_or(by_rate) +
+         std::ranges::max(prepared) * request.move.prepare.value_or(0);
+}
+
 std::optional<Layout> Rebalance(const BalanceRequest& asked) {
+  if (!asked.noise) return std::nullopt;
   const Layout& now = *asked.now;
   const LayoutRequest& request = *asked.make;
   CHECK(request.known.cost != nullptr);
   CHECK_GE(asked.frames_seen, 1);
-  const double voxel_seconds = double(request.summary->types().bytes_per_voxel()) / calibration::service::kVoxelRate;
-  const double least_gain = kLeastGain * (1 + 1.0 / asked.frames_seen);
+  const double frames = std::min(asked.frames_seen, kMostFramesAveraged);
+  const double by_chance = *asked.noise * std::sqrt(2 * std::log(std::max(request.slots, 2U)) / frames);
+  const double least_gain = std::max(kLeastGain, by_chance);
+  const double busiest = FrameSeconds(now, request.slots, asked.seconds);
+  // No layout saves more than what is lost now.
+  if (LostSeconds(now, request.slots, asked.seconds) <= least_gain * busiest) return std::nullopt;
+
   std::optional<Layout> chosen;
   double most_won = 0;
   const auto weigh = [&](Layout candidate, double before, double after) {
-    const double won = kLasts * asked.frames_seen * (before - after) - double(MovedVoxels(now, candidate)) * voxel_seconds;
-    if (before - after <= least_gain * before || won <= most_won) return;
+    if (before - after <= least_gain * before) return;
+    const double won = kLasts * asked.frames_seen * (before - after) - ChangeSeconds(asked, candidate);
+    if (won <= most_won) return;
     most_won = won;
     chosen = std::move(candidate);
   };
 
   Layout reassigned = Reassign(now, request.slots, asked.seconds);
   const double after_reassigning = FrameSeconds(reassigned, request.slots, asked.seconds);
-  weigh(std::move(reassigned), FrameSeconds(now, request.slots, asked.seconds), after_reassigning);
+  weigh(std::move(reassigned), busiest, after_reassigning);
 
   const auto predicted = [&](const Layout& layout) {
     return FrameSeconds(layout, request.slots, PredictedSeconds(layout, *request.known.cost));

@@ -79,6 +79,20 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   return setup;
 }
 
+std::vector<WorkerId> DisplaysOf(const GroupPlan& group, WorkerId display) {
+  const std::vector<Rank>& roots = group.schedule.roots;
+  if (roots.size() == 1) return {display};
+  std::vector<WorkerId> displays;
+  for (const Rank root : roots) displays.push_back(group.placements[root].worker);
+  return displays;
+}
+
+std::optional<std::size_t> ShareOf(const GroupPlan& group, WorkerId display, WorkerId worker) {
+  const std::vector<WorkerId> displays = DisplaysOf(group, display);
+  const auto found = std::ranges::find(displays, worker);
+  return found == displays.end() ? std::nullopt : std::optional(std::size_t(found - displays.begin()));
+}
+
 std::vector<Placement> PlacementsOf(const FramePlan& plan) {
   std::vector<Placement> placements;
   for (const GroupPlan& group : plan.groups) placements.insert(placements.end(), group.placements.begin(), group.placements.end());
@@ -86,8 +100,9 @@ std::vector<Placement> PlacementsOf(const FramePlan& plan) {
 }
 
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
-                            const Turn& turn) {
+                            const Turn& turn, std::uint64_t share_pixels) {
   FramePlan plan;
+  plan.share_pixels = share_pixels;
   plan.turn = turn;
   plan.setup = std::move(setup);
   plan.layout = std::move(layout);

@@ -43,6 +43,11 @@ struct GroupPlan {
   friend bool operator==(const GroupPlan&, const GroupPlan&) = default;
 };
 
+// The workers where the group's image ends, by share. If the schedule has one root, `display` alone; it may hold no rank.
+std::vector<WorkerId> DisplaysOf(const GroupPlan& group, WorkerId display);
+// The share that `worker` gets; none: it gets none.
+std::optional<std::size_t> ShareOf(const GroupPlan& group, WorkerId display, WorkerId worker);
+
 // Frames take turns. If the workers are divided into teams (common/planning/team.h), a plan uses the workers of one team. The display
 // worker changes from frame to frame of a team, so that no worker makes all pictures.
 struct Turn {
@@ -61,7 +66,10 @@ struct FramePlan {
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
   Turn turn;
-  WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible
+  // Not 0: the client puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do
+  // if there is one group (SharesOf).
+  std::uint64_t share_pixels = 0;
+  WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible. In shares: the first one's
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
 
@@ -82,7 +90,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 // Pure. Unavailable: no worker in the roster. `layout` was made for the setup's volume and look and this policy, and for as many slots as
 // the roster has.
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
-                            const Turn& turn = {});
+                            const Turn& turn = {}, std::uint64_t share_pixels = 0);
 // Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
 // for a policy that leaves a choice.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,

@@ -7,7 +7,9 @@
 #include <set>
 
 #include "common/base/check.h"
+#include "common/combining/schemes.h"
 #include "common/combining/travel.h"
+#include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
 namespace {
@@ -61,7 +63,8 @@ ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
   if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
   const PixelRange frame = WholeFrame(plan.setup);
   Travel travel = TravelOf(DeriveSchedule(group.schedule, frame).value(), frame);
-  if (group.placements[group.schedule.root].worker != plan.display) travel = {travel.hops + 1, travel.transfers + 1};
+  if (DisplaysOf(group, plan.display).front() != group.placements[group.schedule.roots.front()].worker)
+    travel = {travel.hops + 1, travel.transfers + 1};
   ColorCoding best = ColorCoding::kFloat32;
   double least = plan.pixel_error;
   for (const ColorCoding coding : {ColorCoding::kHalf, ColorCoding::kFixed16}) {
@@ -78,6 +81,28 @@ ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
 Rank RootOf(const GroupPlan& group, WorkerId display) {
   const auto root = std::find_if(group.placements.begin(), group.placements.end(), [&](const Placement& p) { return p.worker == display; });
   return root == group.placements.end() ? 0 : Rank(root - group.placements.begin());
+}
+
+std::vector<Rank> SharesOf(const FramePlan& plan) {
+  const GroupPlan& group = plan.groups.front();
+  const RendererKind& renderer = *plan.setup.renderer;
+  const std::vector<Rank> one = {RootOf(group, plan.display)};
+  if (plan.share_pixels == 0 || group.placements.empty() || !renderer.FinishesInShares(plan.setup)) return one;
+  const bool pays = !renderer.FrameIsPicture(plan.setup) || ParseCombining(plan.combine).value().scheme->divides();
+  if (!pays) return one;
+  std::vector<Rank> candidates;  // the first of each worker
+  std::set<WorkerId> workers;
+  for (Rank rank = 0; rank < group.placements.size(); ++rank) {
+    if (workers.insert(group.placements[rank].worker).second) candidates.push_back(rank);
+  }
+  const std::uint64_t shares = std::min<std::uint64_t>(
+      {candidates.size(), kMaxShares, kMaxSteps / group.placements.size(), WholeFrame(plan.setup).end / plan.share_pixels});
+  if (shares < 2) return one;
+  std::vector<Rank> roots;
+  for (std::uint64_t share = 0; share < shares; ++share) {
+    roots.push_back(candidates[(plan.turn.number + share * candidates.size() / shares) % candidates.size()]);
+  }
+  return roots;
 }
 
 Roster RosterOf(std::uint32_t workers) {
@@ -127,7 +152,10 @@ Status AssignWorkers(const Roster& roster, FramePlan& plan, const SetApart& apar
   if (!Contains(roster, plan.display)) plan.display = ChooseDisplay(plan, present);
 
   for (GroupPlan& group : plan.groups) {
-    group.schedule = {plan.combine, Rank(group.placements.size()), RootOf(group, plan.display)};
+    const bool may_divide = plan.groups.size() == 1 && apart.boxes.empty();
+    group.schedule = {plan.combine, Rank(group.placements.size()),
+                      may_divide ? SharesOf(plan) : std::vector<Rank>{RootOf(group, plan.display)}};
+    if (group.schedule.roots.size() > 1) plan.display = group.placements[group.schedule.roots.front()].worker;
     group.color = ChooseColor(plan, group);
   }
   return Status::Ok();

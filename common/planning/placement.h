@@ -38,4 +38,12 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool 
 // The rank where the group's image should end: the display worker's, so that it need not travel; 0 if it has none.
 Rank RootOf(const GroupPlan& group, WorkerId display);
 
+// FramePlan::share_pixels of a service: smaller shares cost more in messages than they save (docs/time-dilated-cluster.md).
+inline constexpr std::uint64_t kSharePixels = 65536;
+
+// Where the shares of a frame of one group should end: at most one rank of each worker, and if there are fewer shares than workers, other
+// ones from turn to turn. One root: it is not divided, since that would not pay: it pays if the workers divide the picture anyway
+// (CombiningEntry::divides) or if there is work to be done after combining (RendererKind::Finish).
+std::vector<Rank> SharesOf(const FramePlan& plan);
+
 }  // namespace slabstream

@@ -31,11 +31,12 @@ double PixelsPerVoxel(const FrameSetup& setup) {
 }
 
 LocalImage ResamplePicture(const LocalImage& frame, const FrameSetup& setup) {
-  LocalImage picture = MakeUnwrittenImage(frame.format, {0, 0, setup.camera.width, setup.camera.height});
+  const PixelBounds reached = ReachedPixels(frame.bounds, setup.sheets.from_picture, setup.camera.width, setup.camera.height);
+  LocalImage picture = MakeUnwrittenImage(frame.format, reached);
   constexpr std::int32_t kRows = 16;
-  tbb::parallel_for(tbb::blocked_range<std::int32_t>(0, setup.camera.height, kRows), [&](const auto& rows) {
-    const std::size_t row_floats = 4 * std::size_t(setup.camera.width);
-    std::fill_n(picture.rgba.data() + std::size_t(rows.begin()) * row_floats, rows.size() * row_floats, 0.0F);
+  tbb::parallel_for(tbb::blocked_range<std::int32_t>(reached.y_begin, reached.y_end, kRows), [&](const auto& rows) {
+    const std::size_t row_floats = 4 * std::size_t(reached.width());
+    std::fill_n(picture.rgba.data() + std::size_t(rows.begin() - reached.y_begin) * row_floats, rows.size() * row_floats, 0.0F);
     ResampleRows(frame, setup.sheets.from_picture, rows.begin(), rows.end(), picture);
   });
   return picture;

@@ -135,11 +135,14 @@ class RendererKind {
 
   virtual std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const = 0;
 
-  // Makes the picture from the whole accumulated frame, which stores all its pixels. Bounds of the result are in pixels of the picture.
+  // Makes the picture from the accumulated frame or a share of it, which stores all its pixels. Bounds of the result are in pixels of the
+  // picture.
   // Runs within the caller's task arena. The default resamples a frame along slices, and averages supersampled pixels.
   virtual LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const;
   // Whether Finish would only copy the frame.
   virtual bool FrameIsPicture(const FrameSetup& setup) const;
+  // Whether the pictures that Finish makes of parts of a frame add up to that of the whole one.
+  bool FinishesInShares(const FrameSetup& setup) const { return FrameIsPicture(setup) || setup.format == PixelFormat::kRgba; }
 
  private:
   const Facts facts_;

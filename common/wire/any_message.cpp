@@ -62,8 +62,13 @@ Status Parse(std::span<const std::byte> header, Envelope& envelope) {
   return Status::Ok();
 }
 
-std::size_t PayloadBytesOf(const FrameImage& message) { return message.direct ? 0 : message.runs.encoded_bytes; }
-std::size_t PayloadBytesOf(const FrameReply& message) { return message.direct ? 0 : message.runs.encoded_bytes; }
+std::size_t PayloadBytesOf(const PictureShare& share) { return share.direct ? 0 : share.runs.encoded_bytes; }
+std::size_t PayloadBytesOf(const FrameImage& message) { return PayloadBytesOf(message.picture); }
+std::size_t PayloadBytesOf(const FrameReply& message) {
+  std::size_t bytes = 0;
+  for (const PictureShare& share : message.shares) bytes += PayloadBytesOf(share);
+  return bytes;
+}
 std::size_t PayloadBytesOf(const SentPicture& message) { return message.bytes; }
 std::size_t PayloadBytesOf(const PartialImage& message) {
   if (message.shared) return sizeof(ColumnSpan) * message.shared->rows();

@@ -106,13 +106,18 @@ void Fields(auto& io, Is<FrameReply> auto& m) {
   io.Message("size", m.size, &P::size, &P::mutable_size);
   io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, 1, kMaxGroups);
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
-  io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
+  io.Messages("shares", m.shares, &P::shares, &P::mutable_shares, kMaxShares);
   io.Message("statistics", m.statistics, &P::statistics, &P::mutable_statistics);
   io.Message("geometry", m.geometry, &P::geometry, &P::mutable_geometry);
-  io.Any(m.direct, &P::direct, &P::set_direct);
   io.Check([&](Checker& check) {
     const PixelBounds picture = {0, 0, m.size.width, m.size.height};
-    check.That(picture.Contains(m.runs.image.bounds), "runs.image.bounds", "not inside the picture");
+    check.That(!m.shares.empty(), "shares", "none");
+    for (std::size_t i = 0; i < m.shares.size(); ++i) {
+      const auto share = check.In("shares", i);
+      const RunImageHeader& image = m.shares[i].runs.image;
+      check.That(picture.Contains(image.bounds), "runs.image.bounds", "not inside the picture");
+      check.That(image.format == m.shares.front().runs.image.format, "runs.image.format", "not that of the first share");
+    }
     if (m.groups_done == m.group_count) check.Adopt(RequireRenderer(m.statistics.renderer).status());
   });
 }

@@ -91,14 +91,13 @@ struct FrameStatistics {
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
-struct FrameReply {  // payload: the runs, unless `direct`
+struct FrameReply {  // payload: the runs of the shares that are not direct, one after the other
   RequestId request = 0;
   ImageSize size;                                  // of the whole picture
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final
-  EncodedRuns runs;
-  FrameStatistics statistics;  // final only
+  std::vector<PictureShare> shares;                // from 1 to kMaxShares; those that are direct may have come before this
+  FrameStatistics statistics;                      // final only
   PictureGeometry geometry;
-  bool direct = false;  // the payload comes straight from the display worker (SentPicture), perhaps before this
   friend bool operator==(const FrameReply&, const FrameReply&) = default;
 };
 

@@ -118,6 +118,16 @@ inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker&
   if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
 }
 
+// The shares of a frame of several groups would have to be accumulated.
+inline void CheckShares(const GroupAssignment& m, Checker& check) {
+  if (m.group.schedule.roots.size() == 1 || !check.ok()) return;
+  const auto scope = check.In("group.schedule.roots");
+  check.That(m.group_count == 1 && !m.previews, "", "several, in a frame of several groups or with previews");
+  std::vector<WorkerId> displays = DisplaysOf(m.group, m.display);
+  std::ranges::sort(displays);
+  check.That(std::ranges::adjacent_find(displays) == displays.end(), "", "several ranks of a worker");
+}
+
 v1::GroupAssignment ProtoOf(const GroupAssignment&);
 void Fields(auto& io, Is<GroupAssignment> auto& m) {
   using P = v1::GroupAssignment;
@@ -127,6 +137,7 @@ void Fields(auto& io, Is<GroupAssignment> auto& m) {
   io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, m.key.group + 1, kMaxGroups);
   io.Range("first_group", m.first_group, &P::first_group, &P::set_first_group, 0, m.key.group);
   io.Any(m.previews, &P::previews, &P::set_previews);
+  io.Any(m.straight8, &P::straight8, &P::set_straight8);
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.key.group);
   io.Any(m.client, &P::client, &P::set_client);
   io.Range("display", m.display, &P::display, &P::set_display, 1, kMaxWorkerId);
@@ -140,6 +151,7 @@ void Fields(auto& io, Is<GroupAssignment> auto& m) {
     CheckPeers(m, check);
     CheckHidden(m, check);
     CheckGroup(m.group, m.setup, check);
+    CheckShares(m, check);
   });
 }
 
@@ -162,9 +174,10 @@ void Fields(auto& io, Is<FrameImage> auto& m) {
   io.Any(m.attempt, &P::attempt, &P::set_attempt);
   io.Range("group_count", m.group_count, &P::group_count, &P::set_group_count, 1, kMaxGroups);
   io.Range("groups_done", m.groups_done, &P::groups_done, &P::set_groups_done, 0, m.group_count);
-  io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
+  io.Message("picture", m.picture, &P::picture, &P::mutable_picture);
   io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
-  io.Any(m.direct, &P::direct, &P::set_direct);
+  io.Range("share_count", m.share_count, &P::share_count, &P::set_share_count, 1, kMaxShares);
+  io.Range("share", m.share, &P::share, &P::set_share, 0, m.share_count - 1);
 }
 
 v1::WorkerTrouble ProtoOf(const WorkerTrouble&);

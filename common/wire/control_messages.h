@@ -103,9 +103,10 @@ struct GroupAssignment {
   std::uint32_t group_count = 1;  // [1, kMaxGroups]
   std::uint32_t first_group = 0;  // of this attempt: earlier groups are already accumulated by `display`
   bool previews = false;
+  bool straight8 = false;  // as in FrameRequest
   WorkerId display = 0;
   FrameSetup setup;
-  GroupPlan group;
+  GroupPlan group;                               // with several roots: the only one of its frame
   std::vector<Peer> peers;                       // every worker of the group, and the display worker
   OcclusionMask hidden;                          // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
   std::uint32_t groups_done = 0;                 // of the frame, at most key.group: accumulated, so images lent for them have been read
@@ -134,6 +135,14 @@ struct EncodedRuns {
   friend bool operator==(const EncodedRuns&, const EncodedRuns&) = default;
 };
 
+// A share of a picture, or the whole of it. All shares add up to the picture: where two of them have a pixel, each has a part of its
+// colour.
+struct PictureShare {
+  EncodedRuns runs;
+  bool direct = false;  // the payload went straight to the client (SentPicture)
+  friend bool operator==(const PictureShare&, const PictureShare&) = default;
+};
+
 // Final pixels (supersampling resolved), premultiplied; payload: the runs, unless they went straight to the client.
 struct FrameImage {
   Epoch epoch = 0;
@@ -141,9 +150,9 @@ struct FrameImage {
   FrameId frame = 0;
   std::uint32_t attempt = 0;
   std::uint32_t groups_done = 0, group_count = 1;  // equal: the finished frame
-  EncodedRuns runs;
-  std::vector<RankReport> reports;  // resolve and encode times of the display worker; at most kMaxReports
-  bool direct = false;              // the payload went straight to the client (SentPicture)
+  PictureShare picture;
+  std::vector<RankReport> reports;           // resolve and encode times of the display worker; at most kMaxReports
+  std::uint32_t share = 0, share_count = 1;  // [1, kMaxShares]
   friend bool operator==(const FrameImage&, const FrameImage&) = default;
 };
 

@@ -296,7 +296,7 @@ void Fields(auto& io, Is<ScheduleName> auto& m) {
   using P = v1::ScheduleName;
   io.Text("scheme", m.scheme, &P::scheme, &P::mutable_scheme, 0, kMaxNameBytes);
   io.Range("ranks", m.ranks, &P::ranks, &P::set_ranks, 0, kMaxRanks);
-  io.Any(m.root, &P::root, &P::set_root);
+  io.Numbers("roots", m.roots, &P::roots, &P::mutable_roots, kMaxShares);
 }
 
 void Fields(auto& io, Is<GroupPlan> auto& m) {

@@ -233,6 +233,7 @@ void Fields(auto& io, Is<FrameRequest> auto& m) {
   io.Optional("overlay", m.overlay, &P::has_overlay, &P::overlay, &P::mutable_overlay);
   io.Message("policy", m.policy, &P::policy, &P::mutable_policy);
   io.Any("previews", m.previews, &P::previews, &P::set_previews);
+  io.Any("straight8", m.straight8, &P::straight8, &P::set_straight8);
 }
 
 // What a client left out has its standard value.

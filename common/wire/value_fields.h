@@ -170,7 +170,7 @@ void Fields(auto& io, Is<GroupKey> auto& m) {
 void Fields(auto& io, Is<RunImageHeader> auto& m) {
   using P = v1::RunImageHeader;
   io.OneOf("format", m.format, &P::format, &P::set_format, PixelFormat::kRgba, PixelFormat::kSum);
-  io.OneOf("color", m.color, &P::color, &P::set_color, ColorCoding::kFloat32, ColorCoding::kFixed16);
+  io.OneOf("color", m.color, &P::color, &P::set_color, ColorCoding::kFloat32, ColorCoding::kStraight8);
   io.Message("bounds", m.bounds, &P::bounds, &P::mutable_bounds);
   // At most kMaxFramePixels pixels and 2^32 runs: the payload's length cannot overflow.
   const auto pixels = static_cast<std::uint64_t>(m.bounds.pixel_count());
@@ -193,9 +193,16 @@ void Fields(auto& io, Is<EncodedRuns> auto& m) {
   io.Range("encoded_bytes", m.encoded_bytes, &P::encoded_bytes, &P::set_encoded_bytes, m.codec == Codec::kRaw ? raw_bytes : 1, raw_bytes);
   io.Any(m.digest, &P::digest, &P::set_digest);
   io.Check([&](Checker& check) {
-    check.That(m.image.color == ColorCoding::kFloat32, "image.color", "not floats, to a client");
+    check.That(m.image.color == ColorCoding::kFloat32 || m.image.color == ColorCoding::kStraight8, "image.color",
+               "of 16 bits, to a client");
     check.That(!IsDense(m.image), "image.run_count", "0, of a picture with pixels");
   });
+}
+
+void Fields(auto& io, Is<PictureShare> auto& m) {
+  using P = v1::PictureShare;
+  io.Message("runs", m.runs, &P::runs, &P::mutable_runs);
+  io.Any(m.direct, &P::direct, &P::set_direct);
 }
 
 inline void Write(const OcclusionMask& in, v1::OcclusionMask& out) {

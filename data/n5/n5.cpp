@@ -17,7 +17,9 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<Pyramid> pyramid = OpenPyramid(FolderStore(path), options, context);
+  const Result<std::shared_ptr<Store>> store = OpenStore(path);
+  if (!store.ok()) return store.status();
+  Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
   return MakeChunkedSource(path, *std::move(pyramid), context);
 }
@@ -25,6 +27,9 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 }  // namespace
 }  // namespace n5
 
-SourceFormat N5() { return {.name = "N5", .recognises = n5::Recognises, .options = {"time", "channel", "array"}, .open = n5::Open}; }
+SourceFormat N5() {
+  return {
+      .name = "N5", .recognises = n5::Recognises, .options = {"time", "channel", "array"}, .markers = {n5::kAttributes}, .open = n5::Open};
+}
 
 }  // namespace slabstream

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/log.h"
+#include "common/base/url.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
 #include "data/positional/slice_stream.h"
@@ -54,7 +55,7 @@ void WarnOfChannel(const std::string& path, const ReadOptions& options, const Vo
 }
 
 bool IsReadWhole(const std::string& path, const ReadOptions& options) {
-  return FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr;
+  return !IsUrl(path) && (FindFormat(path, options) != nullptr || FindSourceFormat(path, options) == nullptr);
 }
 
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
@@ -82,7 +83,7 @@ Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, 
       if (!stream.ok()) return stream.status();
       return (*stream)->info().files;
     }
-    if (FindSourceFormat(path, options) == nullptr) return files;
+    if (!IsReadInParts(path, options)) return files;
   }
   const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
   if (!source.ok()) return source.status();

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/url.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/n5/n5.h"
+#include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
 #include "data/positional/positional_source.h"
 #include "data/precomputed/precomputed.h"
@@ -23,17 +25,25 @@ const SourceFormat* FindSourceFormat(const std::string& path, const ReadOptions&
   return found == SourceFormats().end() ? nullptr : &*found;
 }
 
+bool IsReadInParts(const std::string& path, const ReadOptions& options) {
+  return IsUrl(path) || FindSourceFormat(path, options) != nullptr;
+}
+
 Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const ReadOptions& options, const SourceContext& context) {
+  const bool remote = IsUrl(path);
   std::error_code error;
-  if (!std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
-  const SourceFormat* const format = FindSourceFormat(path, options);
+  if (!remote && !std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
+  const Result<RemoteFormat> there = remote ? FindRemoteFormat(path, SourceFormats()) : RemoteFormat{FindSourceFormat(path, options)};
+  if (!there.ok()) return there.status();
+  const SourceFormat* const format = there->format;
   if (format == nullptr) return Status::InvalidArgument(path + ": is no volume that can be read in parts");
   for (const ReadOption& option : ReadOptionList()) {
     if (option.given(options) && std::ranges::find(format->options, option.name) == format->options.end()) {
       return Status::InvalidArgument(path + ": " + std::string(format->name) + " takes no option " + std::string(option.name));
     }
   }
-  return OpenUnchanged(path, [&] { return format->open(path, options, context); });
+  const auto open = [&] { return format->open(path, options, context); };
+  return remote ? OpenRemote(there->version, open) : OpenUnchanged(path, open);
 }
 
 }  // namespace slabstream

@@ -23,7 +23,9 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<Pyramid> pyramid = OpenPyramid(FolderStore(path), options, context);
+  const Result<std::shared_ptr<Store>> store = OpenStore(path);
+  if (!store.ok()) return store.status();
+  Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
   return MakeChunkedSource(path, *std::move(pyramid), context);
 }
@@ -32,7 +34,11 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 }  // namespace precomputed
 
 SourceFormat Precomputed() {
-  return {.name = "Neuroglancer precomputed", .recognises = precomputed::Recognises, .options = {"channel"}, .open = precomputed::Open};
+  return {.name = "Neuroglancer precomputed",
+          .recognises = precomputed::Recognises,
+          .options = {"channel"},
+          .markers = {precomputed::kInfo},
+          .open = precomputed::Open};
 }
 
 }  // namespace slabstream

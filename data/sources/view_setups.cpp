@@ -9,6 +9,7 @@
 
 #include "common/base/files.h"
 #include "common/base/parse_number.h"
+#include "common/base/trimmed.h"
 #include "data/volume_io/length_names.h"
 #include "data/volume_io/xml_events.h"
 
@@ -16,12 +17,6 @@ namespace slabstream {
 namespace {
 
 constexpr std::size_t kMostXmlBytes = std::size_t{64} << 20, kMostSetups = 65536;
-
-std::string_view Trimmed(std::string_view text) {
-  constexpr std::string_view kSpace = " \t\r\n";
-  const std::size_t begin = text.find_first_not_of(kSpace);
-  return begin == std::string_view::npos ? "" : text.substr(begin, text.find_last_not_of(kSpace) + 1 - begin);
-}
 
 // "0.4 0.4 2.0"
 std::optional<Vec3> Spacing(std::string_view text) {

@@ -4,6 +4,9 @@
 #include <future>
 #include <utility>
 
+#include "common/base/url.h"
+#include "data/stores/http_transfers.h"
+
 namespace slabstream {
 
 Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) {
@@ -14,6 +17,7 @@ Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) 
 }
 
 Result<std::shared_ptr<Store>> OpenStore(const std::string& path) {
+  if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess());
   std::error_code error;
   const std::filesystem::file_status about = std::filesystem::status(path, error);
   if (!std::filesystem::exists(about)) return Status::NotFound(path + ": does not exist");

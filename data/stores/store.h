@@ -39,8 +39,8 @@ class Store {
   // ResourceExhausted: more than `most` bytes; nothing is read then.
   virtual void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) = 0;
 
-  // Names of what lies in a folder of the store ("" is the store itself), sorted; those of folders end in "/". Waits. Unimplemented: the
-  // store cannot list.
+  // Names of what lies in a folder of the store ("" is the store itself), sorted; those of folders end in "/". Waits. InvalidArgument:
+  // the store cannot list.
   virtual Result<std::vector<std::string>> List(const std::string& folder) = 0;
 
   // For messages: "/data/scan.ome.zarr". With a key behind it it names an object.
@@ -56,10 +56,15 @@ Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most =
 std::shared_ptr<Store> FolderStore(const std::string& path);
 // The objects in a zip archive that are stored or deflated. Reads its directory. NotFound, InvalidArgument, DataLoss, ResourceExhausted.
 Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
+class HttpTransfers;
+// The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
+// by `transfers`. Asks for nothing yet. It does not list. InvalidArgument: another address, or one with a name, a password, a query or a
+// fragment; as FindS3Place.
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers);
 // One file: its only object has the key "file". Does not check that it exists.
 std::shared_ptr<Store> FileStore(const std::string& path);
 
-// Folder, zip archive (.zip, .ozx) or file. NotFound: there is nothing. Errors of ZipStore.
+// An address (IsUrl), folder, zip archive (.zip, .ozx) or file. NotFound: there is nothing. Errors of HttpStore and ZipStore.
 Result<std::shared_ptr<Store>> OpenStore(const std::string& path);
 
 }  // namespace slabstream

@@ -17,6 +17,7 @@
 
 #include "common/base/cache_folder.h"
 #include "common/base/files.h"
+#include "common/base/url.h"
 
 namespace slabstream {
 namespace {
@@ -81,9 +82,12 @@ std::uint64_t MostBytes(const SourceInfo& source, const std::string& name) {
 Result<IndexFile> IndexFile::Of(const std::string& path, std::string_view options) {
   const Result<std::string> cache = CacheFolder();
   if (!cache.ok()) return cache.status();
-  std::error_code error;
-  fs::path place = fs::weakly_canonical(path, error);
-  if (error) place = fs::absolute(path, error);
+  fs::path place = path;
+  if (!IsUrl(path)) {
+    std::error_code error;
+    place = fs::weakly_canonical(path, error);
+    if (error) place = fs::absolute(path, error);
+  }
   std::string text = place.string() + std::string(options);
   std::string file = fmt::format("{}/index/{:016x}.index", *cache, XXH3_64bits(text.data(), text.size()));
   return IndexFile(std::move(file), std::move(text));

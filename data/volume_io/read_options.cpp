@@ -8,6 +8,7 @@
 
 #include "common/base/find_named.h"
 #include "common/base/parse_number.h"
+#include "common/base/url.h"
 #include "common/mesh/lattice.h"
 
 namespace slabstream {
@@ -100,15 +101,6 @@ Status SetDataset(ReadOptions& options, std::string_view option, std::string_vie
   return Status::Ok();
 }
 
-// Where the options of `source` begin, behind the question mark; npos: it has none.
-std::size_t OptionsBegin(const std::string& source) {
-  const std::size_t mark = source.rfind('?');
-  std::error_code error;
-  const bool has_options =
-      mark != std::string::npos && source.find('=', mark) != std::string::npos && !std::filesystem::exists(source, error);
-  return has_options ? mark + 1 : std::string::npos;
-}
-
 // The end of the option that begins at `begin`: a comma with a name and = behind it, since values may hold commas too.
 std::size_t OptionEnd(const std::string& source, std::size_t begin) {
   const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; };
@@ -118,6 +110,19 @@ std::size_t OptionEnd(const std::string& source, std::size_t begin) {
     if (behind > comma + 1 && behind < source.size() && source[behind] == '=') return comma;
   }
   return source.size();
+}
+
+// Where the options of `source` begin, behind the question mark; npos: it has none.
+std::size_t OptionsBegin(const std::string& source) {
+  const std::size_t mark = source.rfind('?');
+  std::error_code error;
+  const bool has_options =
+      mark != std::string::npos && source.find('=', mark) != std::string::npos && !std::filesystem::exists(source, error);
+  if (!has_options) return std::string::npos;
+  // The endpoint of a bucket (data/stores/s3.h) is part of its address.
+  if (!source.starts_with(kBucketScheme) || source.compare(mark, kEndpointMark.size(), kEndpointMark) != 0) return mark + 1;
+  const std::size_t end = OptionEnd(source, mark + 1);
+  return end < source.size() ? end + 1 : std::string::npos;
 }
 
 template <auto kMember>
@@ -198,8 +203,14 @@ Result<SourceText> ParseSourceText(const std::string& text) {
   return source;
 }
 
+bool MayBeThere(const SourceText& source) {
+  std::error_code error;
+  return IsUrl(source.path) || std::filesystem::exists(source.path, error);
+}
+
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value) {
-  return fmt::format("{}{}{}={}", source, OptionsBegin(source) == std::string::npos ? '?' : ',', name, value);
+  const bool has_some = OptionsBegin(source) != std::string::npos || source.find(kEndpointMark) != std::string::npos;
+  return fmt::format("{}{}{}={}", source, has_some ? ',' : '?', name, value);
 }
 
 std::string AtTime(const std::string& source, int time) {

@@ -74,6 +74,9 @@ struct SourceText {
 // InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take.
 Result<SourceText> ParseSourceText(const std::string& text);
 
+// Whether something is at its path. What an address holds is not known before it is asked: true.
+bool MayBeThere(const SourceText& source);
+
 // The source with one more option.
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
 // The source at one time; times that it names are replaced. `source` is right (ParseSourceText).

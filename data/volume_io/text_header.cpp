@@ -9,17 +9,12 @@
 #include <sstream>
 
 #include "common/base/parse_number.h"
+#include "common/base/trimmed.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::size_t kMaxHeader = std::size_t{1} << 20;  // bytes
-
-std::string Trimmed(const std::string& text) {
-  constexpr const char* kBlanks = " \t\r\n";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  return begin == std::string::npos ? "" : text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
 
 Result<TextHeader> ReadTextHeader(const std::string& path, const TextFormat& format) {
   std::ifstream file(path, std::ios::binary);
@@ -36,14 +31,14 @@ Result<TextHeader> ReadTextHeader(const std::string& path, const TextFormat& for
     if (newline == std::string::npos && text.size() == kMaxHeader) {
       return header.Refused(fmt::format("the header is longer than {} bytes", kMaxHeader));
     }
-    const std::string line = Trimmed(text.substr(begin, newline - begin));
+    const std::string line(Trimmed(text.substr(begin, newline - begin)));
     begin = newline == std::string::npos ? text.size() : newline + 1;
     if (header.end == 0) header.first_line = line;
     header.end = std::int64_t(begin);
     if (line.empty()) break;
     const std::size_t at = line.find(format.separator);
     if (line.front() == '#' || at == std::string::npos) continue;
-    const std::string written = Trimmed(line.substr(0, at)), key = format.ignores_case ? ToLower(written) : written;
+    const std::string written(Trimmed(line.substr(0, at))), key = format.ignores_case ? ToLower(written) : written;
     header.fields.emplace(key, Trimmed(line.substr(at + 1)));
     if (key == format.last_key) break;
   }

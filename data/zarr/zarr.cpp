@@ -37,7 +37,11 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 }  // namespace zarr
 
 SourceFormat Zarr() {
-  return {.name = "Zarr", .recognises = zarr::Recognises, .options = {"time", "channel", "spacing", "array"}, .open = zarr::Open};
+  return {.name = "Zarr",
+          .recognises = zarr::Recognises,
+          .options = {"time", "channel", "spacing", "array"},
+          .markers = {zarr::kNode3, zarr::kArray2, zarr::kGroup2, zarr::kAttributes2},
+          .open = zarr::Open};
 }
 
 }  // namespace slabstream

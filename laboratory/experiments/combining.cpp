@@ -55,7 +55,7 @@ std::vector<PixelBounds> FilledParts(const Combining& c, std::uint64_t seed) {
   return parts;
 }
 
-ScheduleName ScheduleOf(const Combining& c) { return {c.scheme, Rank(c.ranks), 0}; }
+ScheduleName ScheduleOf(const Combining& c) { return {c.scheme, Rank(c.ranks), {0}}; }
 
 // Fills `part` of an image that has room for the whole frame, and empties the rest.
 void Fill(LocalImage& image, const PixelBounds& part) {

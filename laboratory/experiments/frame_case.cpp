@@ -75,6 +75,7 @@ FrameRequest RequestOf(const FrameCase& frame) {
   request.view = usual.view;
   request.size = usual.size;
   request.policy = frame.policy;
+  request.straight8 = true;
   return request;
 }
 
@@ -353,10 +354,12 @@ void FillImages(MeasuredFrame& frame) {
 
 Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
   const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
-  std::vector<FramePlan> plans;  // the distinct plans
+  FramePlan plan = frame.plan;
+  if (machine.picture.direct && in_flight == 1) plan.share_pixels = kSharePixels;  // as a coordinator: frames that come one by one
+  std::vector<FramePlan> plans;                                                    // the distinct plans
   for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
-    plans.push_back(TakeTurn(frame.plan, team.roster, team.turn));
+    plans.push_back(TakeTurn(plan, team.roster, team.turn));
   }
   std::vector<FrameInput> inputs(std::size_t(frames), frame.Input());
   for (std::size_t i = 0; i < inputs.size(); ++i) inputs[i].plan = &plans[i % plans.size()];

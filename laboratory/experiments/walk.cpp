@@ -74,7 +74,12 @@ double SlownessOf(const Walk& walk, const WalkStep& step, const Placement& place
   return slow ? kSlowdown : 1;
 }
 
-// Calls `visit` for each step. It tells the lasting render times of the boxes, by placement, on workers of one speed.
+// Render times of the boxes of a step, by placement, on workers of one speed: of this frame, and lasting.
+struct StepTimes {
+  std::vector<double> first, lasting;
+};
+
+// Calls `visit` for each step. It tells the times.
 template <class Visit>
 void Follow(ExperimentContext& context, const Walk& walk, const Visit& visit) {
   MeasuredLayouts layouts(walk.frame.workers);
@@ -95,12 +100,14 @@ void Follow(ExperimentContext& context, const Walk& walk, const Visit& visit) {
       step.changed.push_back(all || !drawn.contains({placement.worker, placement.box}));
       now.emplace(placement.worker, placement.box);
     }
-    const std::vector<double> lasting = visit(std::as_const(step));
-    std::vector<std::int64_t> nanoseconds;
-    for (std::size_t i = 0; i < lasting.size(); ++i) {
-      nanoseconds.push_back(std::int64_t(lasting[i] * SlownessOf(walk, step, step.placements[i]) * 1e9));
+    const StepTimes times = visit(std::as_const(step));
+    std::vector<std::int64_t> lasting, prepare;
+    for (std::size_t i = 0; i < step.placements.size(); ++i) {
+      const double per_second = SlownessOf(walk, step, step.placements[i]) * 1e9;
+      lasting.push_back(std::int64_t(times.lasting[i] * per_second));
+      prepare.push_back(std::int64_t(std::max(0.0, times.first[i] - times.lasting[i]) * per_second));
     }
-    layouts.Learn(step.plan, nanoseconds);
+    layouts.Learn(step.plan, lasting, prepare);
     drawn = std::move(now);
     before = step.plan.layout;
     look_before = look;
@@ -125,10 +132,11 @@ Json MeasureWalk(ExperimentContext& context, const Walk& walk) {
       worker = std::make_unique<LabWorker>(*volume);
     }
     const std::vector<BoxCost> costs = MeasureNextFrame(*worker, step.plan, step.changed);
-    Json numbers = {{"seconds", SecondsOf(costs, &BoxCost::first_seconds)}, {"lasting", SecondsOf(costs, &BoxCost::seconds)}};
+    StepTimes times{SecondsOf(costs, &BoxCost::first_seconds), SecondsOf(costs, &BoxCost::seconds)};
+    Json numbers = {{"seconds", times.first}, {"lasting", times.lasting}};
     if (IsSampled(step.number)) numbers["boxes"] = NumbersOf(costs, step.plan);
     steps.push_back(std::move(numbers));
-    return SecondsOf(costs, &BoxCost::seconds);
+    return times;
   });
   return Json{{"steps", std::move(steps)}};
 }
@@ -190,7 +198,7 @@ std::vector<std::vector<WalkFrame>> RecallWalk(ExperimentContext& context, const
           box.fetched_bytes = step.fetched_bytes[i];
         }
       }
-      return numbers.at("lasting").get<std::vector<double>>();
+      return StepTimes{numbers.at("seconds").get<std::vector<double>>(), numbers.at("lasting").get<std::vector<double>>()};
     });
   }
   return repeats;

@@ -36,10 +36,10 @@ double SecondsOnAnotherThread(int threads, Work&& work) {
 PictureMeter::Answer PictureMeter::Finish(LocalImage& frame, const FrameSetup& setup) {
   RunImage runs;
   if (setup.renderer->FrameIsPicture(setup)) {
-    runs = EncodePicture(frame);
+    runs = EncodePicture(frame, ColorCoding::kStraight8);
   } else {
     FillRows(frame);
-    runs = EncodePicture(setup.renderer->Finish(frame, setup));
+    runs = EncodePicture(setup.renderer->Finish(frame, setup), ColorCoding::kStraight8);
   }
   Answer answer;
   answer.header.image = runs.header;

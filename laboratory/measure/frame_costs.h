@@ -1,5 +1,6 @@
 // Frame costs: all inputs of a simulation of one frame, measured in this process, on one thread: the time and coverage of each box of its
-// plan (box_costs.h), and the time to make the picture from them and to decode it.
+// plan (box_costs.h), and the time to make the picture from them and to decode it. Pictures are made as for a PNG of 8 bits
+// (FrameRequest::straight8), which experiments ask services for, too.
 #pragma once
 
 #include <deque>

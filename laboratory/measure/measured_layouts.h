@@ -19,23 +19,30 @@ class MeasuredLayouts {
   // The layout of the next frame, whose request leaves no choice and draws the voxels `occupied`.
   std::shared_ptr<const Layout> Next(ResolvedRequest request, std::shared_ptr<const OccupancyGrid> occupied) {
     last_ = std::move(request);
-    return table_.Find({&last_->policy.value(), &last_->volume, last_->summary.get(), std::move(occupied), slots_});
+    occupied_ = std::move(occupied);
+    return table_.Find(Wanted());
   }
 
-  // Render times of the frame of the last Next, by PlacementsOf(plan).
-  void Learn(const FramePlan& plan, std::span<const std::int64_t> nanoseconds) {
+  // Render times of the frame of the last Next, by PlacementsOf(plan); `prepare`: of making what is kept of new boxes, beside them.
+  void Learn(const FramePlan& plan, std::span<const std::int64_t> nanoseconds, std::span<const std::int64_t> prepare = {}) {
     std::vector<RankReport> reports;
     for (const Placement& placement : PlacementsOf(plan)) {
       RankReport& report = reports.emplace_back();
       report.box = placement.id;
-      report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds[reports.size() - 1];
+      const std::size_t place = reports.size() - 1;
+      const std::int64_t prepare_ns = prepare.empty() ? 0 : prepare[place];
+      report.stage_ns[std::size_t(Stage::kPrepare)] = prepare_ns;
+      report.stage_ns[std::size_t(Stage::kRender)] = nanoseconds[place] + prepare_ns;
     }
-    table_.Learn(last_->volume, plan, *last_->policy, reports);
+    table_.Learn(Wanted(), plan, reports);
   }
 
  private:
+  LayoutTable::Request Wanted() const { return {&last_->policy.value(), &last_->volume, last_->summary.get(), occupied_, slots_}; }
+
   std::uint32_t slots_;
   std::optional<ResolvedRequest> last_;  // of Next
+  std::shared_ptr<const OccupancyGrid> occupied_;
   LayoutTable table_;
 };
 

@@ -75,7 +75,7 @@ void MakeReplayed(const RecordedFrame& frame, const ReplayChange& change, const 
       out.coverage.push_back(UniformCoverage(rank.bounds, rank.pixels, frame.grid.width(), frame.grid.height()));
       out.input.boxes.push_back({rank.render_seconds, &out.coverage.back(), 0});
     }
-    group.schedule = {combine, Rank(group.placements.size()), RootOf(group, plan.display)};
+    group.schedule = {combine, Rank(group.placements.size()), {RootOf(group, plan.display)}};
   }
   out.input.plan = &plan;
   out.input.finish_seconds = frame.picture_seconds;

@@ -55,7 +55,9 @@ class _Waiting:
         width, height = self.draft.frame.size.width, self.draft.frame.size.height
         if (reply.size.width, reply.size.height) != (width, height):
             raise DataLoss(f"FrameReply.size is {reply.size.width}x{reply.size.height}, asked for was {width}x{height}")
-        rgba, depth = compose(read_runs(reply.runs, payload, width, height), width, height, self.draft.format)
+        if len(reply.shares) != 1:  # several come straight from workers alone
+            raise DataLoss(f"FrameReply.shares are {len(reply.shares)}, asked for was 1")
+        rgba, depth = compose(read_runs(reply.shares[0].runs, payload, width, height), width, height, self.draft.format)
         preview = reply.groups_done != reply.group_count
         image = Image(rgba, depth, format=self.draft.format, geometry=geometry_of(reply.geometry),
                       statistics=None if preview else statistics_of(reply.statistics, latency), preview=preview)

@@ -129,11 +129,11 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
 def _codes(rgba: Floats, bits: int) -> numpy.typing.NDArray[Any]:
     """Straight alpha: round(max * clamp(straight value, 0, 1)), halves away from zero, without a transfer curve; as the command line's PNG.
     The arithmetic is that of client/image_io: floats, until the rounding."""
-    alpha = rgba[..., 3:]
+    alpha, most = rgba[..., 3:], numpy.float32(2**bits - 1)
     straight = numpy.zeros_like(rgba)
-    numpy.divide(rgba[..., :3], alpha, out=straight[..., :3], where=alpha > 0)
+    numpy.divide(rgba[..., :3], alpha, out=straight[..., :3], where=most * alpha >= numpy.float32(0.5))
     straight[..., 3:] = alpha
-    scaled = numpy.float32(2**bits - 1) * numpy.clip(straight, numpy.float32(0), numpy.float32(1))
+    scaled = most * numpy.clip(straight, numpy.float32(0), numpy.float32(1))
     codes: numpy.typing.NDArray[Any] = numpy.floor(scaled.astype(numpy.float64) + 0.5).astype(f"uint{bits}")
     return codes
 

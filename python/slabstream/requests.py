@@ -137,7 +137,7 @@ class Requests:
         except DecodeError:
             envelope = schema.Envelope()
         kind = envelope.WhichOneof("message")
-        expected = envelope.frame_reply.runs.encoded_bytes if kind == "frame_reply" else 0
+        expected = sum(share.runs.encoded_bytes for share in envelope.frame_reply.shares) if kind == "frame_reply" else 0
         if len(parts) > 2 or envelope.version != schema.WIRE_VERSION or kind is None or len(payload) != expected:
             _log.warning("dropped a message that is not as docs/wire.md says: %s with a payload of %d bytes", kind, len(payload))
             return

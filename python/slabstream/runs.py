@@ -34,11 +34,11 @@ def _unpack(runs: Any, payload: memoryview) -> memoryview:
         pass
     else:
         if xxhash.xxh3_64_intdigest(payload) != runs.digest:
-            raise DataLoss("FrameReply.runs.digest is not that of the payload")
+            raise DataLoss("FrameReply.shares.runs.digest is not that of the payload")
     if runs.codec == schema.CODEC_RAW:
         return payload
     if runs.codec != schema.CODEC_ZSTD:
-        raise DataLoss(f"FrameReply.runs.codec is {runs.codec}, must be 1 or 2")
+        raise DataLoss(f"FrameReply.shares.runs.codec is {runs.codec}, must be 1 or 2")
     try:
         import zstandard
     except ImportError:
@@ -60,10 +60,10 @@ def read_runs(runs: Any, payload: memoryview | bytes, width: int, height: int) -
     image, bounds = runs.image, runs.image.bounds
     n = image.pixel_count
     if image.format not in _PIXEL_BYTES or image.color != schema.COLOR_CODING_FLOAT32:
-        raise DataLoss(f"FrameReply.runs has pixels of format {image.format} and colours {image.color}, which are no picture's")
+        raise DataLoss(f"FrameReply.shares.runs has pixels of format {image.format} and colours {image.color}, which are no picture's")
     w, h = bounds.x_end - bounds.x_begin, bounds.y_end - bounds.y_begin
     if not (0 <= w and bounds.x_end <= width and 0 <= h and bounds.y_end <= height and n <= w * h and image.run_count <= n):
-        raise DataLoss(f"FrameReply.runs has {n} pixels in a rectangle of {w}x{h}, in a picture of {width}x{height}")
+        raise DataLoss(f"FrameReply.shares.runs has {n} pixels in a rectangle of {w}x{h}, in a picture of {width}x{height}")
     payload = _unpack(runs, memoryview(payload))
     if len(payload) != _RUN_BYTES * image.run_count + _PIXEL_BYTES[image.format] * n:
         raise DataLoss(f"FrameReply has a payload of {len(payload)} bytes for {image.run_count} runs of {n} pixels")
@@ -73,7 +73,7 @@ def read_runs(runs: Any, payload: memoryview | bytes, width: int, height: int) -
     begin = row * w + column
     end = begin + count
     if count.sum() != n or (count < 1).any() or (column + count > w).any() or (row >= h).any() or (begin[1:] < end[:-1]).any():
-        raise DataLoss(f"FrameReply.runs does not cover {n} pixels of {w}x{h} in order")
+        raise DataLoss(f"FrameReply.shares.runs does not cover {n} pixels of {w}x{h} in order")
     # Pixel i of the payload is in run r, and (i - pixels before r) behind its begin.
     target = numpy.arange(n) + numpy.repeat(begin - (numpy.cumsum(count) - count), count)
 

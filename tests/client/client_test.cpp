@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <atomic>
 #include <functional>
 #include <optional>
@@ -12,175 +11,13 @@
 #include <thread>
 #include <utility>
 
-#include "common/transport/authenticator.h"
-#include "common/transport/socket.h"
-#include "common/wire/any_message.h"
-#include "common/wire/payload.h"
+#include "tests/client/fake_service.h"
 #include "tests/support/random.h"
 
 namespace slabstream {
 namespace {
 
-using std::chrono::milliseconds;
-using std::chrono::seconds;
 using testing::HasSubstr;
-
-struct Answer {
-  AnyMessage message;
-  Bytes payload;
-};
-
-// Binds an endpoint of its own and answers what comes by a function, which is called in the service's thread.
-class FakeService {
- public:
-  using Handler = std::function<std::vector<Answer>(const AnyMessage&)>;
-
-  FakeService(Context& context, const std::string& endpoint, Handler handler, const SocketOptions& options = {})
-      : handler_(std::move(handler)), socket_(Socket::Router(context, options).value()) {
-    endpoint_ = socket_.Bind(endpoint).value();
-    thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
-  }
-  ~FakeService() {
-    thread_.request_stop();
-    wakeup_.Notify();
-  }
-  const std::string& endpoint() const { return endpoint_; }
-
- private:
-  void Run(const std::stop_token& stop) {
-    const std::array<Socket*, 1> sockets = {&socket_};
-    while (!stop.stop_requested()) {
-      Wait(sockets, &wakeup_, seconds(60));
-      while (const std::optional<Incoming> incoming = socket_.TryReceive()) {
-        const Result<AnyMessage> message = Decode(incoming->header());
-        ASSERT_TRUE(message.ok()) << message.status().message();
-        for (const Answer& answer : handler_(*message)) (void)socket_.Send(incoming->identity, Encode(answer.message), answer.payload);
-      }
-    }
-  }
-
-  Handler handler_;
-  Wakeup wakeup_;
-  Socket socket_;
-  std::string endpoint_;
-  std::jthread thread_;
-};
-
-// Knows every request that it is asked about.
-ClientPong PongTo(const ClientPing& ping) { return {.epoch = 1, .nonce = ping.nonce, .known = ping.open}; }
-
-// Answers pings, and questions and orders by `handler`.
-FakeService::Handler Answering(FakeService::Handler handler) {
-  return [handler = std::move(handler)](const AnyMessage& message) -> std::vector<Answer> {
-    if (const auto* ping = std::get_if<ClientPing>(&message)) return {{PongTo(*ping), {}}};
-    return handler(message);
-  };
-}
-
-FrameRequest SmallRequest() {
-  FrameRequest request;
-  request.dataset = "ball";
-  request.size = {32, 24};
-  return request;
-}
-
-// A reply whose picture is half transparent on a rectangle.
-Answer ReplyTo(RequestId request, std::uint32_t groups_done = 1, std::uint32_t group_count = 1, Codec codec = Codec::kZstd) {
-  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {4, 6, 20, 18});
-  for (std::size_t i = 0; i < image.rgba.size(); ++i) image.rgba[i] = i % 4 == 3 ? 0.5F : 0.001F * float(i % 97);
-  RunImage runs = EncodeRuns(image, {0, 32 * 24}, 32);
-  FrameReply reply{.request = request, .size = {32, 24}, .groups_done = groups_done, .group_count = group_count};
-  reply.statistics.renderer = "raycast";
-  reply.statistics.decomposition = "slab";
-  reply.statistics.axis = "z";
-  reply.statistics.combine = "fan-in";
-  reply.runs.image = runs.header;
-  const Bytes payload = PackRuns(Bytes(std::move(runs.payload)), codec, reply.runs);
-  return {reply, payload};
-}
-
-class ClientTest : public testing::Test {
- protected:
-  Context context_;
-  const ClientTiming quick_ = {.ping = milliseconds(20), .silence = milliseconds(400)};
-};
-
-// A service with keys, and a worker of it that brings pictures, as the test says, under a key that the service names or under another one.
-class DirectPicturesTest : public ClientTest {
- protected:
-  enum class Brings { kNothing, kPicture, kPictureOfAnother, kPictureFirst };
-
-  // How often the client has asked for the picture, and what it got.
-  struct Outcome {
-    Result<Picture> picture;
-    int asked = 0, asked_with_door = 0;
-  };
-
-  Outcome Render(Brings brings) {
-    context_.authenticator().AdmitOnly("clients", {client_.public_key});
-    Outcome outcome{Status::Internal(""), 0, 0};
-    const auto answer = [&](const AnyMessage& message) -> std::vector<Answer> {
-      if (const auto* ping = std::get_if<ClientPing>(&message)) {
-        ClientPong pong = PongTo(*ping);
-        pong.known.clear();  // the frame is over for the service
-        if (ping->senders && *ping->senders != 7) pong.senders = PictureSenders{7, {worker_.public_key}};
-        return {{pong, {}}};
-      }
-      const auto& submit = std::get<SubmitFrame>(message);
-      ++outcome.asked;
-      Answer reply = ReplyTo(submit.request);
-      if (!submit.pictures) return {reply};
-      ++outcome.asked_with_door;
-      if (brings != Brings::kNothing) {
-        const KeyPair& own = brings == Brings::kPictureOfAnother ? stranger_ : worker_;
-        SocketOptions options;
-        options.client_keys = ClientKeys{.server_key = submit.pictures->key, .own = own, .sealed = true};
-        worker_socket_.emplace(Socket::Dealer(context_, options).value());
-        EXPECT_TRUE(worker_socket_->Connect("tcp://127.0.0.1:" + std::to_string(submit.pictures->port)).ok());
-        EXPECT_TRUE(
-            worker_socket_
-                ->Send({}, Encode(SentPicture{std::get<FrameReply>(reply.message).runs.digest, reply.payload.size()}), reply.payload)
-                .ok());
-        while (brings == Brings::kPictureFirst && !worker_socket_->connected()) std::this_thread::yield();
-      }
-      std::get<FrameReply>(reply.message).direct = true;
-      return {{reply.message, {}}};
-    };
-    const SocketOptions options{.server_keys = ServerKeys{.secret_key = service_.secret_key, .plane = "clients"}};
-    const FakeService service(context_, "tcp://127.0.0.1:*", answer, options);
-    const ServiceAddress address(service.endpoint(), ClientKeys{.server_key = service_.public_key, .own = client_});
-    Client client = Client::Connect(context_, address, seconds(30), {.ping = milliseconds(20), .lost_picture = lost_after_}).value();
-    outcome.picture = client.Render(SmallRequest(), seconds(60));
-    return outcome;
-  }
-
-  Duration lost_after_ = seconds(60);
-  const KeyPair service_ = MakeKeyPair(), client_ = MakeKeyPair(), worker_ = MakeKeyPair(), stranger_ = MakeKeyPair();
-  std::optional<Socket> worker_socket_;
-};
-
-TEST_F(DirectPicturesTest, ComeFromAWorkerThatTheServiceNames) {
-  for (const Brings brings : {Brings::kPicture, Brings::kPictureFirst}) {
-    const Outcome outcome = Render(brings);
-    ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
-    EXPECT_TRUE(outcome.picture->direct);
-    EXPECT_EQ(outcome.picture->image.bounds, (PixelBounds{4, 6, 20, 18}));
-    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
-    EXPECT_EQ(outcome.asked, 1);
-  }
-}
-
-TEST_F(DirectPicturesTest, AreAskedForAgainIfTheyAreLost) {
-  lost_after_ = milliseconds(50);
-  for (const Brings brings : {Brings::kNothing, Brings::kPictureOfAnother}) {
-    const Outcome outcome = Render(brings);
-    ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
-    EXPECT_FALSE(outcome.picture->direct);
-    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
-    EXPECT_EQ(outcome.asked, 2);
-    EXPECT_EQ(outcome.asked_with_door, 1) << "the second one comes through the coordinator";
-  }
-}
 
 TEST_F(ClientTest, NobodyAnswers) {
   Socket silent = Socket::Router(context_).value();
@@ -476,17 +313,17 @@ TEST_F(ClientTest, DamagedRepliesNeverCrash) {
         std::vector<std::byte> bytes(answer.payload.span().begin(), answer.payload.span().end());
         for (int i = random.Integer(1, 8); i > 0; --i)
           bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] = std::byte(random.Integer(0, 255));
-        if (reply.runs.codec == Codec::kRaw && random.Chance(0.5)) {
-          answer.payload = PackRuns(Bytes(std::move(bytes)), Codec::kRaw, reply.runs);
+        if (reply.shares.front().runs.codec == Codec::kRaw && random.Chance(0.5)) {
+          answer.payload = PackRuns(Bytes(std::move(bytes)), Codec::kRaw, reply.shares.front().runs);
         } else {
           answer.payload = Bytes(std::move(bytes));
         }
         break;
       }
       case 1: reply.size = {32, 25}; break;
-      case 2: reply.runs.image.bounds.x_end += random.Integer(-3, 30); break;
-      case 3: reply.runs.image.pixel_count += random.Integer<std::uint64_t>(1, 5); break;
-      case 4: reply.runs.digest ^= 1; break;
+      case 2: reply.shares.front().runs.image.bounds.x_end += random.Integer(-3, 30); break;
+      case 3: reply.shares.front().runs.image.pixel_count += random.Integer<std::uint64_t>(1, 5); break;
+      case 4: reply.shares.front().runs.digest ^= 1; break;
     }
     // What the codec itself would refuse, the client drops; then this failure ends the request.
     return {std::move(answer), {FrameFailed{submit->request, Status::Internal("dropped")}, {}}};

@@ -214,6 +214,14 @@ TEST(CoordinatorFrames, PictureOfALostDisplayWorkerStillCounts) {
   EXPECT_TRUE(script.Answer(again[0]).empty());
 }
 
+TEST(CoordinatorFrames, WorkersAreToldInWhichCodesThePictureMayCome) {
+  CoordinatorScript script;
+  script.Join(11, 1);
+  SubmitFrame submit = Frame(1, 1);
+  submit.frame.straight8 = true;
+  EXPECT_TRUE(HandedOut(script.Submit(kClient, submit)).at(0).straight8);
+}
+
 TEST(CoordinatorFrames, PreviewsGoToTheClientInOrderAndTellOfGroupsDone) {
   CoordinatorScript script;
   script.Join(11, 1);

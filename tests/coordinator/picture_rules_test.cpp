@@ -5,6 +5,8 @@
 namespace slabstream {
 namespace {
 
+using testing::ElementsAre;
+using testing::Field;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -12,7 +14,7 @@ const std::string kWorkerKey(40, 'w'), kClientKey(40, 'c');
 
 // A client with a pictures plane, and a worker with keys.
 struct KeysScript : CoordinatorScript {
-  KeysScript() {
+  explicit KeysScript(ScriptConfig c = TestConfig()) : CoordinatorScript(std::move(c)) {
     host = "10.1.2.3";
     images_key = kWorkerKey;
     Join(11, 1);
@@ -29,8 +31,8 @@ struct KeysScript : CoordinatorScript {
                      .attempt = group.key.attempt,
                      .groups_done = group.group_count,
                      .group_count = group.group_count,
-                     .direct = true};
-    image.runs.encoded_bytes = bytes;
+                     .picture = {.direct = true}};
+    image.picture.runs.encoded_bytes = bytes;
     return Worker(WorkerOf(group.display), image);
   }
 };
@@ -43,8 +45,114 @@ TEST(CoordinatorPictures, GoToTheHostThatTheClientHasConnectedFrom) {
   script.Done(groups[0]);
   const auto replies = ToClients<FrameReply>(script.DirectImage(groups[0]));
   ASSERT_THAT(replies, SizeIs(1));
-  EXPECT_TRUE(replies[0].message.direct);
+  EXPECT_THAT(replies[0].message.shares, ElementsAre(Field(&PictureShare::direct, true)));
   EXPECT_TRUE(replies[0].payload.empty());
+}
+
+struct SharesScript : KeysScript {
+  SharesScript() : KeysScript(SmallShares()) { Join(12, 2); }
+  static ScriptConfig SmallShares() {
+    ScriptConfig config = TestConfig();
+    config.share_pixels = 1;
+    return config;
+  }
+  // Of the worker that displays the share.
+  Actions ShareDone(const GroupAssignment& group, std::size_t share) {
+    const WorkerId worker = DisplaysOf(group.group, group.display)[share];
+    return Worker(WorkerOf(worker),
+                  GroupDone{.epoch = config.epoch, .worker = worker, .key = group.key, .reports = {{.rank = Rank(share)}}});
+  }
+  Actions ShareImage(const GroupAssignment& group, std::size_t share, bool direct, Bytes payload = {}) {
+    const WorkerId worker = DisplaysOf(group.group, group.display)[share];
+    FrameImage image{.epoch = config.epoch,
+                     .worker = worker,
+                     .frame = group.key.frame,
+                     .attempt = group.key.attempt,
+                     .groups_done = 1,
+                     .group_count = 1,
+                     .picture = {.direct = direct},
+                     .share = std::uint32_t(share),
+                     .share_count = 2};
+    image.picture.runs.encoded_bytes = 3;
+    return Step(FromWorker{.from = tokens.at(worker), .message = image, .payload = std::move(payload)});
+  }
+  static Bytes Text(const std::string& text) {
+    const auto bytes = std::as_bytes(std::span(text));
+    return Bytes(std::vector<std::byte>(bytes.begin(), bytes.end()));
+  }
+};
+
+TEST(CoordinatorPictures, AreDividedAmongTheWorkersOfAGroupForAClientThatPutsThemTogether) {
+  SharesScript script;
+  const auto groups = HandedOut(script.Submit(kClient, KeysScript::WithDoor(1)));
+  ASSERT_THAT(groups, SizeIs(1));
+  ASSERT_THAT(groups[0].group.schedule.roots, SizeIs(2));
+  EXPECT_THAT(ToClients<FrameProgress>(script.ShareDone(groups[0], 1)), IsEmpty()) << "the other share is not done";
+  EXPECT_THAT(ToClients<FrameReply>(script.ShareImage(groups[0], 1, true)), IsEmpty());
+  EXPECT_THAT(ToClients<FrameProgress>(script.ShareDone(groups[0], 0)), SizeIs(1));
+  EXPECT_THAT(ToClients<FrameReply>(script.ShareImage(groups[0], 1, false, SharesScript::Text("abc"))), IsEmpty()) << "it has that one";
+  const auto replies = ToClients<FrameReply>(script.ShareImage(groups[0], 0, false, SharesScript::Text("xyz")));
+  ASSERT_THAT(replies, SizeIs(1));
+  const FrameReply& reply = replies[0].message;
+  EXPECT_THAT(reply.shares, ElementsAre(Field(&PictureShare::direct, false), Field(&PictureShare::direct, true)));
+  EXPECT_EQ(replies[0].payload.size(), 3U);
+  EXPECT_THAT(reply.statistics.reports, SizeIs(2)) << "each display tells of other ranks";
+}
+
+TEST(CoordinatorPictures, AreNotDividedForOthers) {
+  SharesScript script;
+  SubmitFrame with_previews = KeysScript::WithDoor(2);
+  with_previews.frame.previews = true;
+  const auto roots = [&](const SubmitFrame& submit) {
+    const auto groups = HandedOut(script.AnswerAll(script.Submit(kClient, submit)));
+    return groups.at(0).group.schedule.roots.size();
+  };
+  EXPECT_EQ(roots(Frame(1)), 1U) << "no door";
+  EXPECT_EQ(roots(with_previews), 1U);
+  EXPECT_EQ(roots(KeysScript::WithDoor(3, 2)), 1U) << "two groups";
+}
+
+TEST(CoordinatorPictures, AreNotDividedIfFramesFollowOneAnother) {
+  SharesScript script;
+  const auto first = HandedOut(script.Submit(kClient, KeysScript::WithDoor(1)));
+  const auto second = HandedOut(script.Submit(kClient, KeysScript::WithDoor(2)));
+  EXPECT_THAT(first.at(0).group.schedule.roots, SizeIs(2));
+  EXPECT_THAT(second.at(0).group.schedule.roots, SizeIs(1));
+}
+
+TEST(CoordinatorPictures, AreMadeAnewIfAWorkerWithAShareIsLost) {
+  for (const bool picture_was_there : {false, true}) {
+    SharesScript script;
+    const auto groups = HandedOut(script.Submit(kClient, KeysScript::WithDoor(1)));
+    script.ShareDone(groups.at(0), 0);
+    script.ShareDone(groups[0], 1);
+    if (picture_was_there) script.ShareImage(groups[0], 0, true);
+    const WorkerId lost = DisplaysOf(groups[0].group, groups[0].display)[1];
+    const auto again = HandedOut(script.Kill(script.WorkerOf(lost)));
+    ASSERT_THAT(again, SizeIs(1));
+    EXPECT_EQ(again[0].key, (GroupKey{1, 2, 0}));
+    EXPECT_THAT(again[0].group.schedule.roots, SizeIs(1)) << "one worker is left";
+    EXPECT_THAT(ToClients<FrameReply>(script.ShareImage(groups[0], 0, true)), IsEmpty()) << "a share of the attempt before";
+    script.Done(again[0]);
+    EXPECT_THAT(ToClients<FrameReply>(script.DirectImage(again[0])), SizeIs(1));
+  }
+}
+
+TEST(CoordinatorPictures, TellOfTheSharesOfTheirAttemptAlone) {
+  SharesScript script;
+  script.Join(13, 3);
+  const auto groups = HandedOut(script.Submit(kClient, KeysScript::WithDoor(1)));
+  ASSERT_THAT(groups.at(0).group.schedule.roots, SizeIs(3));
+  script.ShareDone(groups[0], 0);
+  script.ShareDone(groups[0], 1);
+  const WorkerId lost = DisplaysOf(groups[0].group, groups[0].display)[2];
+  const auto again = HandedOut(script.Kill(script.WorkerOf(lost)));
+  ASSERT_THAT(again.at(0).group.schedule.roots, SizeIs(2));
+  for (const std::size_t share : {0, 1}) script.ShareDone(again[0], share);
+  script.ShareImage(again[0], 0, true);
+  const auto replies = ToClients<FrameReply>(script.ShareImage(again[0], 1, true));
+  ASSERT_THAT(replies, SizeIs(1));
+  EXPECT_THAT(replies[0].message.statistics.reports, SizeIs(2));
 }
 
 TEST(CoordinatorPictures, ComeThroughTheCoordinatorElse) {

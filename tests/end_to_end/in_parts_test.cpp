@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "tests/data/stores/scripted_server.h"
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
 
@@ -59,6 +60,17 @@ class InPartsTest : public EndToEndTest {
     return double(count) / (picture.width * picture.height);
   }
 };
+
+TEST_F(InPartsTest, VolumesBehindAWebServerAreShownLikeFiles) {
+  const std::string levels = MakeLevels();
+  const ScriptedServer server(ServesFolder(Path("")));
+  const std::string url = server.url() + "/" + levels;
+  EXPECT_EQ(MustRun({"info", url}).out, MustRun({"info", levels}).out);
+  const std::vector<std::string> look = {"--local=2", "--zoom", "2", "--level", "0"};
+  EXPECT_LE(LargestDifference(Render(url, look), Render(levels, look)), kSame);
+  std::filesystem::create_directory(Path("nothing"));
+  ExpectRefused({"info", server.url() + "/nothing"}, "/nothing: is no volume that can be read from an address");
+}
 
 TEST_F(InPartsTest, LevelsAreChosenByNumberOrDetailAndWrongOnesRefused) {
   const std::string levels = MakeLevels();

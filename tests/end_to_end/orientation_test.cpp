@@ -69,7 +69,10 @@ TEST_F(OrientationTest, OneObjectInAnyStorageGivesOnePicture) {
     const std::vector<Storage> storages = AllStorages();
     const PictureFile first = Render(Store(storages.front()), options);
     EXPECT_GT(*std::ranges::max_element(first.samples), 0.5);
-    for (const Storage& storage : storages) {
+    // Renderers share what places a volume: one of them draws all storages, the others some.
+    const std::size_t step = look[1] == "raycast" ? 1 : 7;
+    for (std::size_t i = 0; i < storages.size(); i += step) {
+      const Storage& storage = storages[i];
       EXPECT_EQ(LargestDifference(Render(Store(storage), options), first), 0) << look[1] << ", " << Text(storage);
     }
   }

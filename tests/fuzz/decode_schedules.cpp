@@ -28,9 +28,10 @@ std::string TextOf(const CombiningChoice& choice) {
 bool DecodeSchedule(std::span<const std::byte> bytes) {
   FuzzInput input(bytes);
   const Rank ranks = 1 + input.Take<std::uint8_t>() % kMostRanks;
-  const Rank root = input.Take<std::uint8_t>() % ranks;
+  std::vector<Rank> roots(1 + input.Take<std::uint8_t>() % 4);
+  for (Rank& root : roots) root = input.Take<std::uint8_t>() % ranks;
   const std::string text(input.Text());
-  const ScheduleName name{text, ranks, root};
+  const ScheduleName name{text, ranks, roots};
   const Result<CombiningChoice> choice = ParseCombining(text);
   const Result<SharedSchedule> derived = DeriveSchedule(name, kPixels);
   CHECK_EQ(CheckScheduleName(name).ok(), choice.ok());
@@ -40,7 +41,7 @@ bool DecodeSchedule(std::span<const std::byte> bytes) {
   const Result<CombiningChoice> again = ParseCombining(TextOf(*choice));
   CHECK(again.ok()) << again.status().message();
   CHECK(again->scheme == choice->scheme && again->arguments == choice->arguments) << text;
-  const Schedule schedule = choice->Make({ranks, root, kPixels});
+  const Schedule schedule = choice->Make(ranks, roots, kPixels);
   CHECK(schedule == (*derived)->schedule()) << text;
   CHECK_LE(schedule.steps.size(), kMaxSteps);
   const Status sound = CheckSchedule(schedule, kPixels);
@@ -54,7 +55,10 @@ std::vector<FuzzBytes> ScheduleSeeds() {
   for (const CombiningEntry& scheme : CombiningSchemes()) {
     for (int i = 0; i < 4; ++i) {
       const std::string text = i == 0 ? std::string(scheme.name) : RandomArguments(scheme, random);
-      seeds.push_back(FuzzSeed().Put(std::uint8_t(random.Integer(0, 32))).Put(std::uint8_t(random.Integer(0, 32))).Put(text).bytes());
+      FuzzSeed seed;
+      seed.Put(std::uint8_t(random.Integer(0, 32))).Put(std::uint8_t(i));
+      for (int root = 0; root <= i; ++root) seed.Put(std::uint8_t(random.Integer(0, 32)));
+      seeds.push_back(seed.Put(text).bytes());
     }
   }
   return seeds;

@@ -37,7 +37,7 @@ class RequestsTest(unittest.TestCase):
     def submit(self, deadline: float = 60) -> int:
         return self.requests.submit(schema.FrameRequest(dataset="ball"), deadline, self.watcher, self.now)
 
-    def receive(self, payload: bytes | None = None, version: int = 1, **message) -> None:
+    def receive(self, payload: bytes | None = None, version: int = schema.WIRE_VERSION, **message) -> None:
         parts = [schema.Envelope(version=version, **message).SerializeToString()]
         self.requests.receive(parts if payload is None else [*parts, payload], self.now)
 
@@ -54,9 +54,9 @@ class RequestsTest(unittest.TestCase):
     def test_a_request_is_told_of_until_its_picture(self) -> None:
         request = self.submit()
         self.receive(frame_progress=schema.FrameProgress(request=request, phase=schema.FRAME_PHASE_RUNNING))
-        runs = schema.EncodedRuns(encoded_bytes=3)
-        self.receive(b"abc", frame_reply=schema.FrameReply(request=request, groups_done=1, group_count=2, runs=runs))
-        self.receive(b"abc", frame_reply=schema.FrameReply(request=request, groups_done=2, group_count=2, runs=runs))
+        shares = [schema.PictureShare(runs=schema.EncodedRuns(encoded_bytes=3))]
+        self.receive(b"abc", frame_reply=schema.FrameReply(request=request, groups_done=1, group_count=2, shares=shares))
+        self.receive(b"abc", frame_reply=schema.FrameReply(request=request, groups_done=2, group_count=2, shares=shares))
         self.receive(frame_failed=schema.FrameFailed(request=request))  # too late
         self.assertEqual(self.watcher.told, [schema.FRAME_PHASE_RUNNING, (1, b"abc"), (2, b"abc")])
 
@@ -122,8 +122,8 @@ class RequestsTest(unittest.TestCase):
     def test_a_ping_tells_each_mebibyte_of_payload(self) -> None:
         request = self.submit()
         self.taken()
-        runs = schema.EncodedRuns(encoded_bytes=1 << 20)
-        self.receive(bytes(1 << 20), frame_reply=schema.FrameReply(request=request, groups_done=1, group_count=2, runs=runs))
+        shares = [schema.PictureShare(runs=schema.EncodedRuns(encoded_bytes=1 << 20))]
+        self.receive(bytes(1 << 20), frame_reply=schema.FrameReply(request=request, groups_done=1, group_count=2, shares=shares))
         self.assertEqual([ping.received_bytes for ping in self.pings()], [1 << 20])
 
     def test_at_most_256_are_open(self) -> None:
@@ -135,7 +135,7 @@ class RequestsTest(unittest.TestCase):
         request = self.submit()
         status = schema.Status(code=1, message="no")
         with self.assertLogs("slabstream", "WARNING") as logs:
-            self.receive(version=2, frame_failed=schema.FrameFailed(request=request, status=status))
+            self.receive(version=schema.WIRE_VERSION + 1, frame_failed=schema.FrameFailed(request=request, status=status))
             self.receive(b"x", frame_failed=schema.FrameFailed(request=request, status=status))
             self.receive(welcome=schema.Welcome())
             self.receive()

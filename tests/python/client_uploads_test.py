@@ -145,7 +145,7 @@ class Uploads(WithAService):
         socket.connect(self.running.endpoint)
 
         def send(payload: bytes | None = None, **message: object) -> None:
-            socket.send_multipart([schema.Envelope(version=1, **message).SerializeToString(), *([] if payload is None else [payload])])
+            socket.send_multipart([schema.Envelope(version=schema.WIRE_VERSION, **message).SerializeToString(), *([] if payload is None else [payload])])
 
         def receive(kind: str) -> object:
             while True:

@@ -40,7 +40,7 @@ class Documents(InAFolder):
         names: dict = {}
         exec(compile(code.replace(printed, running.endpoint), "wire.md", "exec"), names)
         names["socket"].close()
-        bounds, picture = names["answer"].frame_reply.runs.image.bounds, names["picture"]
+        bounds, picture = names["answer"].frame_reply.shares[0].runs.image.bounds, names["picture"]
         whole = np.zeros((512, 512, 4), np.float32)
         whole[bounds.y_begin : bounds.y_end, bounds.x_begin : bounds.x_end] = picture
         with ss.connect(endpoint=running.endpoint) as service:

@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/image/sample_codes.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
@@ -26,6 +27,12 @@ EmbeddedOptions OptionsFor(std::shared_ptr<const Volume> volume, int workers, in
   options.coordinator.catalogue["ball"] = [volume]() -> Result<std::shared_ptr<const Volume>> { return volume; };
   options.coordinator.catalogue["broken"] = []() -> Result<std::shared_ptr<const Volume>> { return Status::DataLoss("file ends early"); };
   return options;
+}
+
+std::vector<std::uint8_t> StraightCodesOf(const LocalImage& image) {
+  std::vector<std::uint8_t> codes(image.rgba.size());
+  StraightCodes(image.rgba.data(), codes.size() / 4, codes.data());
+  return codes;
 }
 
 class EmbeddedServiceTest : public testing::Test {
@@ -55,6 +62,23 @@ class EmbeddedServiceTest : public testing::Test {
   std::shared_ptr<const Volume> volume_ = std::make_shared<const Volume>(AsGrid(*TestSphere(40)));
   std::unique_ptr<EmbeddedService> service_;
 };
+
+// A picture in the codes of a PNG of 8 bits makes the same PNG as the picture itself, and has no depths.
+TEST_F(EmbeddedServiceTest, PicturesComeInTheCodesOfAFileIfThatIsEnough) {
+  Start(1);
+  Client client = Connect();
+  for (const RendererKind* renderer : Renderers()) {
+    SCOPED_TRACE(renderer->name());
+    FrameRequest request = TestRequest(renderer, 30, 2);
+    const Result<Picture> floats = client.Render(request);
+    request.straight8 = true;
+    const Result<Picture> codes = client.Render(request);
+    ASSERT_TRUE(floats.ok() && codes.ok()) << floats.status().message() << codes.status().message();
+    EXPECT_FALSE(HasDepth(codes->image.format));
+    EXPECT_EQ(StraightCodesOf(codes->image), StraightCodesOf(floats->image));
+    EXPECT_NE(codes->image.rgba, floats->image.rgba) << "it came as floats";
+  }
+}
 
 TEST_F(EmbeddedServiceTest, PictureIsThatOfOneRendererForAnyWorkersAndGroups) {
   for (const int workers : {1, 3}) {

@@ -173,15 +173,16 @@ TEST_F(ExecutorTest, FinishedFrameIsResolvedAndPacked) {
   setup.camera.supersample = 2;
   executor_.Perform(SendFrame{.message = {.epoch = 1, .worker = 1, .frame = 3, .attempt = 1, .groups_done = 1},
                               .image = 1,
+                              .pixels = WholeFrame(setup),
                               .setup = std::make_shared<const FrameSetup>(setup)});
   const auto sent = std::get<OutgoingFrame>(outputs_.Next());
   const FrameImage& frame = sent.message;
-  EXPECT_EQ(frame.runs.image.bounds, (PixelBounds{1, 0, 4, 2}));
+  EXPECT_EQ(frame.picture.runs.image.bounds, (PixelBounds{1, 0, 4, 2}));
   ASSERT_EQ(frame.reports.size(), 1U);
   EXPECT_GT(frame.reports[0].stage_ns[std::size_t(Stage::kEncode)], 0);
-  const Result<Bytes> runs = UnpackRuns(frame.runs, sent.payload);
+  const Result<Bytes> runs = UnpackRuns(frame.picture.runs, sent.payload);
   ASSERT_TRUE(runs.ok()) << runs.status().message();
-  EXPECT_FLOAT_EQ(PixelAt(*ReadRuns(frame.runs.image, runs->span(), frame.runs.image.bounds), 3, 1).rgba[3], 0.5F);
+  EXPECT_FLOAT_EQ(PixelAt(*ReadRuns(frame.picture.runs.image, runs->span(), frame.picture.runs.image.bounds), 3, 1).rgba[3], 0.5F);
 }
 
 TEST_F(ExecutorTest, EveryChunkIsAnsweredAndDamageIsFound) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "common/planning/placement.h"
 #include "common/service/service_file.h"
 #include "common/wire/any_message.h"
 #include "coordinator/service.h"
@@ -24,6 +25,8 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::Field;
 using testing::HasSubstr;
 
 class KeysOfServiceTest : public testing::Test {
@@ -123,6 +126,45 @@ TEST_F(KeysOfServiceTest, PicturesGoStraightToClientsAndAreTheSame) {
   EXPECT_EQ(pictures, 3);
 }
 
+// Every worker finishes a share. Until it has a connection to the client, its share comes through the coordinator.
+TEST_F(KeysOfServiceTest, SharesOfPicturesAddUpToThoseOfOneRenderer) {
+  constexpr int kWorkers = 3;
+  StartWorkers(kWorkers);
+  Client client = ConnectAs(Role::kClient);
+  int direct = 0, divided = 0;
+  for (const RendererKind* renderer : {Splatting(), ZBuffer(), FindRenderer("raycast")}) {
+    for (const char* combine : {"fan-in", "centralized", "radix-k", "direct-send", "chain"}) {
+      for (const bool minified : {false, true}) {
+        FrameRequest request = TestRequest(renderer, 30, 1);
+        request.size = {640, 600};
+        request.policy.combine = combine;
+        if (minified) request.view.zoom = 0.04;
+        SCOPED_TRACE(testing::Message() << renderer->name() << ", " << combine << (minified ? ", minified" : ""));
+        const Result<Picture> picture = client.Render(request);
+        ASSERT_TRUE(picture.ok()) << picture.status().message();
+        EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request, *volume_), request.size), AllowedDifference(request));
+        const std::int64_t most = picture->statistics.grid.pixel_count() / std::int64_t(kSharePixels);
+        const bool swaps = combine == std::string("radix-k") || combine == std::string("direct-send");
+        const bool finishes = minified || renderer == Splatting();
+        const bool divides = (swaps || finishes) && !(minified && renderer == ZBuffer());  // means of depths do not add up
+        const std::int64_t shares = divides ? std::clamp<std::int64_t>(most, 1, kWorkers) : 1;
+        EXPECT_EQ(std::int64_t(picture->statistics.reports.size()), kWorkers + shares) << "boxes and shares";
+        request.straight8 = true;  // shares that are resampled come as floats all the same
+        const Result<Picture> codes = client.Render(request);
+        ASSERT_TRUE(codes.ok()) << codes.status().message();
+        LocalImage colors = picture->image;
+        colors.format = PixelFormat::kRgba;
+        colors.depth.clear();
+        EXPECT_LE(LargestDifference(codes->image, colors, request.size), 1.01F / 255);
+        divided += shares > 1 ? 1 : 0;
+        direct += picture->direct ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(direct, 0);
+  EXPECT_GE(divided, 9);
+}
+
 TEST_F(KeysOfServiceTest, PicturesComeThroughTheCoordinatorIfNobodyListensAtTheDoor) {
   StartWorkers(1);
   SocketOptions options;
@@ -139,7 +181,7 @@ TEST_F(KeysOfServiceTest, PicturesComeThroughTheCoordinatorIfNobodyListensAtTheD
     ASSERT_TRUE(message.ok()) << message.status().message();
     const auto* reply = std::get_if<FrameReply>(&*message);
     if (reply == nullptr) continue;
-    EXPECT_FALSE(reply->direct);
+    EXPECT_THAT(reply->shares, ElementsAre(Field(&PictureShare::direct, false)));
     EXPECT_FALSE(incoming->payload().empty());
     return;
   }

@@ -108,7 +108,7 @@ class WorkerAndPeer : public testing::Test {
     setup.transfer.opacities = {{0, 1, 0.5, 0}};
     setup.termination = 0;
     assignment.group.placements = {{0, {{0, 0, 0}, {8, 8, 16}}, root}, {1, {{0, 0, 16}, {8, 8, 32}}, kWorker + kPeer - root}};
-    assignment.group.schedule = {"fan-in", 2, 0};
+    assignment.group.schedule = {"fan-in", 2, {0}};
     assignment.display = root;
     assignment.peers = {{kWorker, worker_images_, memory_scope_}, {kPeer, peer_images_, peer_scope_}};
     return assignment;

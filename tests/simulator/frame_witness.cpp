@@ -177,6 +177,8 @@ void FrameWitness::OnPicture(const FrameImage& image, const Bytes& payload, cons
     tally_.Add(Count::kPreviews);
     return;
   }
+  EXPECT_EQ(reply.shares.size(), image.share_count);
+  if (reply.shares.size() > 1) tally_.Add(image.attempt > 1 ? Count::kSharedPicturesRetried : Count::kSharedPictures);
   for (std::size_t far = 1; far < expected.size(); ++far) {
     for (std::size_t near = 0; near < far; ++near) {
       EXPECT_TRUE(MayComeFirst(camera, frame->second.boxes.at(expected[near]), frame->second.boxes.at(expected[far])))

@@ -115,6 +115,8 @@ WorkerToCoordinator HostileWords::MakeOfWorker(const Speaker& self, std::uint32_
       FrameImage image{.epoch = epoch, .worker = worker == self.worker ? kNobody : worker, .frame = Number(), .attempt = Number32()};
       image.groups_done = Number32();
       image.group_count = random_.Chance(0.5) ? image.groups_done : Number32();
+      image.share_count = random_.Integer(1U, 3U);
+      image.share = random_.Integer(0U, image.share_count - 1);
       return image;
     }
     case 3: return WorkerTrouble{epoch, worker, Key(), WorkerId(Number32()), Reason(), random_.Chance(0.5)};

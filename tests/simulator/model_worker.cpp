@@ -179,7 +179,9 @@ double ModelWorker::Begin(Job& job, const SendPartial& action) {
 }
 
 double ModelWorker::Begin(Job& job, const SendFrame& action) {
-  job.payload = PackSymbols(images_.Get(action.image));
+  SymbolicImage picture = images_.Get(action.image);
+  std::erase_if(picture, [&](const auto& pixel) { return pixel.first < action.pixels.begin || pixel.first >= action.pixels.end; });
+  job.payload = PackSymbols(picture);
   return speed_.finish;
 }
 

@@ -99,6 +99,7 @@ SubmitFrame RandomRequest(Random& random, const Policy& policy, RequestId id, st
   if (random.Chance(0.1)) submit.frame.termination = 0;
   submit.frame.policy = policy;
   submit.frame.previews = random.Chance(0.3);
+  if (random.Chance(0.9)) submit.pictures = PicturesDoor{4711, std::string(40, 'k')};  // nobody opens it
   return submit;
 }
 

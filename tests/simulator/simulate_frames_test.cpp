@@ -313,7 +313,7 @@ RandomRun MakeRandomRun(Random& random) {
         continue;
       }
       for (Placement& placement : group.placements) placement.worker = (placement.worker - 1) % owners + 1;
-      group.schedule = {combining, workers, random.Integer<Rank>(0, workers - 1)};
+      group.schedule = {combining, workers, {random.Integer<Rank>(0, workers - 1)}};
     }
     run.inputs.push_back(frame->input());
     run.inputs.back().finish_seconds = random.Real(0, 0.01);
@@ -362,7 +362,7 @@ TEST(SimulateFrames, NothingHappensTwiceOrBeforeItsTime) {
         for (const Step& step : schedule->steps()) {
           steps += group.placements[step.from].worker != group.placements[step.to].worker ? 1 : 0;
         }
-        group_images += group.placements[group.schedule.root].worker != plan.display ? 1 : 0;
+        group_images += group.placements[group.schedule.roots.front()].worker != plan.display ? 1 : 0;
       }
     }
     EXPECT_EQ(rendered.size(), boxes);
@@ -432,7 +432,7 @@ TEST(SimulateFrames, PicturesAreMadeBesideEachOtherIfWorkersTakeTurns) {
     for (std::vector<FrameInput>* inputs : {&taking_turns, &one_displays}) {
       frames.push_back(std::make_unique<MadeFrame>(kWorkers, 1, kSide, 0.5, 1, "fan-in"));
       frames.back()->plan().display = inputs == &taking_turns ? f % kWorkers + 1 : 1;
-      frames.back()->plan().groups[0].schedule = {"fan-in", kWorkers, frames.back()->plan().display - 1};
+      frames.back()->plan().groups[0].schedule = {"fan-in", kWorkers, {frames.back()->plan().display - 1}};
       frames.back()->finish_seconds = 4;
       inputs->push_back(frames.back()->input());
     }
@@ -485,7 +485,7 @@ TEST(SimulateFrames, AThousandWorkersTakeEachStepOfTheScheduleOnce) {
     const MadeFrame frame(kWorkers, 1, kSide, 0.5, 1, scheme);
     const Timeline timeline = SimulateFrames(std::vector{frame.input()}, WithoutDelays(), {.keep_spans = false}).value();
     const PixelRange pixels = {0, std::uint64_t(kSide) * kSide};
-    EXPECT_EQ(timeline.frames[0].messages, DeriveSchedule({scheme, kWorkers, 0}, pixels).value()->steps().size()) << scheme;
+    EXPECT_EQ(timeline.frames[0].messages, DeriveSchedule({scheme, kWorkers, {0}}, pixels).value()->steps().size()) << scheme;
     EXPECT_NEAR(timeline.frames[0].latency(), 1, 1e-9) << scheme;
   }
 }

@@ -76,6 +76,7 @@ void Simulation::StartCoordinator() {
   config.worker_wait = seconds(5);
   config.vacancy_grace = milliseconds(random_.Integer(500, 8000));
   config.stall_timeout = seconds(4);
+  config.share_pixels = 1;  // the frames are small
   epoch_ = config.epoch;
   published_.clear();
   stored_.clear();
@@ -577,7 +578,7 @@ void Simulation::FromClientNode(std::size_t client, const ClientToFrames& messag
   const Arrivals arrivals = network_.Send({kClientEnds + int(client), kCoordinatorEnd}, service_.now());
   for (int i = 0; i < arrivals.count; ++i) {
     service_.queue().At(arrivals.times[i], [this, client, message = OnTheWay(message)] {
-      service_.StepCoordinator(FromClient{TokenOfClient(client), message});
+      service_.StepCoordinator(FromClient{TokenOfClient(client), message, "10.0.0.1"});
     });
   }
 }

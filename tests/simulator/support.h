@@ -27,7 +27,7 @@ class MadeFrame {
     for (std::uint32_t g = 0; g < groups; ++g) {
       GroupPlan group;
       for (std::uint32_t i = 0; i < workers; ++i) group.placements.push_back({g * workers + i, {}, i + 1});
-      group.schedule = {combining, workers, 0};
+      group.schedule = {combining, workers, {0}};
       plan_.groups.push_back(std::move(group));
     }
     costs_.assign(std::size_t(workers) * groups, {seconds, &coverage_, 0});

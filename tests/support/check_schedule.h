@@ -43,15 +43,18 @@ inline Status Wrong(std::size_t step, const std::string& message) {
 }
 
 // Checks that ranks are in range, rounds ascend, no rank touches pixels twice in a round, only adjacent intervals meet, nobody sends what
-// it does not hold, and the root ends with [0, ranks) of every pixel of `pixels`. InvalidArgument otherwise.
+// it does not hold, and the roots end with [0, ranks) of every pixel of their shares of `pixels`, and nobody with any other.
+// InvalidArgument otherwise.
 inline Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
   if (schedule.ranks == 0) {
     return schedule.steps.empty() ? Status::Ok() : Status::InvalidArgument("schedule.steps is not empty, but there are no ranks");
   }
   if (schedule.ranks > kMaxRanks)
     return Status::InvalidArgument(fmt::format("schedule.ranks is {}, but at most {} are allowed", schedule.ranks, kMaxRanks));
-  if (schedule.root >= schedule.ranks) {
-    return Status::InvalidArgument(fmt::format("schedule.root is {}, but must be below {}", schedule.root, schedule.ranks));
+  for (const Rank root : schedule.roots) {
+    if (root >= schedule.ranks) {
+      return Status::InvalidArgument(fmt::format("schedule.roots has {}, but must be below {}", root, schedule.ranks));
+    }
   }
   if (pixels.begin >= pixels.end) return Status::InvalidArgument("schedule: the frame has no pixels");
 
@@ -91,9 +94,19 @@ inline Status CheckSchedule(const Schedule& schedule, PixelRange pixels) {
       }
     }
   }
-  if (runner.held(schedule.root).list() != std::vector<Fragment<RankInterval>>{{pixels, {0, schedule.ranks}}}) {
-    return Status::InvalidArgument(
-        fmt::format("schedule: root {} does not end with ranks [0, {}) of every pixel", schedule.root, schedule.ranks));
+  for (std::size_t share = 0; share < schedule.roots.size(); ++share) {
+    const Rank root = schedule.roots[share];
+    const PixelRange of_root = Share(pixels, share, schedule.roots.size());
+    std::uint64_t whole = 0;
+    for (const Fragment<RankInterval>& part : runner.held(root).Take(of_root)) {
+      if (part.value == RankInterval{0, schedule.ranks}) whole += PixelCount(part.pixels);
+    }
+    if (whole != PixelCount(of_root)) {
+      return Status::InvalidArgument(fmt::format("schedule: root {} does not end with ranks [0, {}) of every pixel", root, schedule.ranks));
+    }
+  }
+  for (Rank rank = 0; rank < schedule.ranks; ++rank) {
+    if (!runner.held(rank).list().empty()) return Status::InvalidArgument(fmt::format("schedule: rank {} ends with pixels", rank));
   }
   return Status::Ok();
 }

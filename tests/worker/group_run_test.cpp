@@ -127,7 +127,7 @@ GroupAssignment MakeAssignment(Rank ranks, const std::string& combining, Rank ro
   assignment.setup.sheets.width = kWidth;
   assignment.setup.sheets.height = kHeight;
   for (Rank rank = 0; rank < ranks; ++rank) assignment.group.placements.push_back({rank, {}, 1});
-  assignment.group.schedule = {combining, ranks, root};
+  assignment.group.schedule = {combining, ranks, {root}};
   return assignment;
 }
 
@@ -173,6 +173,61 @@ TEST(GroupRun, EveryScheduleGivesTheGroupImageOnceInOrder) {
       for (const ImagePiece& piece : display.group_image->pieces) handed_over.insert(piece.image);
       handed_over.erase(0);
       for (const ImageHandle image : handed_over) display.images.Release(image);
+      for (Worker& worker : cluster.workers()) {
+        EXPECT_TRUE(worker.run->finished());
+        EXPECT_EQ(worker.images.size(), 0U);
+      }
+    }
+  }
+}
+
+// Each worker with ranks displays a share.
+TEST(GroupRun, EveryScheduleGivesEachDisplayItsShare) {
+  Random random(13);
+  SCOPED_TRACE(random.trace());
+  for (const CombiningEntry& scheme : CombiningSchemes()) {
+    for (int trial = 0; trial < 60; ++trial) {
+      const auto ranks = random.Integer<Rank>(2, 9);
+      GroupAssignment assignment = MakeAssignment(ranks, RandomArguments(scheme, random), 0);
+      SCOPED_TRACE(assignment.group.schedule.scheme + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
+      for (Placement& placement : assignment.group.placements) placement.worker = random.Integer<WorkerId>(1, 4);
+      std::vector<Rank>& roots = assignment.group.schedule.roots;
+      roots.clear();
+      for (WorkerId worker = 1; worker <= 4; ++worker) {
+        for (Rank rank = 0; rank < ranks; ++rank) {
+          if (assignment.group.placements[rank].worker != worker) continue;
+          roots.push_back(rank);
+          break;
+        }
+      }
+      if (roots.size() < 2) continue;
+      assignment.display = assignment.group.placements[roots.front()].worker;
+
+      Cluster cluster(random, assignment, 4);
+      while (cluster.Step()) {
+        if (HasFatalFailure()) return;
+      }
+      SymbolicPixel all(ranks);
+      for (Rank rank = 0; rank < ranks; ++rank) all[rank] = rank;
+      std::multiset<Rank> reported;
+      for (std::size_t share = 0; share < roots.size(); ++share) {
+        Worker& display = cluster.worker(assignment.group.placements[roots[share]].worker);
+        ASSERT_TRUE(display.group_image.has_value());
+        std::uint64_t pixels = 0;
+        for (const ImagePiece& piece : display.group_image->pieces) {
+          const SymbolicImage source = display.images.Get(piece.image);
+          for (std::uint64_t i = piece.pixels.begin; i < piece.pixels.end; ++i) EXPECT_EQ(source.at(i), all) << "pixel " << i;
+          EXPECT_GE(piece.pixels.begin, Share(kFrame, share, roots.size()).begin);
+          EXPECT_LE(piece.pixels.end, Share(kFrame, share, roots.size()).end);
+          pixels += PixelCount(piece.pixels);
+        }
+        EXPECT_EQ(pixels, PixelCount(Share(kFrame, share, roots.size())));
+        for (const RankReport& report : display.group_image->reports) reported.insert(report.rank);
+        std::set<ImageHandle> handed_over;
+        for (const ImagePiece& piece : display.group_image->pieces) handed_over.insert(piece.image);
+        for (const ImageHandle image : handed_over) display.images.Release(image);
+      }
+      EXPECT_EQ(reported, std::multiset<Rank>(all.begin(), all.end()));
       for (Worker& worker : cluster.workers()) {
         EXPECT_TRUE(worker.run->finished());
         EXPECT_EQ(worker.images.size(), 0U);
@@ -231,10 +286,10 @@ TEST(GroupRun, AScheduleThatDoesNotFitIsAFailure) {
   GroupAssignment too_few = MakeAssignment(3, "fan-in", 0);
   too_few.group.placements.pop_back();
   EXPECT_FALSE(GroupRun(too_few, 1, names).failure().ok());
-  for (const ScheduleName& name : {ScheduleName{"fan-in", 3, 3}, ScheduleName{"glue", 3, 0}, ScheduleName{"fan-in", 4, 0}}) {
+  for (const ScheduleName& name : {ScheduleName{"fan-in", 3, {3}}, ScheduleName{"glue", 3, {0}}, ScheduleName{"fan-in", 4, {0}}}) {
     GroupAssignment wrong = MakeAssignment(3, "fan-in", 0);
     wrong.group.schedule = name;
-    EXPECT_FALSE(GroupRun(wrong, 1, names).failure().ok()) << name.scheme << ", " << name.ranks << " ranks, root " << name.root;
+    EXPECT_FALSE(GroupRun(wrong, 1, names).failure().ok()) << name.scheme << ", " << name.ranks << " ranks, root " << name.roots.front();
   }
 }
 

@@ -91,7 +91,7 @@ class WorkerMachineTest : public testing::Test {
       const std::int32_t padded = std::int32_t(group * 4 + rank);
       a.group.placements.push_back({BoxId(padded), {{0, 0, padded * 64}, {128, 128, padded * 64 + 64}}, placements[rank]});
     }
-    a.group.schedule = {"fan-in", Rank(placements.size()), 0};
+    a.group.schedule = {"fan-in", Rank(placements.size()), {0}};
     a.peers = {{kSelf, "inproc://self"}, {kPeer, "inproc://peer"}};
     return a;
   }

@@ -85,25 +85,44 @@ class World {
   std::map<std::uint32_t, std::vector<Fragment<RankInterval>>> arrived_;
 };
 
-TEST(ScheduleRunner, EveryScheduleEndsAtItsRootWhateverTheOrderOfEvents) {
+TEST(ScheduleRunner, EveryScheduleEndsAtItsRootsWhateverTheOrderOfEvents) {
   Random random(3);
   SCOPED_TRACE(random.trace());
   for (const CombiningEntry& scheme : CombiningSchemes()) {
     for (int trial = 0; trial < 60; ++trial) {
       const auto ranks = random.Integer<Rank>(1, 14);
-      const ScheduleName name = {RandomArguments(scheme, random), ranks, random.Integer<Rank>(0, ranks - 1)};
+      ScheduleName name = {RandomArguments(scheme, random), ranks, std::vector<Rank>(random.Integer<std::size_t>(1, 5))};
+      for (Rank& root : name.roots) root = random.Integer<Rank>(0, ranks - 1);
       SCOPED_TRACE(name.scheme + ", " + std::to_string(ranks) + " ranks, trial " + std::to_string(trial));
       World world(random, Derive(name), random.Integer(1, 6));
       world.Run();
       if (HasFatalFailure()) return;
       for (Rank rank = 0; rank < ranks; ++rank) EXPECT_TRUE(world.runner(rank).order().Done(rank));
-      EXPECT_EQ(world.runner(name.root).held(name.root).list(), (Fragments<RankInterval>::List{{kFrame, {0, ranks}}}));
+      for (std::size_t share = 0; share < name.roots.size(); ++share) {
+        const PixelRange pixels = Share(kFrame, share, name.roots.size());
+        EXPECT_EQ(world.runner(name.roots[share]).held(name.roots[share]).Within(pixels),
+                  (Fragments<RankInterval>::List{{pixels, {0, ranks}}}));
+      }
     }
   }
 }
 
-TEST(ScheduleRunner, ARankThatIsNotRenderedOrIsCombiningWaits) {
-  ScheduleRunner<RankInterval> runner(Derive({"centralized", 3, 0}), kFrame, {0});
+TEST(ScheduleRunner, ARankThatIsNotRenderedWaitsAndOneThatIsCombiningDoesNotSend) {
+  ScheduleRunner<RankInterval> runner(Derive({"fan-in", 4, {0}}), kFrame, {2});
+  const std::uint32_t receives = 1;  // from rank 3
+  ASSERT_TRUE(runner.order().Awaited(receives));
+  runner.order().OnArrived(runner.order().Awaited(receives).value(), 240);
+  EXPECT_FALSE(runner.TakeNext());
+  runner.OnRendered(2, {2, 3});
+  EXPECT_EQ(runner.TakeNext()->kind, StepOrder::Kind::kReceive);
+  runner.order().OnCombineStarted(2);
+  EXPECT_FALSE(runner.TakeNext()) << "what it is to send is being combined";
+  runner.order().OnCombined(2);
+  EXPECT_EQ(runner.TakeNext()->kind, StepOrder::Kind::kSend);
+}
+
+TEST(ScheduleRunner, ARankThatIsCombiningReceives) {
+  ScheduleRunner<RankInterval> runner(Derive({"centralized", 3, {0}}), kFrame, {0});
   ASSERT_TRUE(runner.order().Awaited(0));
   runner.order().OnArrived(runner.order().Awaited(0).value(), 240);
   EXPECT_FALSE(runner.TakeNext());
@@ -112,15 +131,30 @@ TEST(ScheduleRunner, ARankThatIsNotRenderedOrIsCombiningWaits) {
   EXPECT_FALSE(runner.order().Awaited(0));
   runner.order().OnCombineStarted(0);
   runner.order().OnArrived(runner.order().Awaited(1).value(), 240);
-  EXPECT_FALSE(runner.TakeNext());
+  EXPECT_TRUE(runner.TakeNext());
+  runner.order().OnCombineStarted(0);
+  runner.order().OnCombined(0);
   EXPECT_FALSE(runner.order().Done(0));
   runner.order().OnCombined(0);
-  EXPECT_TRUE(runner.TakeNext());
   EXPECT_TRUE(runner.order().Done(0));
 }
 
+// Others wait for what is sent.
+TEST(ScheduleRunner, ARankSendsBeforeItReceives) {
+  ScheduleRunner<RankInterval> runner(Derive({"direct-send", 3, {0, 1, 2}}), kFrame, {1});
+  const std::vector<Step>& steps = runner.order().schedule().steps();
+  for (std::uint32_t i = 0; i < steps.size(); ++i) {
+    if (steps[i].to == 1) runner.order().OnArrived(runner.order().Awaited(i).value(), 80);
+  }
+  runner.OnRendered(1, {1, 2});
+  std::vector<StepOrder::Kind> kinds;
+  while (const auto taken = runner.TakeNext()) kinds.push_back(taken->kind);
+  using enum StepOrder::Kind;
+  EXPECT_EQ(kinds, (std::vector{kSend, kSend, kReceive, kReceive}));
+}
+
 TEST(ScheduleRunner, StepsOfTheSamePixelsKeepTheirOrderAndOthersDoNotWait) {
-  ScheduleRunner<RankInterval> runner(Derive({"chain:strips=2", 3, 0}), kFrame, {1});
+  ScheduleRunner<RankInterval> runner(Derive({"chain:strips=2", 3, {0}}), kFrame, {1});
   runner.OnRendered(1, {1, 2});
   const std::vector<Step>& steps = runner.order().schedule().steps();
   const auto index = [&](Rank to, std::uint64_t begin) {
@@ -134,7 +168,7 @@ TEST(ScheduleRunner, StepsOfTheSamePixelsKeepTheirOrderAndOthersDoNotWait) {
 }
 
 TEST(ScheduleRunner, AReceiveComesAgainUntilAllPixelsAreThere) {
-  ScheduleRunner<RankInterval> runner(Derive({"fan-in", 2, 0}), kFrame, {0});
+  ScheduleRunner<RankInterval> runner(Derive({"fan-in", 2, {0}}), kFrame, {0});
   runner.OnRendered(0, {0, 1});
   runner.order().OnArrived(runner.order().Awaited(0).value(), 100);
   EXPECT_TRUE(runner.TakeNext());
@@ -148,9 +182,9 @@ TEST(ScheduleRunner, AReceiveComesAgainUntilAllPixelsAreThere) {
 TEST(DeriveSchedule, IsWhatTheSchemeMakes) {
   for (const CombiningEntry& entry : CombiningSchemes()) {
     const std::string scheme(entry.name);
-    const SharedSchedule schedule = Derive({scheme, 13, 5});
+    const SharedSchedule schedule = Derive({scheme, 13, {5}});
     EXPECT_EQ(schedule->schedule(), MakeSchedule(scheme, {13, 5, kFrame}));
-    EXPECT_EQ(Derive({scheme, 13, 5}), schedule) << "the last schedules are shared";
+    EXPECT_EQ(Derive({scheme, 13, {5}}), schedule) << "the last schedules are shared";
     for (Rank rank = 0; rank < 13; ++rank) {
       std::vector<std::uint32_t> expected;
       for (std::uint32_t i = 0; i < schedule->steps().size(); ++i) {
@@ -159,16 +193,18 @@ TEST(DeriveSchedule, IsWhatTheSchemeMakes) {
       EXPECT_TRUE(std::ranges::equal(schedule->StepsOf(rank), expected));
     }
   }
-  EXPECT_EQ(Derive({"", 0, 0})->schedule(), (Schedule{0, 0, {}}));
+  EXPECT_EQ(Derive({"", 0, {0}})->schedule(), (Schedule{0, {0}, {}}));
 }
 
 TEST(DeriveSchedule, SaysWhatIsWrongWithAName) {
   const auto message = [](const ScheduleName& name) { return DeriveSchedule(name, kFrame).status().message(); };
-  EXPECT_EQ(message({"fan-in", 2, 2}), "schedule.root is 2, but must be below 2");
-  EXPECT_EQ(message({"fan-in", 0, 1}), "schedule.root is 1, but must be below 1");
-  EXPECT_EQ(message({"fan-in", kMaxRanks + 1, 0}), "schedule.ranks is 65537, but at most 65536 are allowed");
-  EXPECT_NE(message({"glue", 2, 0}).find("schedule.scheme: 'glue' is not one of"), std::string::npos);
-  EXPECT_NE(message({"fan-in:2", 2, 0}).find("takes nothing after its name"), std::string::npos);
+  EXPECT_EQ(message({"fan-in", 2, {2}}), "schedule.roots has 2, but must be below 2");
+  EXPECT_EQ(message({"fan-in", 0, {1}}), "schedule.roots has 1, but must be below 1");
+  EXPECT_EQ(message({"fan-in", 2, {}}), "schedule.roots are 0, but must be from 1 to 64");
+  EXPECT_EQ(message({"fan-in", 30000, std::vector<Rank>(60)}), "schedule.roots are 60, but at most 34 are allowed for 30000 ranks");
+  EXPECT_EQ(message({"fan-in", kMaxRanks + 1, {0}}), "schedule.ranks is 65537, but at most 65536 are allowed");
+  EXPECT_NE(message({"glue", 2, {0}}).find("schedule.scheme: 'glue' is not one of"), std::string::npos);
+  EXPECT_NE(message({"fan-in:2", 2, {0}}).find("takes nothing after its name"), std::string::npos);
 }
 
 }  // namespace

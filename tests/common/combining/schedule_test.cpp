@@ -27,10 +27,37 @@ TEST(CombiningSchemes, EveryOneEndsWithAllRanksAtTheRoot) {
         SCOPED_TRACE(testing::Message() << combining << ", " << ranks << " ranks, root " << root);
         const Schedule schedule = MakeSchedule(combining, {ranks, root, kFrame});
         EXPECT_EQ(schedule.ranks, ranks);
-        EXPECT_EQ(schedule.root, root);
+        EXPECT_EQ(schedule.roots, std::vector<Rank>{root});
         ASSERT_EQ(CheckSchedule(schedule, kFrame), Status::Ok());
       }
     }
+  }
+}
+
+TEST(CombiningSchemes, EveryRootEndsWithItsShare) {
+  Random random(6);
+  SCOPED_TRACE(random.trace());
+  for (const CombiningEntry& entry : CombiningSchemes()) {
+    for (Rank ranks = 1; ranks <= 40; ++ranks) {
+      const std::string combining = ranks % 2 == 0 ? std::string(entry.name) : RandomArguments(entry, random);
+      std::vector<Rank> roots(random.Integer<std::size_t>(1, 20));
+      for (Rank& root : roots) root = random.Integer<Rank>(0, ranks - 1);
+      SCOPED_TRACE(testing::Message() << combining << ", " << ranks << " ranks, " << roots.size() << " roots");
+      const Schedule schedule = ParseCombining(combining)->Make(ranks, roots, kFrame);
+      EXPECT_EQ(schedule.roots, roots);
+      ASSERT_EQ(CheckSchedule(schedule, kFrame), Status::Ok());
+    }
+  }
+}
+
+// If every rank has a share, each receives as many pixels as in a swap without the collecting.
+TEST(CombiningSchemes, SharesDivideTheWorkEvenly) {
+  for (const char* combining : {"fan-in", "centralized", "tree:4", "radix-k:4x4", "binary-swap", "direct-send"}) {
+    const Schedule schedule = ParseCombining(combining)->Make(16, AllRanks(16), {0, 16000});
+    std::map<Rank, std::uint64_t> received;
+    for (const Step& step : schedule.steps) received[step.to] += PixelCount(step.pixels);
+    EXPECT_EQ(received.size(), 16U) << combining;
+    for (const auto& [rank, pixels] : received) EXPECT_EQ(pixels, 15000U) << combining << ", rank " << rank;
   }
 }
 
@@ -181,7 +208,7 @@ TEST(Centralized, EverybodySendsToTheRootOnce) {
 Schedule RecursiveHalving() {
   const PixelRange low = {0, 500}, high = {500, 1000}, q0 = {0, 250}, q1 = {250, 500}, q2 = {500, 750}, q3 = {750, 1000};
   return {4,
-          1,
+          {1},
           {{0, 0, 1, high},
            {0, 1, 0, low},
            {0, 2, 3, high},
@@ -198,10 +225,10 @@ Schedule RecursiveHalving() {
 TEST(CheckSchedule, UnderstandsSwapsOfPixelRanges) {
   ASSERT_EQ(CheckSchedule(RecursiveHalving(), kFrame), Status::Ok());
   // A chain in image strips: the strips need not be sent in one piece.
-  const Schedule strips = {3, 0, {{0, 2, 1, {0, 300}}, {1, 1, 0, {0, 300}}, {1, 2, 1, {300, 1000}}, {2, 1, 0, {300, 1000}}}};
+  const Schedule strips = {3, {0}, {{0, 2, 1, {0, 300}}, {1, 1, 0, {0, 300}}, {1, 2, 1, {300, 1000}}, {2, 1, 0, {300, 1000}}}};
   EXPECT_EQ(CheckSchedule(strips, kFrame), Status::Ok());
   // Fragments of different history leave in one step.
-  const Schedule pieces = {2, 0, {{0, 0, 1, {0, 10}}, {1, 1, 0, {0, 10}}, {2, 1, 0, {10, 1000}}}};
+  const Schedule pieces = {2, {0}, {{0, 0, 1, {0, 10}}, {1, 1, 0, {0, 10}}, {2, 1, 0, {10, 1000}}}};
   EXPECT_EQ(CheckSchedule(pieces, kFrame), Status::Ok());
 }
 
@@ -215,29 +242,29 @@ TEST(CheckSchedule, SaysWhatIsWrong) {
     const std::string text = message(schedule);
     EXPECT_NE(text.find(part), std::string::npos) << text << "\nhas no: " << part;
   };
-  expect({kMaxRanks + 1, 0, {}}, "schedule.ranks is 65537");
-  expect({2, 2, {{0, 1, 0, kFrame}}}, "schedule.root is 2");
-  expect({2, 0, {{0, 2, 0, kFrame}}}, "steps[0]: goes from rank 2 to 0");
-  expect({2, 0, {{0, 0, 0, kFrame}}}, "two different ranks");
-  expect({3, 0, {{1, 2, 1, kFrame}, {0, 1, 0, kFrame}}}, "steps[1]: is of round 0, but follows round 1");
-  expect({2, 0, {{0, 1, 0, {0, 1001}}}}, "moves pixels [0, 1001)");
-  expect({2, 0, {{0, 1, 0, {5, 5}}}}, "moves pixels [5, 5)");
-  expect({3, 0, {{0, 2, 0, kFrame}}}, "not adjacent");
-  expect({2, 0, {}}, "root 0 does not end with ranks [0, 2)");
-  expect({2, 0, {{0, 1, 0, {0, 999}}}}, "does not end");
-  expect({2, 1, {{0, 1, 0, kFrame}}}, "does not end");  // at the wrong rank
-  expect({3, 0, {{0, 1, 0, kFrame}, {1, 1, 0, kFrame}}}, "steps[1]: rank 1 sends pixels that it does not hold");
-  expect({3, 0, {{0, 1, 0, {0, 10}}, {1, 1, 0, {5, 20}}}}, "does not hold");
-  expect({3, 0, {{0, 1, 0, kFrame}, {0, 2, 0, kFrame}}}, "rank 0 touches the same pixels twice in round 0");
-  expect({3, 0, {{0, 2, 1, {0, 10}}, {0, 1, 0, {9, 20}}}}, "rank 1 touches the same pixels twice in round 0");
+  expect({kMaxRanks + 1, {0}, {}}, "schedule.ranks is 65537");
+  expect({2, {2}, {{0, 1, 0, kFrame}}}, "schedule.roots has 2");
+  expect({2, {0}, {{0, 2, 0, kFrame}}}, "steps[0]: goes from rank 2 to 0");
+  expect({2, {0}, {{0, 0, 0, kFrame}}}, "two different ranks");
+  expect({3, {0}, {{1, 2, 1, kFrame}, {0, 1, 0, kFrame}}}, "steps[1]: is of round 0, but follows round 1");
+  expect({2, {0}, {{0, 1, 0, {0, 1001}}}}, "moves pixels [0, 1001)");
+  expect({2, {0}, {{0, 1, 0, {5, 5}}}}, "moves pixels [5, 5)");
+  expect({3, {0}, {{0, 2, 0, kFrame}}}, "not adjacent");
+  expect({2, {0}, {}}, "root 0 does not end with ranks [0, 2)");
+  expect({2, {0}, {{0, 1, 0, {0, 999}}}}, "does not end");
+  expect({2, {1}, {{0, 1, 0, kFrame}}}, "does not end");  // at the wrong rank
+  expect({3, {0}, {{0, 1, 0, kFrame}, {1, 1, 0, kFrame}}}, "steps[1]: rank 1 sends pixels that it does not hold");
+  expect({3, {0}, {{0, 1, 0, {0, 10}}, {1, 1, 0, {5, 20}}}}, "does not hold");
+  expect({3, {0}, {{0, 1, 0, kFrame}, {0, 2, 0, kFrame}}}, "rank 0 touches the same pixels twice in round 0");
+  expect({3, {0}, {{0, 2, 1, {0, 10}}, {0, 1, 0, {9, 20}}}}, "rank 1 touches the same pixels twice in round 0");
   Schedule twice = RecursiveHalving();
   twice.steps.push_back({5, 0, 1, {0, 250}});
   expect(twice, "does not hold");
 }
 
 TEST(CheckSchedule, AGroupWithoutImagesNeedsNoSteps) {
-  EXPECT_TRUE(CheckSchedule({0, 0, {}}, kFrame).ok());
-  EXPECT_FALSE(CheckSchedule({0, 0, {{0, 0, 1, kFrame}}}, kFrame).ok());
+  EXPECT_TRUE(CheckSchedule({0, {0}, {}}, kFrame).ok());
+  EXPECT_FALSE(CheckSchedule({0, {0}, {{0, 0, 1, kFrame}}}, kFrame).ok());
 }
 
 // Unless the schedule is still a good one: what the root does not send away it may combine with what it collects.
@@ -246,7 +273,7 @@ TEST(CheckSchedule, NoticesALostStep) {
     const Schedule good = MakeSchedule(std::string(entry.name), {13, 5, kFrame});
     for (std::size_t lost = 0; lost < good.steps.size(); ++lost) {
       Schedule bad = good;
-      if (good.steps[lost].from == good.root) continue;
+      if (good.steps[lost].from == good.roots.front()) continue;
       bad.steps.erase(bad.steps.begin() + std::ptrdiff_t(lost));
       EXPECT_FALSE(CheckSchedule(bad, kFrame).ok()) << entry.name << " without step " << lost;
     }

@@ -108,7 +108,7 @@ TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
       }
     }
   }
-  // Where colours cannot be coded they stay floats.
+  // Where 16-bit codes cannot hold the colours they stay floats.
   LocalImage bright = MakeLocalImage(PixelFormat::kRgba, {0, 0, 4, 1});
   bright.rgba[0] = bright.rgba[3] = 2;
   EXPECT_EQ(EncodeRuns(ViewOf(bright), ColorCoding::kHalf).header.color, ColorCoding::kFloat32);

@@ -1,5 +1,6 @@
 #include "common/image/run_image.h"
 #include "common/image/image_view.h"
+#include "common/image/sample_codes.h"
 
 #include <gtest/gtest.h>
 
@@ -135,6 +136,24 @@ TEST(RunImage, PicturesLeaveTheVoxelsOut) {
     EXPECT_TRUE(decoded.voxel.empty());
   }
   EXPECT_EQ(EncodePicture(MakeLocalImage(PixelFormat::kDepth, {})).header.format, PixelFormat::kRgbaDepth);
+}
+
+// Runs of a picture in the codes of a PNG of 8 bits: a quarter of the colours' bytes, no depths, and the PNG is the same.
+TEST(RunImage, PicturesMayComeInTheCodesOfAFile) {
+  Random random(37);
+  SCOPED_TRACE(random.trace());
+  for (const PixelFormat format : {PixelFormat::kRgba, PixelFormat::kDepth}) {
+    const LocalImage image = RandomImage(random, format, {2, 3, 20, 15});
+    const RunImage runs = EncodePicture(image, ColorCoding::kStraight8);
+    EXPECT_EQ(runs.payload.size(), 12 * runs.header.run_count + 4 * runs.header.pixel_count);
+    const LocalImage decoded = ReadRuns(runs.header, runs.payload, kFrame).value();
+    EXPECT_EQ(decoded.format, PixelFormat::kRgba);
+    ASSERT_EQ(decoded.bounds, image.bounds);
+    std::vector<std::uint8_t> codes(image.rgba.size()), decoded_codes(image.rgba.size());
+    StraightCodes(image.rgba.data(), codes.size() / 4, codes.data());
+    StraightCodes(decoded.rgba.data(), codes.size() / 4, decoded_codes.data());
+    EXPECT_EQ(decoded_codes, codes);
+  }
 }
 
 TEST(RunImage, BoundsOfPicturesEndWhereTheyShowNothing) {

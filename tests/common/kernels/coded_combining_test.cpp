@@ -41,7 +41,7 @@ LocalImage RunSchedule(const Schedule& schedule, const std::vector<LocalImage>& 
       Erase(held[step.from].image, one, kFrame.width());
     }
   }
-  LocalImage result = std::move(held[schedule.root].image);
+  LocalImage result = std::move(held[schedule.roots.front()].image);
   FillRows(result);
   return result;
 }

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/image/add_image.h"
+#include "common/image/image_view.h"
 #include "tests/support/random_image.h"
 #include "tests/support/simd_targets.h"
 
@@ -68,6 +70,29 @@ TEST(ResampleRows, WritesItsRowsOnly) {
   ResampleRows(frame, map, 0, 30, whole);
   for (std::int32_t y = 0; y < 30; y += 7) ResampleRows(frame, map, y, std::min(y + 7, 30), parts);
   EXPECT_EQ(whole.rgba, parts.rgba);
+}
+
+// As the shares of a picture that several workers finish.
+TEST(ResampleRows, PartsOfAFrameAddUpToTheWhole) {
+  Random random(67);
+  SCOPED_TRACE(random.trace());
+  for (int trial = 0; trial < 60; ++trial) {
+    const LocalImage frame = RandomImage(random, PixelFormat::kRgba, {0, 0, 50, 40});
+    const ProjectiveMap map = RandomMap(random, std::exp(random.Real(-1.5, 1.5)), trial % 2 == 1);
+    LocalImage whole = Picture(40, 30), sum = Picture(40, 30);
+    ResampleRows(frame, map, 0, 30, whole);
+    std::uint64_t begin = 0;
+    while (begin < 2000) {
+      const std::uint64_t end = std::min<std::uint64_t>(2000, begin + random.Integer<std::uint64_t>(1, 900));
+      LocalImage part = CopyOf(ViewOf(frame, {begin, end}, 50));
+      FillRows(part);
+      LocalImage picture = MakeLocalImage(PixelFormat::kRgba, ReachedPixels(part.bounds, map, 40, 30));
+      ResampleRows(part, map, picture.bounds.y_begin, picture.bounds.y_end, picture);
+      AddImage(sum, picture);
+      begin = end;
+    }
+    for (std::size_t i = 0; i < whole.rgba.size(); ++i) ASSERT_NEAR(sum.rgba[i], whole.rgba[i], 2e-6F) << "trial " << trial;
+  }
 }
 
 // Weights are not negative and sum to 1.

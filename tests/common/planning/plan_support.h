@@ -48,7 +48,7 @@ inline void ExpectSound(const FramePlan& plan, const Roster& roster) {
     // The display worker gets the group's image without another message if it has a rank.
     const bool has_rank = std::any_of(group.placements.begin(), group.placements.end(), [&](auto& p) { return p.worker == plan.display; });
     if (has_rank) {
-      EXPECT_EQ(group.placements[group.schedule.root].worker, plan.display);
+      EXPECT_EQ(group.placements[group.schedule.roots.front()].worker, plan.display);
     }
   }
   EXPECT_NE(plan.display, 0U);

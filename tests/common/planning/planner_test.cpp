@@ -175,7 +175,7 @@ TEST(PlanFrame, AnEmptyVolumeHasAPlanOfEmptyGroups) {
   ExpectSound(plan, roster);
   EXPECT_TRUE(PlacedBoxes(plan).empty());
   EXPECT_EQ(plan.groups.size(), 1U);
-  EXPECT_EQ(plan.groups[0].schedule, (ScheduleName{plan.combine, 0, 0}));
+  EXPECT_EQ(plan.groups[0].schedule, (ScheduleName{plan.combine, 0, {0}}));
   EXPECT_EQ(plan.display, roster.slots[0]);
 }
 

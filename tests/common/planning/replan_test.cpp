@@ -32,6 +32,36 @@ TEST(PlanFrame, DisplayWorkersTakeTurns) {
   }
 }
 
+TEST(PlanFrame, SharesAreOfDifferentWorkersAndTakeTurns) {
+  for (int workers = 2; workers <= 9; ++workers) {
+    FrameRequest request = SomeRequest();
+    request.policy.groups = 1;
+    Roster roster = FullRoster(workers);
+    FramePlan first = Plan(request, FullSummary({96, 96, 96}), roster);
+    if (workers > 2) roster.slots.back() = 0;  // another worker has its box
+    const std::size_t present = std::size_t(workers) - (workers > 2 ? 1 : 0);
+    for (std::size_t shares = 1; shares <= present + 1; ++shares) {
+      first.share_pixels = WholeFrame(first.setup).end / shares;
+      std::set<WorkerId> all;
+      for (std::uint64_t turn = 0; turn < present; ++turn) {
+        const FramePlan plan = TakeTurn(first, roster, {turn, 1});
+        ExpectSound(plan, roster);
+        const std::vector<WorkerId> displays = DisplaysOf(plan.groups.front(), plan.display);
+        const std::set<WorkerId> distinct(displays.begin(), displays.end());
+        EXPECT_EQ(displays.size(), std::min(shares, present));
+        EXPECT_EQ(distinct.size(), displays.size());
+        EXPECT_EQ(displays.front(), plan.display);
+        all.insert(displays.begin(), displays.end());
+      }
+      EXPECT_EQ(all.size(), present) << shares << " shares";
+    }
+    // A box that is tried alone is in nobody's way.
+    first.share_pixels = 1;
+    const FramePlan trial = *Replan(first, roster, {{first.groups.front().placements.front().id}, 1});
+    EXPECT_EQ(trial.groups.front().schedule.roots.size(), 1U);
+  }
+}
+
 TEST(Replan, ReassignsLostBoxesAndChangesNothingElse) {
   const VolumeSummary summary = FullSummary({40, 40, 120});
   for (const CombiningEntry& scheme : CombiningSchemes()) {

@@ -37,7 +37,7 @@ TEST(AnyMessage, EverySampleSurvivesTheWire) {
 }
 
 TEST(AnyMessage, HeaderBytesAreThoseOfTheDocumentation) {
-  const std::string documented("\x08\x01\x9a\x04\x09\x09\x05\x00\x00\x00\x00\x00\x00\x00", 14);  // docs/wire.md, section 2
+  const std::string documented("\x08\x02\x9a\x04\x09\x09\x05\x00\x00\x00\x00\x00\x00\x00", 14);  // docs/wire.md, section 2
   const Result<AnyMessage> decoded = Decode(BytesOf(documented));
   ASSERT_TRUE(decoded.ok()) << decoded.status().message();
   EXPECT_TRUE(*decoded == AnyMessage(StatusQuery{.nonce = 5}));
@@ -81,7 +81,7 @@ TEST(AnyMessage, ManyRanksSurvive) {
     message.group.placements.push_back({rank, box, rank + 1});
     message.peers.push_back({rank + 1, "inproc://worker"});
   }
-  message.group.schedule = {"direct-send", kRanks, 0};
+  message.group.schedule = {"direct-send", kRanks, {0}};
   EXPECT_TRUE(DecodeAnyInput(Encode(message)));
 }
 
@@ -116,18 +116,18 @@ TEST(AnyMessage, EachMessageHasOnePlaceToGo) {
 }
 
 TEST(AnyMessage, EnvelopeFaultsAreNamed) {
-  EXPECT_EQ(Decode({}).status().message(), "Envelope.version: 0 is not the one spoken here, 1");
+  EXPECT_EQ(Decode({}).status().message(), "Envelope.version: 0 is not the one spoken here, 2");
   v1::Envelope envelope;
   envelope.mutable_stop()->set_epoch(5);
-  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 0 is not the one spoken here, 1");
-  envelope.set_version(2);
-  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 2 is not the one spoken here, 1");
+  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 0 is not the one spoken here, 2");
   envelope.set_version(1);
+  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 1 is not the one spoken here, 2");
+  envelope.set_version(2);
   EXPECT_EQ(ErrorOf(envelope), "");
   envelope.clear_message();
   EXPECT_EQ(ErrorOf(envelope), "Envelope.message: none that this version knows");
   // A message with a number that is not in the schema yet: field 99, of zero bytes.
-  EXPECT_EQ(Decode(BytesOf(std::string("\x08\x01\x9A\x06\x00", 5))).status().message(), "Envelope.message: none that this version knows");
+  EXPECT_EQ(Decode(BytesOf(std::string("\x08\x02\x9A\x06\x00", 5))).status().message(), "Envelope.message: none that this version knows");
   EXPECT_THAT(Decode(BytesOf("garbage")).status().message(), HasSubstr("Envelope: 7 bytes that are not a Protobuf message"));
   const std::vector<std::byte> huge(kMaxHeaderBytes + 1);
   EXPECT_EQ(Decode(huge).status().message(), "Envelope: 67108865 bytes, at most 67108864");
@@ -173,8 +173,8 @@ TEST(AnyMessage, RefusedSubmitsCanBeAnswered) {
 
 TEST(AnyMessage, PayloadLengthsAreThoseOfTheHeader) {
   const EncodedRuns runs{{PixelFormat::kDepth, {0, 0, 10, 10}, 3, 50}, Codec::kZstd, 99, 0};
-  EXPECT_EQ(ExpectedPayloadBytes(FrameImage{.runs = runs, .reports = {}}), 99U);
-  EXPECT_EQ(ExpectedPayloadBytes(FrameReply{.runs = runs, .statistics = {}}), 99U);
+  EXPECT_EQ(ExpectedPayloadBytes(FrameImage{.picture = {runs}}), 99U);
+  EXPECT_EQ(ExpectedPayloadBytes(FrameReply{.shares = {{runs}, {runs, true}}, .statistics = {}}), 99U);
   EXPECT_EQ(ExpectedPayloadBytes(PartialImage{.image = runs.image, .reports = {}}), 3U * 12 + 50 * 24);
   const SharedImage shared = {.arena = {1, 2, 3}, .bounds = {5, 10, 9, 17}, .stride = 4};
   EXPECT_EQ(ExpectedPayloadBytes(PartialImage{.shared = shared, .reports = {}}), 7U * 8);

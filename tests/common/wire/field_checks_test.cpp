@@ -139,7 +139,7 @@ TEST(FieldChecks, Groups) {
       {[&](E& e) { plan(e)->mutable_placements(1)->set_worker(0); }, "GroupAssignment.group.placements[1].worker: 0 is not in [1, "},
       {[&](E& e) { plan(e)->mutable_placements()->RemoveLast(); }, "GroupAssignment.group.schedule.ranks: 3, but there are 2 placements"},
       {[&](E& e) { schedule(e)->set_ranks(65537); }, "GroupAssignment.group.schedule.ranks: 65537 is not in [0, 65536]"},
-      {[&](E& e) { schedule(e)->set_root(3); }, "GroupAssignment.group: schedule.root is 3, but must be below 3"},
+      {[&](E& e) { schedule(e)->set_roots(0, 3); }, "GroupAssignment.group: schedule.roots has 3, but must be below 3"},
       {[&](E& e) { schedule(e)->set_scheme("glue"); }, "GroupAssignment.group: schedule.scheme: 'glue' is not one of "},
       {[&](E& e) { schedule(e)->clear_scheme(); }, "GroupAssignment.group: schedule.scheme: '' is not one of "},
       {[&](E& e) { schedule(e)->set_scheme(std::string(257, 'x')); }, "GroupAssignment.group.schedule.scheme: "},
@@ -279,9 +279,10 @@ TEST(FieldChecks, Images) {
   Check<FrameImage>({
       {[](auto& e) { e.mutable_frame_image()->set_group_count(0); }, "FrameImage.group_count: 0 is not in [1, 1024]"},
       {[](auto& e) { e.mutable_frame_image()->set_groups_done(2); }, "FrameImage.groups_done: 2 is not in [0, 1]"},
-      {[](auto& e) { e.mutable_frame_image()->mutable_runs()->set_encoded_bytes(1); }, "FrameImage.runs.encoded_bytes: 1 is not in [0, 0]"},
-      {[](auto& e) { e.mutable_frame_image()->mutable_runs()->set_codec(v1::CODEC_ZSTD); },
-       "FrameImage.runs.encoded_bytes: 0 is not in [1, 0]"},
+      {[](auto& e) { e.mutable_frame_image()->mutable_picture()->mutable_runs()->set_encoded_bytes(1); },
+       "FrameImage.picture.runs.encoded_bytes: 1 is not in [0, 0]"},
+      {[](auto& e) { e.mutable_frame_image()->mutable_picture()->mutable_runs()->set_codec(v1::CODEC_ZSTD); },
+       "FrameImage.picture.runs.encoded_bytes: 0 is not in [1, 0]"},
   });
 }
 
@@ -313,11 +314,11 @@ TEST(FieldChecks, Clients) {
   Check<FrameReply>({
       {[](auto& e) { e.mutable_frame_reply()->clear_size(); }, "FrameReply.size.width: 0 is not in [1, 16384]"},
       {[](auto& e) {
-         v1::EncodedRuns* runs = e.mutable_frame_reply()->mutable_runs();
+         v1::EncodedRuns* runs = e.mutable_frame_reply()->mutable_shares(0)->mutable_runs();
          runs->mutable_image()->mutable_bounds()->set_x_end(2);
          runs->mutable_image()->mutable_bounds()->set_y_end(1);
        },
-       "FrameReply.runs.image.bounds: not inside the picture"},
+       "FrameReply.shares[0].runs.image.bounds: not inside the picture"},
       {[&](auto& e) { geometry(e)->clear_world(); }, "FrameReply.geometry.world: not set"},
       {[&](auto& e) { geometry(e)->set_unit(v1::LengthUnit(9)); }, "FrameReply.geometry.unit: unknown value 9"},
       {[&](auto& e) { geometry(e)->clear_projection(); }, "FrameReply.geometry.projection: not set"},

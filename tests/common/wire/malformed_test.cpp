@@ -220,6 +220,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"parameters", kMaxParameters},
       {"renderers", 256},
       {"abilities", 64},
+      {"roots", kMaxShares},
+      {"shares", kMaxShares},
   };
   std::map<std::string, bool> seen;
   AlterEachField(

@@ -58,7 +58,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   GroupAssignment message{.epoch = kMax64, .key = {.frame = kMax64, .attempt = kMax32, .group = 3}, .finished_before = kMax64 - 1};
   message.group_count = 1024;
   message.first_group = 3;
-  message.previews = true;
+  message.previews = message.straight8 = true;
   message.display = kMax32;
   FrameSetup& setup = message.setup;
   setup.dataset = kMax64;
@@ -88,7 +88,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
     setup.stored = StoredAt{.source = "/data/scan.ome.zarr?channel=1", .level = 2, .version = kMax64, .block = {{0, 0, 0}, {64, 32, 1}}};
     message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {kMaxVolumeSide, 32, 2}}, -1e30F}};
   }
-  message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, ranks / 2};
+  message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, {ranks / 2}};
   message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
   return message;
@@ -172,6 +172,14 @@ GroupAssignment BehindOthers() {
 EncodedRuns NoRuns() { return {{PixelFormat::kRgba, {}, 0, 0}, Codec::kRaw, 0, kMax64}; }
 EncodedRuns SomeRuns() { return {{PixelFormat::kRgbaDepth, {1, 2, 30, 40}, 7, 900}, Codec::kZstd, 12 * 7 + 20 * 900, 1}; }
 
+EncodedRuns StraightRuns() {
+  EncodedRuns runs = SomeRuns();
+  runs.image.format = PixelFormat::kRgba;
+  runs.image.color = ColorCoding::kStraight8;
+  runs.encoded_bytes = 12 * 7 + 4 * 900;
+  return runs;
+}
+
 constexpr Box kWholeBox = {{0, 0, 0}, {kMaxVolumeSide, kMaxVolumeSide, kMaxVolumeSide}};
 constexpr Box kOneVoxel = {{9, 8, 7}, {10, 9, 8}};
 
@@ -229,9 +237,9 @@ std::vector<GroupDone> SamplesOf() {
 
 template <>
 std::vector<FrameImage> SamplesOf() {
-  return {{1, 2, 3, 4, 0, 1, NoRuns(), {}},
-          {kMax64, kMax32, kMax64, kMax32, 1024, 1024, SomeRuns(), {FullReport()}},
-          {1, 2, 3, 4, 1, 1, SomeRuns(), {}, true}};
+  return {{1, 2, 3, 4, 0, 1, {NoRuns()}, {}},
+          {kMax64, kMax32, kMax64, kMax32, 1024, 1024, {SomeRuns()}, {FullReport()}, kMaxShares - 1, kMaxShares},
+          {1, 2, 3, 4, 1, 1, {SomeRuns(), true}, {}, 0, 2}};
 }
 
 template <>
@@ -335,7 +343,7 @@ std::vector<SubmitFrame> SamplesOf() {
   full.shading = ManyLights();
   full.termination = 0.5;
   full.policy = {kUmlaut, kLongName, AxisChoice::kX, kMaxGroups, kUmlaut, kLongName, kLongName, kMaxPixelError, kMaxTeams};
-  full.previews = true;
+  full.previews = full.straight8 = true;
   FrameRequest sliced = Request();
   sliced.clipping.slab = ClipSlab{.through = Vec3{1, -2, 3e8}};
   FrameRequest surfaces = Request();
@@ -382,10 +390,11 @@ std::vector<FrameReply> SamplesOf() {
       World::kScene, LengthUnit::kFile, Projection::kOrthographic, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, {}, -7.5, 0.25};
   PictureGeometry in_metres = of_patient;
   in_metres.unit = LengthUnit::kMetre;
-  return {{1, {1, 1}, 0, 1, NoRuns(), {}, {}},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), statistics, of_patient},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, behind_the_eye_plane},
-          {kMax64, {30, 40}, 1024, 1024, SomeRuns(), predicted, in_metres, true}};
+  return {{1, {1, 1}, 0, 1, {{NoRuns()}}, {}, {}},
+          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}}, statistics, of_patient},
+          {kMax64, {30, 40}, 1024, 1024, {{StraightRuns()}}, statistics, of_patient},
+          {kMax64, {30, 40}, 1024, 1024, {{SomeRuns()}, {SomeRuns(), true}}, predicted, behind_the_eye_plane},
+          {kMax64, {30, 40}, 1024, 1024, std::vector<PictureShare>(kMaxShares, {SomeRuns(), true}), predicted, in_metres}};
 }
 
 template <>

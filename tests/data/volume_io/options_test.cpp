@@ -27,6 +27,17 @@ TEST(SourceText, IsAPathWithOptionsBehindIt) {
   EXPECT_EQ(ParseSourceText("what?")->path, "what?") << "no option stands behind the question mark";
 }
 
+TEST(SourceText, MayBeABucketOfAServer) {
+  const std::string bucket = "s3://bucket/em?endpoint=http://127.0.0.1:9000";
+  EXPECT_EQ(ParseSourceText(bucket)->path, bucket);
+  const Result<SourceText> timed = ParseSourceText(WithReadOption(bucket, "time", "3"));
+  ASSERT_TRUE(timed.ok()) << timed.status().message();
+  EXPECT_EQ(timed->path, bucket);
+  EXPECT_EQ(timed->options.time, (TimeRange{3, 3}));
+  EXPECT_EQ(AtTime(bucket + ",time=3", 4), bucket + ",time=4");
+  EXPECT_EQ(ParseSourceText("s3://bucket/em?time=3")->path, "s3://bucket/em");
+}
+
 TEST(SourceText, MayBeAFileWithAQuestionMark) {
   const TemporaryDirectory directory;
   const std::string odd = directory / "a?time=1";

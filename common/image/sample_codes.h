@@ -10,8 +10,12 @@ namespace slabstream {
 // Of each sample. Of premultiplied colours these are the colours over black.
 void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes);
 
-// `premultiplied`: [pixel][4], as `codes`, which hold the colours before they were multiplied by alpha; 0 where alpha is 0.
+// `premultiplied`: [pixel][4], as `codes`, which hold the colours before they were multiplied by alpha; 0 where the code of alpha is 0.
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes);
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes);
+
+// The premultiplied colours that 8-bit codes stand for. StraightCodes of them are the same codes again, except that colours without alpha
+// become 0.
+void FromStraightCodes(const std::uint8_t* codes, std::size_t pixels, float* premultiplied);
 
 }  // namespace slabstream

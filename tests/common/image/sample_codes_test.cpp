@@ -1,9 +1,10 @@
 // Codes of samples: known values, and every instruction set against the reference.
 
-#include "tests/common/kernels/sample_codes_reference.h"
+#include "tests/common/image/sample_codes_reference.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -39,13 +40,34 @@ TEST(SampleCodes, AreRoundedAndClamped) {
 }
 
 TEST(SampleCodes, OfColorsAreDividedByAlpha) {
-  const std::vector<float> rgba = {0.25F, 0.5F, 0.125F, 0.5F, 0.3F, 0.2F, 0.1F, 0};
+  const std::vector<float> rgba = {0.25F, 0.5F, 0.125F, 0.5F, 5e-6F, 5e-6F, 5e-6F, 6e-6F};
   std::vector<std::uint8_t> codes(8);
   std::vector<std::uint16_t> deep(8);
   StraightCodes(rgba.data(), 2, codes.data());
   StraightCodes(rgba.data(), 2, deep.data());
   EXPECT_EQ(codes, (std::vector<std::uint8_t>{128, 255, 64, 128, 0, 0, 0, 0}));
   EXPECT_EQ(deep, (std::vector<std::uint16_t>{32768, 65535, 16384, 32768, 0, 0, 0, 0}));
+}
+
+// Also where alpha is tiny, so that its code is 0.
+TEST(SampleCodes, OfColorsFromCodesAreTheseCodes) {
+  std::vector<std::uint8_t> codes;
+  for (int alpha = 0; alpha < 256; ++alpha) {
+    for (int color = 0; color < 256; ++color) {
+      for (const int sample : {color, 255 - color, color, alpha}) codes.push_back(std::uint8_t(alpha == 0 ? 0 : sample));
+    }
+  }
+  for (const std::size_t pixels : {codes.size() / 4, std::size_t{7}}) {
+    ForEachTarget([&] {
+      std::vector<float> rgba(4 * pixels);
+      FromStraightCodes(codes.data() + codes.size() - rgba.size(), pixels, rgba.data());
+      std::vector<std::uint8_t> again(rgba.size());
+      StraightCodes(rgba.data(), pixels, again.data());
+      EXPECT_TRUE(std::equal(again.begin(), again.end(), codes.end() - std::ptrdiff_t(again.size())));
+      EXPECT_EQ(rgba[rgba.size() - 1], 1);
+      EXPECT_EQ(rgba[rgba.size() - 4], 1);
+    });
+  }
 }
 
 TEST(SampleCodes, AreThoseOfTheReferenceOnEveryInstructionSet) {

@@ -1,13 +1,13 @@
 // The codes of samples for every instruction set that the compiler knows; the best one that the CPU has is chosen at the first call.
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "common/kernels/sample_codes.cpp"
+#define HWY_TARGET_INCLUDE "common/image/sample_codes.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 #include <limits>
 
-#include "common/kernels/sample_codes.h"
+#include "common/image/sample_codes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace slabstream::HWY_NAMESPACE {
@@ -15,6 +15,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using FloatTag = hn::ScalableTag<float>;
 using OneTag = hn::CappedTag<float, 1>;
+constexpr float kMax8 = std::numeric_limits<std::uint8_t>::max();
 
 // As many samples as D has lanes.
 template <class D, class Code>
@@ -39,6 +40,7 @@ void Plain8(const float* samples, std::size_t count, std::uint8_t* codes) {
 
 template <class Code>
 HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
+  constexpr float max = std::numeric_limits<Code>::max();
   const std::size_t count = 4 * pixels;
   std::size_t i = 0;
 #if HWY_TARGET != HWY_SCALAR
@@ -48,13 +50,32 @@ HWY_INLINE void Straight(const float* rgba, std::size_t pixels, Code* codes) {
   for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
     const auto color = hn::LoadU(d, rgba + i), alpha = hn::Broadcast<3>(color);  // within each 128-bit block: one pixel
     const auto straight = hn::Div(color, hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), alpha));
-    StoreCodes(d, hn::IfThenElseZero(hn::Gt(alpha, hn::Zero(d)), straight), codes + i);
+    const auto shows = hn::Ge(hn::Mul(hn::Set(d, max), alpha), hn::Set(d, 0.5F));
+    StoreCodes(d, hn::IfThenElseZero(shows, straight), codes + i);
   }
 #endif
   for (; i < count; ++i) {
-    const float alpha = rgba[i | 3], sample = i % 4 == 3 ? alpha : alpha > 0 ? rgba[i] / alpha : 0;
+    const float alpha = rgba[i | 3], sample = i % 4 == 3 ? alpha : max * alpha >= 0.5F ? rgba[i] / alpha : 0;
     StoreCodes(OneTag(), hn::Set(OneTag(), sample), codes + i);
   }
+}
+
+void FromStraight8(const std::uint8_t* codes, std::size_t pixels, float* rgba) {
+  const std::size_t count = 4 * pixels;
+  std::size_t i = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const FloatTag d;
+  const hn::RebindToSigned<FloatTag> di;
+  const hn::RebindToUnsigned<FloatTag> du;
+  const hn::Rebind<std::uint8_t, FloatTag> dc;
+  const auto is_alpha = hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(du, 0), hn::Set(du, 3)), hn::Set(du, 3)));
+  for (; i + hn::Lanes(d) <= count; i += hn::Lanes(d)) {
+    const auto straight = hn::Div(hn::ConvertTo(d, hn::PromoteTo(di, hn::LoadU(dc, codes + i))), hn::Set(d, kMax8));
+    const auto factor = hn::IfThenElse(is_alpha, hn::Set(d, 1.0F), hn::Broadcast<3>(straight));
+    hn::StoreU(hn::Mul(straight, factor), d, rgba + i);
+  }
+#endif
+  for (; i < count; ++i) rgba[i] = float(codes[i]) / kMax8 * (i % 4 == 3 ? 1 : float(codes[i | 3]) / kMax8);
 }
 
 void Straight8(const float* rgba, std::size_t pixels, std::uint8_t* codes) { Straight(rgba, pixels, codes); }
@@ -68,6 +89,7 @@ namespace slabstream {
 HWY_EXPORT(Plain8);
 HWY_EXPORT(Straight8);
 HWY_EXPORT(Straight16);
+HWY_EXPORT(FromStraight8);
 
 void SampleCodes(const float* samples, std::size_t count, std::uint8_t* codes) { HWY_DYNAMIC_DISPATCH(Plain8)(samples, count, codes); }
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t* codes) {
@@ -75,6 +97,9 @@ void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint8_t*
 }
 void StraightCodes(const float* premultiplied, std::size_t pixels, std::uint16_t* codes) {
   HWY_DYNAMIC_DISPATCH(Straight16)(premultiplied, pixels, codes);
+}
+void FromStraightCodes(const std::uint8_t* codes, std::size_t pixels, float* premultiplied) {
+  HWY_DYNAMIC_DISPATCH(FromStraight8)(codes, pixels, premultiplied);
 }
 
 }  // namespace slabstream

@@ -1,7 +1,7 @@
 // The definitions of SampleCodes and StraightCodes in plain code.
 #pragma once
 
-#include "common/kernels/sample_codes.h"
+#include "common/image/sample_codes.h"
 
 namespace slabstream::testing {
 

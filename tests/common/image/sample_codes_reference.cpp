@@ -1,4 +1,4 @@
-#include "tests/common/kernels/sample_codes_reference.h"
+#include "tests/common/image/sample_codes_reference.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +17,8 @@ template <class Code>
 void StraightCodesOf(const float* premultiplied, std::size_t pixels, Code* codes) {
   for (std::size_t i = 0; i < 4 * pixels; i += 4) {
     const float alpha = premultiplied[i + 3];
-    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = alpha > 0 ? CodeOf<Code>(premultiplied[i + c] / alpha) : Code(0);
     codes[i + 3] = CodeOf<Code>(alpha);
+    for (std::size_t c = 0; c < 3; ++c) codes[i + c] = codes[i + 3] > 0 ? CodeOf<Code>(premultiplied[i + c] / alpha) : Code(0);
   }
 }
 

@@ -1,0 +1,135 @@
+// Objects behind an HTTP server. What was read of an object stays what it was: a later read that finds another version of it is an error,
+// so that no volume is a mixture of two.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "common/base/printable.h"
+#include "common/base/url.h"
+#include "data/stores/http_transfers.h"
+#include "data/stores/object_key.h"
+#include "data/stores/store.h"
+
+namespace slabstream {
+namespace {
+
+// Everything but what RFC 3986 leaves as it is, and the slashes between parts.
+std::string Encoded(const std::string& key) {
+  std::string url;
+  for (const char c : key) {
+    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                       std::string_view("-._~/").find(c) != std::string_view::npos;
+    url += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
+  }
+  return url;
+}
+
+// Which version of each object was seen first; of the last kMost.
+class SeenVersions {
+ public:
+  // False: another version of the object was seen before.
+  bool Agrees(const std::string& key, const std::string& version) {
+    if (version.empty()) return true;
+    const std::lock_guard lock(mutex_);
+    const auto [found, is_new] = versions_.try_emplace(key, version);
+    if (!is_new) return found->second == version;
+    order_.push_back(key);
+    if (order_.size() > kMost) {
+      versions_.erase(order_.front());
+      order_.pop_front();
+    }
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t kMost = 65536;
+  std::mutex mutex_;
+  std::map<std::string, std::string> versions_;
+  std::deque<std::string> order_;
+};
+
+class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStoreImpl> {
+ public:
+  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers)
+      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers) {}
+
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+    if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
+    if (range.bytes == 0) return done(Bytes());
+    const bool whole = range.begin == 0 && range.bytes == ByteRange::kAll;
+    HttpGet get{.url = url_ + "/" + Encoded(key), .span = {}, .most = most, .access = access_};
+    // Where an object ends must be known to read what lies there: servers differ in what they make of "the last n bytes".
+    if (!whole && (range.from_end || range.bytes == ByteRange::kAll)) {
+      get.only_size = true;
+      const auto sized = [self = shared_from_this(), key, range, most, done = std::move(done)](const Result<HttpObject>& object) mutable {
+        if (!object.ok()) return done(object.status());
+        const Result<ByteSpan> span = BytesOfRange(self->url_ + "/" + key, object->size, range, most);
+        if (!span.ok()) return done(span.status());
+        if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
+        self->Read(key, {span->begin, span->bytes}, most, std::move(done));
+      };
+      return transfers_.Get(std::move(get), sized);
+    }
+    if (!whole) {
+      get.span = ByteSpan{range.begin, range.bytes};
+      if (range.bytes > most) {  // unless the object ends before
+        get.span->bytes = most;
+        if (most == 0) return done(Printable(Status::ResourceExhausted(get.url + ": nothing may be read of it")));
+      }
+    }
+    const auto read = [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
+      if (!object.ok()) return done(object.status());
+      if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
+      const bool cut = range.bytes != ByteRange::kAll && range.bytes > most && object->size > range.begin + most;
+      if (cut) return done(Printable(Status::ResourceExhausted(fmt::format("{}/{}: has more than {} bytes", self->url_, key, most))));
+      done(std::move(object->bytes));
+    };
+    transfers_.Get(std::move(get), read);
+  }
+
+  Result<std::vector<std::string>> List(const std::string& folder) override {
+    return Printable(Status::InvalidArgument(fmt::format("{}{}{}: a web server does not say what lies there; name the array (?array=)",
+                                                         url_, folder.empty() ? "" : "/", folder)));
+  }
+
+  const std::string& name() const override { return url_; }
+
+ private:
+  Status Changed(const std::string& key) const {
+    return Printable(Status::Unavailable(fmt::format("{}/{}: has changed since it was opened", url_, key)));
+  }
+
+  const std::string url_;
+  const std::shared_ptr<const S3Access> access_;
+  HttpTransfers& transfers_;
+  SeenVersions seen_;
+};
+
+}  // namespace
+
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers) {
+  std::string url = address;
+  std::shared_ptr<const S3Access> access;
+  if (address.starts_with(kBucketScheme)) {
+    Result<S3Place> place = FindS3Place(address);
+    if (!place.ok()) return place.status();
+    url = std::move(place->url);
+    if (place->access) access = std::make_shared<const S3Access>(*std::move(place->access));
+  }
+  const auto wrong = [&](std::string_view why) { return Printable(Status::InvalidArgument(fmt::format("{}: {}", url, why))); };
+  const std::size_t host = url.find("//") + 2, path = std::min(url.find('/', host), url.size());
+  if (!IsUrl(url) || path == host) return wrong("must be http://HOST/PATH, https://HOST/PATH or s3://BUCKET/PATH");
+  if (const std::size_t at = url.find('@', host); at < path) {
+    return Status::InvalidArgument(
+        fmt::format("{}...{}: an address must not hold a name or password", url.substr(0, host), url.substr(at)));
+  }
+  if (url.find_first_of("?#") != std::string::npos) return wrong("must have no '?' or '#'");
+  while (url.ends_with('/') && url.size() > path) url.pop_back();
+  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers));
+}
+
+}  // namespace slabstream

@@ -1,0 +1,88 @@
+// HttpTransfers: asks HTTP and HTTPS servers for objects and parts of them, many at a time, on a thread of its own (libcurl). Connections
+// are kept for the next request; HTTP/2 sends several requests over one.
+//
+// What may pass is tried again: no connection, a connection that breaks or stalls, and the answers 408, 429, 500, 502, 503 and 504. Pauses
+// double from kFirstPause on, and are drawn between half of that and all of it, so that clients that failed together do not come back
+// together. A server that says when to come back (Retry-After) is asked no sooner; if that is later than kLongestPause, the request fails.
+//
+// Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may not end at a loopback or
+// link-local address, so that no server on the internet makes this process ask what only this machine sees.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/base/bytes.h"
+#include "common/base/status.h"
+#include "common/base/time.h"
+#include "data/stores/range_reader.h"
+#include "data/stores/s3.h"
+
+namespace slabstream {
+
+struct HttpGet {
+  std::string url;                                   // absolute, encoded
+  std::optional<ByteSpan> span;                      // of the object, not empty; none: all of it
+  bool only_size = false;                            // HEAD: no bytes
+  std::uint64_t most = 0;                            // bytes of an answer
+  std::shared_ptr<const S3Access> access = nullptr;  // that signs it, as long as no redirect leads to another host; null: it is anonymous
+};
+
+struct HttpObject {
+  Bytes bytes;             // fewer than asked for if the object ends before
+  std::uint64_t size = 0;  // of the whole object
+  std::string version;     // ETag, or else when it was changed; empty: the server tells neither
+};
+
+// What a server was asked since this process began.
+struct HttpCounts {
+  std::uint64_t requests = 0;  // each try is one
+  std::uint64_t retries = 0;   // of these: after one that failed
+  std::uint64_t failures = 0;  // after which nothing was tried again
+  std::uint64_t bytes = 0;     // of bodies
+
+  std::uint64_t answered() const { return requests - retries - failures; }
+};
+
+class HttpTransfers {
+ public:
+  static constexpr std::size_t kMostOfAHost = 16;  // requests under way at a time; others wait for their turn
+  static constexpr int kTries = 6;
+  static constexpr Duration kFirstPause = std::chrono::milliseconds(200), kLongestPause = std::chrono::seconds(30);
+  static constexpr Duration kConnecting = std::chrono::seconds(10);  // for a connection to be there
+  static constexpr Duration kStalled = std::chrono::seconds(20);     // without a byte
+  static constexpr Duration kPatience = std::chrono::seconds(60);    // nothing is tried again later than this after the first try
+
+  struct Timing {
+    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled;
+    int tries = kTries;  // at least 1
+  };
+
+  // That of this process, which is never destroyed, since stores may read until the process ends.
+  static HttpTransfers& OfProcess();
+  static HttpCounts CountsOfProcess();  // of all its hosts; nothing if it has asked for nothing
+
+  explicit HttpTransfers(const Timing& timing);
+  ~HttpTransfers();  // what is under way ends with Cancelled
+  HttpTransfers(const HttpTransfers&) = delete;
+  HttpTransfers& operator=(const HttpTransfers&) = delete;
+
+  // Calls `done` exactly once, on the thread of the transfers, which it must not hold up. Messages begin with the URL. NotFound: 404, 410.
+  // ResourceExhausted: the answer has more than `most` bytes; few of them are read. Unavailable: there is no answer, or one without the
+  // bytes; where trying again may help, only the last try fails so. DataLoss: the answer holds other bytes than were asked for. Any thread.
+  using Done = std::function<void(Result<HttpObject>)>;
+  void Get(HttpGet get, Done done);
+
+  std::map<std::string, HttpCounts> counts() const;  // by "host:port"
+
+ private:
+  struct Impl;
+  const std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace slabstream

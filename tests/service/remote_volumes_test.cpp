@@ -1,0 +1,82 @@
+// A service of a volume behind a web server: pictures are those of the voxels, and a server that fails holds up nobody else.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "client/embedded/embedded_service.h"
+#include "data/sources/memory_source.h"
+#include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/stores/scripted_server.h"
+#include "tests/service/pictures.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::seconds;
+using testing::HasSubstr;
+
+class RemoteVolumesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    OmeZarrOptions options;
+    options.chunk_side = 16;
+    options.shard_side = 32;
+    const Status written =
+        WriteOmeZarr(*MakeMemorySource(ball_, {.format = "NRRD", .file_type = "uint8"}), directory_ / "ball.zarr", options);
+    ASSERT_TRUE(written.ok()) << written.message();
+    const ScriptedServer::Script serves = ServesFolder(directory_.path());
+    server_ = std::make_unique<ScriptedServer>(
+        [this, serves](const ServerRequest& request) { return broken_ ? AnswerText("403 Forbidden", "") : serves(request); });
+    EmbeddedOptions service;
+    service.workers = 2;
+    service.coordinator.catalogue["remote"] = DataSource(server_->url() + "/ball.zarr", "");
+    service.coordinator.catalogue["small"] = [small = small_]() -> Result<std::shared_ptr<const Volume>> { return small; };
+    service.coordinator.machine.memory_bytes = std::uint64_t{512} << 10;  // no level of the ball but perhaps the coarsest ones
+    auto started = EmbeddedService::Start(context_, std::move(service));
+    ASSERT_TRUE(started.ok()) << started.status().message();
+    service_ = *std::move(started);
+    client_.emplace(service_->Connect().value());
+  }
+  Result<Picture> Render(const std::string& dataset) {
+    FrameRequest request = request_;
+    request.dataset = dataset;
+    return client_->Render(request, seconds(60));
+  }
+  void ExpectPicture(const std::string& dataset, const Volume& volume) {
+    const Result<Picture> picture = Render(dataset);
+    ASSERT_TRUE(picture.ok()) << picture.status().message();
+    EXPECT_GT(HighestAlpha(picture->image), 0.1);
+    EXPECT_LE(LargestDifference(picture->image, RenderDirectly(request_, volume), request_.size), AllowedDifference(request_));
+  }
+
+  const TemporaryDirectory directory_;
+  const std::shared_ptr<const Volume> ball_ = TestSphere(100), small_ = TestSphere(20);
+  const FrameRequest request_ = [] {
+    FrameRequest request = TestRequest(FindRenderer("raycast"), 30, 3);
+    request.level = "0";
+    return request;
+  }();
+  std::atomic<bool> broken_ = false;
+  std::unique_ptr<ScriptedServer> server_;
+  Context context_;
+  std::unique_ptr<EmbeddedService> service_;
+  std::optional<Client> client_;
+};
+
+TEST_F(RemoteVolumesTest, PicturesAreThoseOfTheVoxels) { ExpectPicture("remote", *ball_); }
+
+TEST_F(RemoteVolumesTest, AServerThatFailsIsNamedAndIsUsedAgainWhenItIsBack) {
+  broken_ = true;
+  const Status failed = Render("remote").status();
+  EXPECT_EQ(failed.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(failed.message(), HasSubstr(server_->url() + "/ball.zarr"));
+  EXPECT_THAT(failed.message(), HasSubstr("HTTP 403"));
+  ExpectPicture("small", *small_);
+  broken_ = false;
+  ExpectPicture("remote", *ball_);
+}
+
+}  // namespace
+}  // namespace slabstream
