@@ -130,6 +130,17 @@ class Host:
         named = ["sh", "-c", f'hostname {self.hostname}; exec "$@"', "sh"]
         return subprocess.Popen(["sh", "-c", enter, "sh", *spaces, *named, *command], start_new_session=True, **popen)
 
+    def busy_seconds(self) -> float:
+        """Processor time of the processes that run on the host, since they began."""
+        ticks = 0
+        for pid in self.quota.processes():
+            try:
+                fields = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+            except OSError:  # it has ended
+                continue
+            ticks += int(fields[11]) + int(fields[12])  # in user mode, in the kernel
+        return ticks / os.sysconf("SC_CLK_TCK")
+
     def close(self) -> None:
         self.quota.close()
         subprocess.run(["ip", "netns", "del", self.name], capture_output=True, check=False)
@@ -159,16 +170,7 @@ class Cluster:
             host.limit(share, bytes_per_second)
 
     def busy_seconds(self) -> float:
-        """Processor time of the processes that run on the hosts, since they began."""
-        ticks = 0
-        for host in self.hosts:
-            for pid in host.quota.processes():
-                try:
-                    fields = pathlib.Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-                except OSError:  # it has ended
-                    continue
-                ticks += int(fields[11]) + int(fields[12])  # in user mode, in the kernel
-        return ticks / os.sysconf("SC_CLK_TCK")
+        return sum(host.busy_seconds() for host in self.hosts)
 
     def close(self) -> None:
         """Ends all processes of the hosts and removes the hosts."""

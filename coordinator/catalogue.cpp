@@ -219,7 +219,7 @@ struct WayToRead {
 
 Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
                                 ReadProgress& progress) {
-  Result<Survey> survey = SurveySource(*source, &progress);
+  Result<Survey> survey = SurveySource(*source, IsUrl(place) ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }

@@ -180,7 +180,7 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
     if (older.id() < frame.id() && older.request().client == frame.request().client)
       older.OnOvertaken(frame.HaveRendered(frame.groups_done() - 1));
   }
-  SendClient(frame.request().client, frame.Progress());
+  SendProgress(frame);
 }
 
 void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
@@ -302,7 +302,7 @@ void FrameMachine::State::BeginAttempts() {
     if (!status.ok()) {
       FailFrame(frame, status);
     } else {
-      SendClient(frame.request().client, frame.Progress());
+      SendProgress(frame);
     }
   }
 }
@@ -327,7 +327,7 @@ bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
   actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->datasets()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
-  SendClient(running.request().client, running.Progress());
+  SendProgress(running);
   return true;
 }
 
@@ -403,6 +403,7 @@ std::vector<FrameAction> FrameMachine::Step(const FrameEvent& event, Time now) {
   std::visit([&state](const auto& e) { state.On(e); }, event);
   if (!state.stopped) {
     state.Expire();
+    state.DropCoarse();
     state.Advance();
     state.DropPlans();
   }

@@ -29,6 +29,7 @@ void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& m
   OpenRequest request{.client = client, .submit = message, .pictures = AddressOf(message.pictures, event.host), .arrived = now};
   if (Status names = CheckNames(policy); !names.ok()) return FailRequest(request, names, &RefusedRequests::bad_request);
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
+  if (message.frame.previews) QueueCoarse(request);
   request.use = ++last_use;
   queue.Push(std::move(request));
   actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, std::make_shared<const FrameRequest>(message.frame)});
@@ -85,7 +86,8 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
 }
 
 Status FrameMachine::State::WithinQuota(PeerToken client) const {
-  const auto running = std::ranges::count(frames, client, [](const RunningFrame& frame) { return frame.request().client; });
+  const auto running = std::ranges::count_if(
+      frames, [client](const RunningFrame& frame) { return frame.request().client == client && !frame.request().coarse; });
   if (queue.CountOf(client) + std::size_t(running) >= kMaxOpenRequests) {
     return Status::ResourceExhausted("this client has " + std::to_string(kMaxOpenRequests) +
                                      " open requests, which is the limit of a client");
@@ -170,6 +172,7 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& mess
 }
 
 void FrameMachine::State::SendQueued(const OpenRequest& request, const DatasetAwaited* awaited) {
+  if (request.coarse) return;
   const bool loading = awaited != nullptr && awaited->loading;
   SendClient(request.client, FrameProgress{.request = request.submit.request,
                                            .phase = loading ? FramePhase::kLoading : FramePhase::kQueued,
@@ -193,6 +196,7 @@ void FrameMachine::State::EndRequest(PeerToken client, RequestId request, Coordi
 }
 
 void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status& status, RefusedAs as) {
+  if (request.coarse) return;
   EndRequest(request.client, request.submit.request, FrameFailed{.request = request.submit.request, .status = Bounded(status)}, {});
   if (as != nullptr) {
     ++(refused.*as);
@@ -204,6 +208,7 @@ void FrameMachine::State::AnswerFailure(const OpenRequest& request, const Status
 // Of a request whose frame has not begun.
 void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& status, RefusedAs as) {
   actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
+  if (request.coarse) return;
   AnswerFailure(request, status, as);
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "request {} of client {} {}: {}", request.submit.request, request.client,
        as == nullptr ? "ends without a frame: dataset " + request.submit.frame.dataset : "is refused", status.message());
@@ -215,13 +220,14 @@ void FrameMachine::State::FreeClient(PeerToken client) {
   actions.emplace_back(ClientLeft{client});
   for (const OpenRequest& request : queue.Forget(client)) {
     actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
-    ++frames_cancelled;
+    frames_cancelled += request.coarse ? 0 : 1;
   }
   std::vector<FrameId> orphans;
   for (const RunningFrame& frame : frames) {
-    if (frame.request().client == client) orphans.push_back(frame.id());
+    if (frame.request().client != client) continue;
+    orphans.push_back(frame.id());
+    frames_cancelled += frame.request().coarse ? 0 : 1;
   }
-  frames_cancelled += orphans.size();
   for (const FrameId id : orphans) EndFrame(id, "its client has gone");
 }
 

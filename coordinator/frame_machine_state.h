@@ -2,6 +2,7 @@
 //
 // Every Step: take the event in (On), let time take effect (Expire), then start whatever can start (Advance). Handlers append to `actions`.
 //   frame_machine.cpp          plans, frames, time, and the Step itself
+//   frame_machine_previews.cpp quick pictures from coarse levels
 //   frame_machine_workers.cpp  messages of workers
 //   frame_machine_clients.cpp  messages of clients, news of datasets, and the ends of requests
 #pragma once
@@ -107,7 +108,7 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const ShutDown& message);
 
   // ---- requests
-  bool IsOpen(PeerToken client, RequestId request) { return queue.Contains(client, request) || frames.FindRequest(client, request); }
+  bool IsOpen(PeerToken client, RequestId request) { return queue.Find(client, request) != nullptr || frames.FindRequest(client, request); }
   Status WithinQuota(PeerToken client) const;
   Status Resolve(OpenRequest& request, const DatasetReady& ready) const;
   void SendQueued(const OpenRequest& request, const DatasetAwaited* awaited);  // null: its dataset is there
@@ -116,6 +117,9 @@ struct FrameMachine::State {
   void FailRequest(const OpenRequest& request, const Status& status, RefusedAs as = nullptr);
   void AnswerFailure(const OpenRequest& request, const Status& status, RefusedAs as = nullptr);
   void SendAnswer(PeerToken client, Answer& answer);
+  void QueueCoarse(const OpenRequest& request);
+  bool IsWanted(const OpenRequest& coarse);
+  void DropCoarse();
   void FreeClient(PeerToken client);
 
   // ---- frames and workers
@@ -140,6 +144,9 @@ struct FrameMachine::State {
   std::string_view WhatLacks(const OpenRequest& request) const;  // until its frame can begin
   bool StartNextFrame(std::size_t workers);
   void HandOut(RunningFrame& frame);
+  void SendProgress(const RunningFrame& frame) {
+    if (!frame.request().coarse) SendClient(frame.request().client, frame.Progress());
+  }
   void AfterGroupDone(const RunningFrame& frame);
   void EndFrame(FrameId id, std::string_view result);
   void FailFrame(const RunningFrame& frame, const Status& status);

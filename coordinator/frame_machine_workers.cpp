@@ -60,7 +60,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   auto [shares, payload] = frame->TakePicture();
   FrameReply reply{.request = request.submit.request,
                    .size = request.submit.frame.size,
-                   .groups_done = message.groups_done,
+                   .groups_done = request.coarse ? 0 : message.groups_done,
                    .group_count = message.group_count,
                    .shares = std::move(shares),
                    .statistics = {},
@@ -68,9 +68,9 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   for (const PictureShare& share : reply.shares) {
     if (share.direct) clients.Sent(request.client, share.runs.encoded_bytes);
   }
-  if (use == RunningFrame::Use::kPreview) {
-    if (clients.IsBehind(request.client)) return;
-    SendClient(request.client, std::move(reply), std::move(payload));
+  if (use == RunningFrame::Use::kPreview || request.coarse) {
+    if (!clients.IsBehind(request.client)) SendClient(request.client, std::move(reply), std::move(payload));
+    if (request.coarse) EndFrame(message.frame, "done, as a preview");
     return;
   }
   reply.statistics = frame->Statistics(now);

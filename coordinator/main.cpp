@@ -18,6 +18,8 @@
 #include "coordinator/catalogue.h"
 #include "coordinator/service.h"
 #include "data/open/any_volume.h"
+#include "data/open/cache_option.h"
+#include "data/stores/object_cache.h"
 
 namespace slabstream {
 namespace {
@@ -45,6 +47,7 @@ int Run(int argc, char** argv) {
   options.client_endpoint = "tcp://127.0.0.1:7420";
   std::vector<std::string> data;
   bool compress = false;
+  std::uint64_t cache = 0;
 
   CLI::App app("Slabstream coordinator: takes requests from clients, plans frames and streams boxes to workers.", "slabstream-coordinator");
   SetUp(app, std::string(Version()));
@@ -69,6 +72,7 @@ int Run(int argc, char** argv) {
             "Memory limit. Datasets that no request needs are unloaded, least recently used first")
       ->type_name("SIZE")
       ->default_str(fmt::format("a quarter of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
+  AddCacheOption(app, cache);
   options.surroundings.link = *ParseLink("--link", kDefaultLink);
   AddParsed(app, "--link", options.surroundings.link, ParseLink,
             "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
@@ -77,6 +81,7 @@ int Run(int argc, char** argv) {
   AddMetricsOptions(app, metrics);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
     SetReadMemory(options.machine.memory_bytes);  // before anything is read
+    if (Status kept = KeepObjects(cache); !kept.ok()) return kept;
     FoundData found = FindData(data);
     CheckFiles(found);
     for (const std::string& line : found.complaints) LogWarning(line);

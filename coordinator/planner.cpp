@@ -8,6 +8,7 @@
 #include "common/base/guarded.h"
 #include "common/planning/levels.h"
 #include "common/planning/policy_names.h"
+#include "common/planning/shown_zones.h"
 #include "common/planning/worker_memory.h"
 
 namespace slabstream {
@@ -18,6 +19,11 @@ std::int64_t BoxTarget(const FrameSetup& setup, std::span<const HostedWorker> wo
   std::int64_t target = kBoxBytesTarget;
   for (const HostedWorker& worker : workers) target = std::min(target, BoxBytesFor(setup, worker.memory_bytes));
   return target;
+}
+
+// Which parts of the volume boxes are made of; null: all of it, from one level.
+std::shared_ptr<const LevelMap> MapOf(const ResolvedRequest& resolved, const FrameSetup& setup) {
+  return resolved.map != nullptr ? resolved.map : ShownZones(setup);
 }
 
 // Whether the frame fits if it is drawn from this level. Nobody may have loaded it, so it counts as one that is read in parts.
@@ -34,11 +40,13 @@ bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const Vol
   const std::size_t slots = request.roster.slots.size();
   const ResolvedPolicy policy =
       resolved->policy ? *resolved->policy : ResolvePolicy(FirstPolicy(resolved->frame.policy, slots), level.geometry);
+  const std::shared_ptr<const LevelMap> map = ShownZones(*setup);
   auto layout = std::make_shared<const Layout>(MakeLayout({.summary = summary.get(),
                                                            .volume = &resolved->volume,
                                                            .policy = &policy,
                                                            .slots = std::uint32_t(slots),
                                                            .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                           .map = map.get(),
                                                            .stop = request.stop}));
   const Result<FramePlan> plan = PlanFrame(*std::move(setup), policy, request.roster, std::move(layout), request.turn);
   return plan.ok() && FramesThatFit(*plan, *summary, request.limits).ok();
@@ -78,10 +86,11 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
-  LayoutTable::Request wanted{.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
-  if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
+  LayoutTable::Request wanted{
+      .policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = MapOf(resolved, *setup)};
+  if (!layouts_.HasMade(wanted)) return std::nullopt;
   wanted.box_bytes_target = BoxTarget(*setup, request.workers);
   std::shared_ptr<const Layout> layout = layouts_.FindMade(wanted);
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
@@ -131,7 +140,7 @@ LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const Res
           .occupied = request.occupied,
           .slots = std::uint32_t(request.roster.slots.size()),
           .box_bytes_target = BoxTarget(setup, request.workers),
-          .map = resolved.map,
+          .map = MapOf(resolved, setup),
           .coarser = resolved.coarser};
 }
 

@@ -107,10 +107,11 @@ void RequestQueue::VisitFirsts(const std::function<bool(OpenRequest&)>& visit) {
   }
 }
 
-bool RequestQueue::Contains(PeerToken client, RequestId request) const {
+const OpenRequest* RequestQueue::Find(PeerToken client, RequestId request) const {
   const auto queue = clients_.find(client);
-  return queue != clients_.end() &&
-         std::ranges::any_of(queue->second.requests, [&](const OpenRequest& r) { return r.Is(client, request); });
+  if (queue == clients_.end()) return nullptr;
+  const auto found = std::ranges::find_if(queue->second.requests, [&](const OpenRequest& r) { return r.Is(client, request); });
+  return found == queue->second.requests.end() ? nullptr : &*found;
 }
 
 std::size_t RequestQueue::size() const {
@@ -121,7 +122,7 @@ std::size_t RequestQueue::size() const {
 
 std::size_t RequestQueue::CountOf(PeerToken client) const {
   const auto queue = clients_.find(client);
-  return queue == clients_.end() ? 0 : queue->second.requests.size();
+  return queue == clients_.end() ? 0 : std::size_t(std::ranges::count(queue->second.requests, false, &OpenRequest::coarse));
 }
 
 std::uint32_t RequestQueue::PositionOf(PeerToken client, RequestId request) {

@@ -41,6 +41,7 @@ struct OpenRequest {
   Time arrived;
   UseId use = 0;             // of its dataset
   std::string lowered = {};  // FrameStatistics::lowered
+  bool coarse = false;       // it makes a preview of the client's request of this number (frame_machine_previews.cpp)
   // Once it has its dataset.
   bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
   bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
@@ -72,7 +73,7 @@ struct OpenRequest {
   Duration charged{};  // for it, until it is settled; once taken
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
-  bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id; }
+  bool Is(PeerToken of_client, RequestId id) const { return client == of_client && submit.request == id && !coarse; }
   HasDataset* dataset() { return std::get_if<HasDataset>(&state); }  // null: not yet
   const HasDataset* dataset() const { return std::get_if<HasDataset>(&state); }
   template <class Plan>
@@ -99,9 +100,9 @@ class RequestQueue {
   void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
   // The first request of each client, in turn, until `visit` returns false.
   void VisitFirsts(const std::function<bool(OpenRequest&)>& visit);
-  bool Contains(PeerToken client, RequestId request) const;
+  const OpenRequest* Find(PeerToken client, RequestId request) const;  // null: it is not there
   std::size_t size() const;
-  std::size_t CountOf(PeerToken client) const;
+  std::size_t CountOf(PeerToken client) const;  // of what the client has asked for
   // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);
 

@@ -17,6 +17,8 @@
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"
+#include "data/open/cache_option.h"
+#include "data/stores/object_cache.h"
 #include "worker/service.h"
 
 namespace slabstream {
@@ -39,6 +41,7 @@ int Run(int argc, char** argv) {
   WorkerOptions options;
   MetricsOptions metrics;
   int cache_mib = 0;
+  std::uint64_t cache = 0;
   std::string compress = "auto", service;
   bool frames_only = false;
   static constexpr Duration kLongestDrain = std::chrono::hours(24);
@@ -62,6 +65,7 @@ int Run(int argc, char** argv) {
       ->type_name("SIZE")
       ->default_str(fmt::format("half of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
   AddInteger(app, "--cache-mib", cache_mib, 1, kMaxCacheMib, "MiB of voxels kept between frames")->default_str("what --memory leaves");
+  AddCacheOption(app, cache);
   AddOptionalValue(app, "--compress", compress, "on", OneOf({"auto", "on", "off"}),
                    "Pack images with zstd. auto: for workers behind links that are slower than zstd. on (--compress alone): "
                    "all images, and the pictures for clients. off: none")
@@ -92,6 +96,7 @@ int Run(int argc, char** argv) {
     options.machine.compression = *ParseCompression(compress);
     options.share_memory = !frames_only;
     SetReadMemory(options.machine.memory_bytes);
+    if (Status kept = KeepObjects(cache); !kept.ok()) return kept;
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;
     return Serve(std::move(options), metrics);
   });

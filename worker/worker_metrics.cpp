@@ -65,7 +65,8 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Value(picture_bytes_, {{"plane", "pictures"}});
   out.Single("worker_unsent_total", MetricType::kCounter, "Images and pictures that could not be sent.", unsent_);
   const HttpCounts web = HttpTransfers::CountsOfProcess();
-  AddWebRequests(out, "worker_web_requests_total", "worker_web_bytes_total", {web.answered(), web.retries, web.failures, web.bytes});
+  AddWebRequests(out, "worker_web_requests_total", "worker_web_bytes_total",
+                 {web.answered(), web.unchanged, web.retries, web.failures, web.bytes});
   AddProcess(out, memory_limit_);
   return out.Take();
 }

@@ -19,6 +19,7 @@
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/tuning/service_machine.h"
+#include "data/open/cache_option.h"
 #include "data/volume_io/formats.h"
 #include "simulator/model/link_model.h"
 
@@ -286,6 +287,7 @@ void DeclareUp(const CommandLine& line) {
             "Memory limit of all processes: the coordinator gets a third, the workers share the rest")
       ->type_name("SIZE")
       ->default_str(fmt::format("three quarters of this machine's memory: {}", MemoryText(options->memory)));
+  AddCacheOption(*sub, options->cache);
   AddInteger(*sub, "--metrics", options->metrics, 1, 65535,
              "Serve metrics for Prometheus on loopback: the coordinator at this port, each worker at one of the next")
       ->type_name("PORT")
@@ -311,6 +313,7 @@ void DeclareView(const CommandLine& line) {
   AddReadOptions(*sub);
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
   AddService(*sub, options->service);
+  AddCacheOption(*sub, options->cache);
   sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
       ->type_name("HOST:PORT")
       ->default_str(options->listen);

@@ -11,6 +11,7 @@
 #include "common/otlp/trace_sender.h"
 #include "common/volume/memory_budget.h"
 #include "common/wire/control_messages.h"
+#include "data/open/cache_option.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -34,6 +35,7 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   AddParsed(app, "--memory", connection.local_memory, ParseMemoryLimit, "Memory limit of this process, with --local: 2G or 512M")
       ->type_name("SIZE")
       ->default_str("none");
+  AddCacheOption(app, connection.local_cache);
   AddService(app, connection.service);
 }
 

@@ -33,6 +33,7 @@ struct ConnectionOptions {
   int local_workers = 0;                       // 0: render at the service; else in this process, by this many workers
   int local_threads = 0;                       // of each local worker; 0: LocalThreads
   std::uint64_t local_memory = 0;              // bytes, limit of this process with local workers; 0: none
+  std::uint64_t local_cache = 0;               // bytes on disk, likewise; 0: none
   bool unasked = false;                        // local workers that nobody asked for (RendersHere)
   ServiceChoice service;
 };
@@ -128,6 +129,7 @@ struct UpOptions {
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
   std::string link;               // as ParseLink takes it; empty: the coordinator's default
   std::uint64_t memory = 0;       // bytes, of all processes together
+  std::uint64_t cache = 0;        // bytes on disk, as slabstream-worker takes it; 0: none
   int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none
   bool detach = false;
   std::string log_level;  // of the processes that it starts; empty: info
@@ -137,6 +139,7 @@ struct ViewOptions {
   ServiceChoice service;
   std::string source;                  // a volume file, or a dataset's name at the service
   LayerFiles layers;                   // of a file
+  std::uint64_t cache = 0;             // of the service that it starts, as UpOptions::cache
   std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
   bool browser = true;                 // open it, if there is a display
 };

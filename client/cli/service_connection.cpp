@@ -13,6 +13,7 @@
 #include "common/cli/program.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"
+#include "data/stores/object_cache.h"
 #include "data/survey/survey.h"
 
 namespace slabstream {
@@ -46,7 +47,8 @@ Result<std::uint64_t> MostHeld(const ConnectionOptions& connection) {
 }
 
 // Before anything is read.
-Status LimitLocalMemory(const ConnectionOptions& connection) {
+Status LimitLocal(const ConnectionOptions& connection) {
+  if (Status kept = KeepObjects(connection.local_cache); !kept.ok()) return kept;
   if (connection.local_memory == 0) return Status::Ok();
   const Result<MemoryShares> shares = SharesOf(connection);
   if (!shares.ok()) return shares.status();
@@ -64,9 +66,9 @@ ServiceConnection::~ServiceConnection() = default;
 Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& connection, std::span<const std::string> sources,
                                                   const LayerFiles& layers) {
   if (connection.local_workers == 0) {
-    if (connection.local_threads > 0 || connection.local_memory > 0) {
-      return Status::InvalidArgument(fmt::format("--{} needs --local: the processes of a service have limits of their own",
-                                                 connection.local_threads > 0 ? "threads" : "memory"));
+    if (connection.local_threads > 0 || connection.local_memory > 0 || connection.local_cache > 0) {
+      const std::string_view option = connection.local_threads > 0 ? "threads" : connection.local_memory > 0 ? "memory" : "cache";
+      return Status::InvalidArgument(fmt::format("--{} needs --local: the processes of a service have limits of their own", option));
     }
     if (layers.any()) {
       return Status::InvalidArgument(
@@ -82,7 +84,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     if (opened.ok()) opened->datasets_.assign(sources.begin(), sources.end());
     return opened;
   }
-  if (Status limited = LimitLocalMemory(connection); !limited.ok()) return limited;
+  if (Status limited = LimitLocal(connection); !limited.ok()) return limited;
   const Result<std::uint64_t> most_held = MostHeld(connection);
   if (!most_held.ok()) return most_held.status();
   std::vector<DataSource> files;

@@ -173,8 +173,12 @@ Status RunView(const ViewOptions& options) {
   ServiceChoice choice = *named;
   if (file && choice.text().empty()) {
     if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
-    Result<Helper> up = Helper::Start({*self, "up", "--listen", "tcp://127.0.0.1:*", "--workers", std::to_string(WorkersForOneUser()),
-                                       "--data", CatalogueEntry(options.source, options.layers)});
+    std::vector<std::string> command = {*self,       "up",
+                                        "--listen",  "tcp://127.0.0.1:*",
+                                        "--workers", std::to_string(WorkersForOneUser()),
+                                        "--data",    CatalogueEntry(options.source, options.layers)};
+    if (options.cache != 0) command.insert(command.end(), {"--cache", fmt::format("{}M", options.cache >> 20)});
+    Result<Helper> up = Helper::Start(std::move(command));
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));
     Result<std::string> endpoint = EndpointOfUp(*service);

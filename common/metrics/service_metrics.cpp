@@ -18,8 +18,9 @@ void AddRefused(Exposition& out, std::string_view name, std::string_view help, c
 }
 
 void AddWebRequests(Exposition& out, std::string_view requests_name, std::string_view bytes_name, const WebRequests& requests) {
-  out.Family(requests_name, MetricType::kCounter, "Requests of web servers for parts of volumes: answered, tried again, given up.");
+  out.Family(requests_name, MetricType::kCounter, "Requests of web servers for parts of volumes, by result.");
   out.Value(requests.answered, {{"result", "done"}});
+  out.Value(requests.unchanged, {{"result", "unchanged"}});
   out.Value(requests.again, {{"result", "again"}});
   out.Value(requests.failed, {{"result", "failed"}});
   out.Single(bytes_name, MetricType::kCounter, "Bytes that web servers have sent for them.", requests.bytes);

@@ -15,8 +15,11 @@ void AddRefused(Exposition& out, std::string_view name, std::string_view help, c
 
 // Of web servers that hold volumes.
 struct WebRequests {
-  std::uint64_t answered = 0, again = 0, failed = 0;  // again: after one that failed, tried once more; failed: given up
-  std::uint64_t bytes = 0;                            // that came
+  std::uint64_t answered = 0;   // with bytes
+  std::uint64_t unchanged = 0;  // answered without, since the disk has them
+  std::uint64_t again = 0;      // after one that failed, tried once more
+  std::uint64_t failed = 0;     // given up
+  std::uint64_t bytes = 0;      // that came
 };
 void AddWebRequests(Exposition& out, std::string_view requests_name, std::string_view bytes_name,
                     const WebRequests& requests);  // by `result`

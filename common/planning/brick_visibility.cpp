@@ -21,9 +21,11 @@ BrickVisibility::BrickVisibility(const VolumeSummary& summary, const BrickRangeL
     if (table_.opacity[std::size_t(bin)] > 0) next = bin;
     next_visible_[std::size_t(bin)] = next;
   }
+  any_value_visible_ = Visible(AnyValue(summary.description));
 }
 
 bool BrickVisibility::AnyVisible(const Box& box) const {
+  if (bricks_.empty() && layers_.empty()) return any_value_visible_;
   const auto brick_of = [](std::int32_t voxel) { return voxel / kBrick; };
   for (std::int32_t z = brick_of(box.begin.z); z <= brick_of(box.end.z - 1); ++z) {
     for (std::int32_t y = brick_of(box.begin.y); y <= brick_of(box.end.y - 1); ++y) {
@@ -37,11 +39,13 @@ bool BrickVisibility::AnyVisible(const Box& box) const {
 }
 
 std::vector<Box> BrickVisibility::VisibleBricks(const ClipRegion& clip) const {
+  const Box all = summary_.description.geometry.bounds();
+  if (bricks_.empty()) return any_value_visible_ && clip.MayKeep(all) ? std::vector<Box>{all} : std::vector<Box>{};
   std::vector<Box> visible;
   for (std::size_t i = 0; i < bricks_.size(); ++i) {
     if (!AnyVisible(i)) continue;
     const Index3 brick = PlaceIn(summary_.brick_counts, i);
-    const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, summary_.description.geometry.bounds());
+    const Box box = Intersection({kBrick * brick, kBrick * (brick + Uniform(1))}, all);
     if (clip.MayKeep(box)) visible.push_back(box);
   }
   return visible;

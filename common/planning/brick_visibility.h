@@ -25,12 +25,14 @@ class BrickVisibility {
                   std::vector<std::uint8_t> layers = {});
 
   // The brick can be visible.
-  bool AnyVisible(std::size_t brick) const { return Visible(bricks_[brick]) || (!layers_.empty() && layers_[brick] != 0); }
+  bool AnyVisible(std::size_t brick) const {
+    return (bricks_.empty() ? any_value_visible_ : Visible(bricks_[brick])) || (!layers_.empty() && layers_[brick] != 0);
+  }
 
   // True if a brick that touches `box` (not empty, inside the volume) can be visible.
   bool AnyVisible(const Box& box) const;
 
-  // The bricks that can be visible and are not clipped away.
+  // The bricks that can be visible and are not clipped away; the volume as a whole, if there are no ranges of bricks.
   std::vector<Box> VisibleBricks(const ClipRegion& clip = {}) const;
 
   // Counts all voxels of bricks that can be visible as occupied: a substitute for an exact count.
@@ -45,6 +47,7 @@ class BrickVisibility {
   ClassificationTable table_;
   std::vector<std::uint8_t> layers_;  // by brick; empty: none
   std::vector<int> next_visible_;     // by bin: the lowest bin at or above it with an opacity above zero; table_.size(): none
+  bool any_value_visible_ = false;    // a brick of which nothing is known
 };
 
 }  // namespace slabstream

@@ -199,10 +199,15 @@ struct LayoutMaker::State {
       const LevelBox at(box, made.levels[id]);
       return at.level != LevelMap::kOutside && request.volume->clip().MayKeep(at.box) && visible[at.level].AnyVisible(PaddedBoxOf(at));
     };
+    // Parts of boxes are known of one level alone.
+    const std::optional<UnreadParts> unread = request.coarser.empty() ? FindUnread() : std::nullopt;
+    std::vector<std::vector<FilledBox>> filled(unread ? made.levels.size() : 0);
     Layout layout = Share(std::move(made.partition), policy, shows, [&](const Box& box, BoxId id) {
-      return double(PaddedBoxOf({box, made.levels[id]}).voxel_count());
+      const Box padded = PaddedBoxOf({box, made.levels[id]});
+      return double(unread ? VoxelsRead(*unread, padded, filled[id]) : padded.voxel_count());
     });
     layout.levels = std::move(made.levels);
+    layout.filled = std::move(filled);
     return layout;
   }
 
@@ -241,17 +246,21 @@ struct LayoutMaker::State {
     const auto shows = [&](const Box& box, BoxId) { return fields.Shows(box) && (!unread || unread->Shows(box)); };
     const auto cost_of = [&](const Box& box, BoxId id) {
       if (!unread) return by_cost ? MeanSeconds(box) : 1;
-      const Box padded = PaddedBoxOf({box, 0});
-      filled[id] = unread->Of(padded);
-      std::int64_t read = padded.voxel_count();
-      for (const FilledBox& part : filled[id]) read -= part.box.voxel_count();
-      return double(read);
+      return double(VoxelsRead(*unread, PaddedBoxOf({box, 0}), filled[id]));
     };
     Layout layout = Share(std::move(partition), policy, shows, cost_of);
     layout.filled = std::move(filled);
     if (!extinction) extinction = FindLeastExtinction(*request.summary, *request.volume);
     layout.extinction = *extinction;
     return layout;
+  }
+
+  // Of a padded box. `filled`: becomes what need not be read of it.
+  static std::int64_t VoxelsRead(const UnreadParts& unread, const Box& padded, std::vector<FilledBox>& filled) {
+    filled = unread.Of(padded);
+    std::int64_t read = padded.voxel_count();
+    for (const FilledBox& part : filled) read -= part.box.voxel_count();
+    return read;
   }
 
   // Gives boxes that show something to slots. Asks for the cost of each of them once.

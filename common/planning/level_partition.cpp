@@ -1,10 +1,10 @@
 #include "common/planning/level_partition.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <optional>
 #include <queue>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -18,10 +18,10 @@ struct Cut {
   std::int32_t position = 0;
 };
 
-// Numbers of zones by level.
-using Counts = std::array<std::int64_t, 256>;
+// Numbers of zones by level; the last one: of those outside.
+using Counts = std::vector<std::int64_t>;
 
-std::int64_t Minority(const Counts& counts) {
+std::int64_t Minority(std::span<const std::int64_t> counts) {
   std::int64_t all = 0, most = 0;
   for (const std::int64_t count : counts) {
     all += count;
@@ -94,22 +94,25 @@ class Divider {
   // zones are of one level.
   std::optional<Cut> BetweenLevels(const Box& box) const {
     const Box zones = ZonesIn(box);
-    Counts all{};
-    Visit(zones, [&](const Index3&, std::uint8_t level) { ++all[level]; });
+    const std::size_t kinds = map_.levels.size() + 1;
+    const auto kind = [&](std::uint8_t level) { return level == LevelMap::kOutside ? kinds - 1 : level; };
+    Counts all(kinds);
+    Visit(zones, [&](const Index3&, std::uint8_t level) { ++all[kind(level)]; });
     if (Minority(all) == 0) return std::nullopt;
     std::optional<Cut> best;
     auto least = std::tuple(std::numeric_limits<std::int64_t>::max(), std::int64_t{0});
     for (const Axis axis : kAxes) {
-      std::vector<Counts> slices(std::size_t(zones.size()[axis]));
-      Visit(zones, [&](const Index3& zone, std::uint8_t level) { ++slices[std::size_t(zone[axis] - zones.begin[axis])][level]; });
-      Counts below{}, above = all;
-      for (std::size_t i = 0; i + 1 < slices.size(); ++i) {
-        for (std::size_t level = 0; level < below.size(); ++level) {
-          below[level] += slices[i][level];
-          above[level] -= slices[i][level];
+      const auto count = std::size_t(zones.size()[axis]);
+      Counts slices(count * kinds), below(kinds), above = all;
+      Visit(zones,
+            [&](const Index3& zone, std::uint8_t level) { ++slices[std::size_t(zone[axis] - zones.begin[axis]) * kinds + kind(level)]; });
+      for (std::size_t i = 0; i + 1 < count; ++i) {
+        for (std::size_t level = 0; level < kinds; ++level) {
+          below[level] += slices[i * kinds + level];
+          above[level] -= slices[i * kinds + level];
         }
-        const auto unequal = std::int64_t(i + 1) - std::int64_t(slices.size() - i - 1);
-        const std::tuple left = {Minority(below) + Minority(above), std::abs(unequal) - std::int64_t(slices.size())};
+        const auto unequal = std::int64_t(i + 1) - std::int64_t(count - i - 1);
+        const std::tuple left = {Minority(below) + Minority(above), std::abs(unequal) - std::int64_t(count)};
         if (left >= least) continue;
         least = left;
         best = {axis, (zones.begin[axis] + std::int32_t(i) + 1) * map_.side[axis]};

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/picture_extent.h"
 #include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/volume/grid_map.h"
@@ -35,22 +36,6 @@ int CoarsestFor(double width, const VolumeLevels& levels, int count) {
   int level = 0;
   for (int next = 1; next < count && CoarseSpacing(finest, levels.levels[std::size_t(next)].geometry) <= width; ++next) level = next;
   return level;
-}
-
-// Where a box of voxels lies in the picture. `map`: to the camera's grid.
-Camera::ImageExtent ExtentOf(const Box& box, const GridMap& map, const Camera& camera) {
-  Vec3 low, high;
-  for (const Axis axis : kAxes) {
-    low[axis] = map.To(box.begin[axis] - 0.5, axis);
-    high[axis] = map.To(box.end[axis] - 0.5, axis);
-  }
-  return camera.ProjectBetween(low, high);
-}
-
-bool InPicture(const Camera::ImageExtent& extent, const Camera& camera) {
-  constexpr double kSlack = 1;  // pixels
-  return extent.x_end > -kSlack && extent.y_end > -kSlack && extent.x_begin < camera.width + kSlack &&
-         extent.y_begin < camera.height + kSlack;
 }
 
 // Of the pixels that show the nearest point; orthographic: of all pixels.

@@ -101,10 +101,14 @@ std::uint64_t LightBytes(const FrameSetup& setup) {
 std::uint64_t VoxelBytes(const Box& padded, const VolumeSummary& summary, double derived_share) {
   if (padded.empty()) return 0;
   std::uint64_t voxels = 0;
-  VisitBricks(padded, summary, [&](std::size_t brick, const Box& part) {
-    const ValueRange& range = summary.bricks[brick];
-    if (range.min != range.max) voxels += std::uint64_t(part.voxel_count());
-  });
+  if (summary.bricks.empty()) {
+    voxels = std::uint64_t(padded.voxel_count());
+  } else {
+    VisitBricks(padded, summary, [&](std::size_t brick, const Box& part) {
+      const ValueRange& range = summary.bricks[brick];
+      if (range.min != range.max) voxels += std::uint64_t(part.voxel_count());
+    });
+  }
   auto bytes = std::uint64_t((1 + derived_share) * double(voxels * BytesPerSample(summary.description.type)));
   for (const VolumeSummary* layer : {summary.labels.get(), summary.overlay.get()}) {
     if (layer != nullptr) bytes += VoxelBytes(padded, *layer, derived_share);

@@ -182,7 +182,6 @@ VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSu
   VolumeSummary summary{.description = description, .range = surveyed.range, .histogram = surveyed.histogram};
   summary.non_finite = surveyed.non_finite;
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
-  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
   return summary;
 }
 
@@ -209,14 +208,15 @@ PiecewiseSummary::PiecewiseSummary(const VolumeDescription& description) : state
   VolumeSummary& summary = state_->summary;
   summary.description = description;
   summary.brick_counts = CubesOver(description.geometry.size, kBrick);
-  summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(description));
   VisitScalarType(description.type, [&]<class T>(const T*) { state_->pieces.emplace<PiecesOf<T>>(); });
 }
 
 PiecewiseSummary::~PiecewiseSummary() = default;
 
 void PiecewiseSummary::Add(const VoxelBlock& piece) {
-  std::visit([&](auto& pieces) { pieces.Add(piece, state_->summary); }, state_->pieces);
+  VolumeSummary& summary = state_->summary;
+  if (summary.bricks.empty()) summary.bricks.assign(CountIn(summary.brick_counts), AnyValue(summary.description));
+  std::visit([&](auto& pieces) { pieces.Add(piece, summary); }, state_->pieces);
 }
 
 void PiecewiseSummary::AddSample(const VoxelBlock& piece) {

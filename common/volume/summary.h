@@ -1,7 +1,8 @@
 // VolumeSummary: what the planner, the automatic transfer function and `info` know about a volume without its voxels.
 //
 // The volume is divided into bricks (kBrick; the last ones cut off by the volume's border). Each brick keeps the range of data values of
-// its voxels, so bricks tell whether a box can hold anything visible under a transfer function.
+// its voxels, so bricks tell whether a box can hold anything visible under a transfer function. Of a volume that nobody has read there are
+// no ranges: a terabyte would have a gigabyte of them.
 #pragma once
 
 #include <algorithm>
@@ -44,12 +45,12 @@ struct VolumeSummary {
   ValueRange range;                                       // of finite data values; {0, 0} if there is none
   std::array<std::uint64_t, kHistogramBins> histogram{};  // of finite data values, by HistogramBin(range, value)
   Index3 brick_counts;                                    // bricks along each axis
-  BrickRangeList bricks;                                  // of finite values; kNoFiniteValue: there is none
+  BrickRangeList bricks;                                  // of finite values; kNoFiniteValue: there is none. Empty: any value everywhere
   std::int64_t non_finite = 0;                            // voxels that are NaN or infinite: never visible
   // Of its layers; null: there is no such layer. Values of labels are their numbers.
   std::shared_ptr<const VolumeSummary> labels = nullptr, overlay = nullptr;
   std::shared_ptr<const LabelTable> label_table = nullptr;  // if there are labels
-  // Nobody holds the voxels, but they can be read there. Ranges of bricks may then be those of any value of the type. None: they are held.
+  // Nobody holds the voxels, but they can be read there. None: they are held.
   std::optional<StoredAt> stored = {};
   // Of a stored level, what an index knows of its bricks, in place of `bricks`. It says which voxels need not be read, and nothing else:
   // no picture may depend on whether there is an index. Null: there is none.
@@ -71,7 +72,7 @@ struct VolumeSummary {
 // The range of all values that samples of this type can stand for: of a brick of which nothing is known.
 ValueRange AnyValue(const VolumeDescription& description);
 
-// What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and bricks of any value.
+// What is known of a level of which nobody has read all voxels: the statistics of the survey (of another one), and no bricks.
 VolumeSummary UnreadSummary(const VolumeDescription& description, const VolumeSummary& surveyed);
 
 // Of data values, from one of stored samples: kNoFiniteValue stays what it is.
@@ -94,7 +95,7 @@ class PiecewiseSummary {
   // True: the same pieces must be given once more.
   bool EndOfPieces();
   void AddAgain(const VoxelBlock& piece);
-  // Bricks outside all pieces have any value.
+  // Bricks outside all pieces have any value. There are none if there were samples alone.
   VolumeSummary Take();
 
  private:

@@ -94,7 +94,7 @@ struct FrameStatistics {
 struct FrameReply {  // payload: the runs of the shares that are not direct, one after the other
   RequestId request = 0;
   ImageSize size;                                  // of the whole picture
-  std::uint32_t groups_done = 0, group_count = 1;  // equal: final
+  std::uint32_t groups_done = 0, group_count = 1;  // equal: final; 0 done: a preview from a coarser level
   std::vector<PictureShare> shares;                // from 1 to kMaxShares; those that are direct may have come before this
   FrameStatistics statistics;                      // final only
   PictureGeometry geometry;

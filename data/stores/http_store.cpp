@@ -11,7 +11,9 @@
 #include "common/base/printable.h"
 #include "common/base/url.h"
 #include "data/stores/http_transfers.h"
+#include "data/stores/object_cache.h"
 #include "data/stores/object_key.h"
+#include "data/stores/read_threads.h"
 #include "data/stores/store.h"
 
 namespace slabstream {
@@ -54,8 +56,8 @@ class SeenVersions {
 
 class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStoreImpl> {
  public:
-  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers)
-      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers) {}
+  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, ObjectCache* cache)
+      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), cache_(cache) {}
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
@@ -81,14 +83,13 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         if (most == 0) return done(Printable(Status::ResourceExhausted(get.url + ": nothing may be read of it")));
       }
     }
-    const auto read = [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
+    Get(std::move(get), [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
       if (!object.ok()) return done(object.status());
       if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
       const bool cut = range.bytes != ByteRange::kAll && range.bytes > most && object->size > range.begin + most;
       if (cut) return done(Printable(Status::ResourceExhausted(fmt::format("{}/{}: has more than {} bytes", self->url_, key, most))));
       done(std::move(object->bytes));
-    };
-    transfers_.Get(std::move(get), read);
+    });
   }
 
   Result<std::vector<std::string>> List(const std::string& folder) override {
@@ -99,6 +100,32 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string& name() const override { return url_; }
 
  private:
+  // Bytes that the disk has come from there, once the server says that they are still right. The disk is asked, and gets what the server
+  // sends, on threads that read files.
+  void Get(HttpGet get, HttpTransfers::Done done) {
+    if (cache_ == nullptr) return transfers_.Get(std::move(get), std::move(done));
+    PostRead(
+        [self = shared_from_this(), get = std::move(get), done = std::move(done)]() mutable { self->GetOrFind(std::move(get), done); });
+  }
+
+  void GetOrFind(HttpGet get, const HttpTransfers::Done& done) {
+    const std::string name = get.span ? fmt::format("{} {}+{}", get.url, get.span->begin, get.span->bytes) : get.url;
+    std::optional<ObjectCache::Entry> kept = cache_->Find(name);
+    if (kept && kept->bytes.size() > get.most) kept.reset();
+    if (kept) get.known = kept->version;
+    transfers_.Get(std::move(get), [self = shared_from_this(), name, done, kept = std::move(kept)](Result<HttpObject> object) {
+      if (object.ok() && object->unchanged && kept) {
+        object->bytes = kept->bytes;
+        object->size = kept->size;
+      } else if (object.ok() && object->version.starts_with('"')) {
+        // Strong ETags alone: two versions may have the same time, or the same weak ETag.
+        PostRead(
+            [self, name, entry = ObjectCache::Entry{object->version, object->size, object->bytes}] { self->cache_->Keep(name, entry); });
+      }
+      done(std::move(object));
+    });
+  }
+
   Status Changed(const std::string& key) const {
     return Printable(Status::Unavailable(fmt::format("{}/{}: has changed since it was opened", url_, key)));
   }
@@ -106,12 +133,13 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string url_;
   const std::shared_ptr<const S3Access> access_;
   HttpTransfers& transfers_;
+  ObjectCache* const cache_;
   SeenVersions seen_;
 };
 
 }  // namespace
 
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers) {
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache) {
   std::string url = address;
   std::shared_ptr<const S3Access> access;
   if (address.starts_with(kBucketScheme)) {
@@ -129,7 +157,7 @@ Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfe
   }
   if (url.find_first_of("?#") != std::string::npos) return wrong("must have no '?' or '#'");
   while (url.ends_with('/') && url.size() > path) url.pop_back();
-  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers));
+  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers, cache));
 }
 
 }  // namespace slabstream

@@ -266,7 +266,10 @@ struct HttpTransfers::Impl {
       const ByteSpan& span = *transfer.get.span;
       curl_easy_setopt(easy, CURLOPT_RANGE, fmt::format("{}-{}", span.begin, span.begin + span.bytes - 1).c_str());
     }
+    transfer.headers.reset();
+    if (!transfer.get.known.empty()) AddHeader(transfer, "If-None-Match: " + transfer.get.known);
     if (transfer.get.access != nullptr && !transfer.elsewhere()) Sign(transfer);
+    curl_easy_setopt(easy, CURLOPT_HTTPHEADER, transfer.headers.get());
     host.active.emplace(easy, std::move(owned));
     curl_multi_add_handle(multi, easy);
   }
@@ -277,10 +280,12 @@ struct HttpTransfers::Impl {
     curl_easy_setopt(transfer.easy, CURLOPT_AWS_SIGV4, fmt::format("aws:amz:{}:s3", access.region).c_str());
     curl_easy_setopt(transfer.easy, CURLOPT_USERNAME, access.key.c_str());
     curl_easy_setopt(transfer.easy, CURLOPT_PASSWORD, access.secret.c_str());
-    curl_slist* headers = curl_slist_append(nullptr, "x-amz-content-sha256: UNSIGNED-PAYLOAD");
-    if (!access.token.empty()) headers = curl_slist_append(headers, ("x-amz-security-token: " + access.token).c_str());
-    transfer.headers.reset(headers);
-    curl_easy_setopt(transfer.easy, CURLOPT_HTTPHEADER, headers);
+    AddHeader(transfer, "x-amz-content-sha256: UNSIGNED-PAYLOAD");
+    if (!access.token.empty()) AddHeader(transfer, "x-amz-security-token: " + access.token);
+  }
+
+  static void AddHeader(Transfer& transfer, const std::string& line) {
+    transfer.headers.reset(curl_slist_append(transfer.headers.release(), line.c_str()));
   }
 
   static const std::string& UserAgent() {
@@ -296,6 +301,7 @@ struct HttpTransfers::Impl {
     Count(transfer.host, [&](HttpCounts& count) {
       ++count.requests;
       count.retries += transfer.tries > 1 ? 1 : 0;
+      count.unchanged += transfer.status() == 304 ? 1 : 0;
       count.bytes += transfer.body.size();
     });
     curl_multi_remove_handle(multi, easy);
@@ -315,6 +321,9 @@ struct HttpTransfers::Impl {
       return MayPass(code) ? Again(std::move(owned), why) : fail(StatusCode::kUnavailable, why);
     }
     const std::string http = fmt::format("HTTP {}", status);
+    if (status == 304 && !transfer.get.known.empty()) {
+      return Answer(std::move(owned), HttpObject{.version = transfer.get.known, .unchanged = true});
+    }
     if (status >= 300 && status < 400) return Redirect(std::move(owned), http);
     if (status == 404 || status == 410) return fail(StatusCode::kNotFound, "does not exist (" + http + ")");
     if (MayPass(status)) return Again(std::move(owned), http);
@@ -418,6 +427,7 @@ HttpCounts HttpTransfers::CountsOfProcess() {
     sum.requests += counts.requests;
     sum.retries += counts.retries;
     sum.failures += counts.failures;
+    sum.unchanged += counts.unchanged;
     sum.bytes += counts.bytes;
   }
   return sum;

@@ -30,6 +30,7 @@ struct HttpGet {
   std::optional<ByteSpan> span;                      // of the object, not empty; none: all of it
   bool only_size = false;                            // HEAD: no bytes
   std::uint64_t most = 0;                            // bytes of an answer
+  std::string known = {};                            // an ETag: if the object still has it, no bytes come
   std::shared_ptr<const S3Access> access = nullptr;  // that signs it, as long as no redirect leads to another host; null: it is anonymous
 };
 
@@ -37,16 +38,18 @@ struct HttpObject {
   Bytes bytes;             // fewer than asked for if the object ends before
   std::uint64_t size = 0;  // of the whole object
   std::string version;     // ETag, or else when it was changed; empty: the server tells neither
+  bool unchanged = false;  // it is still the one that was known (HttpGet::known)
 };
 
 // What a server was asked since this process began.
 struct HttpCounts {
-  std::uint64_t requests = 0;  // each try is one
-  std::uint64_t retries = 0;   // of these: after one that failed
-  std::uint64_t failures = 0;  // after which nothing was tried again
-  std::uint64_t bytes = 0;     // of bodies
+  std::uint64_t requests = 0;   // each try is one
+  std::uint64_t retries = 0;    // of these: after one that failed
+  std::uint64_t failures = 0;   // after which nothing was tried again
+  std::uint64_t unchanged = 0;  // answers without bytes, of objects that were known
+  std::uint64_t bytes = 0;      // of bodies
 
-  std::uint64_t answered() const { return requests - retries - failures; }
+  std::uint64_t answered() const { return requests - retries - failures - unchanged; }  // with bytes
 };
 
 class HttpTransfers {

@@ -6,6 +6,7 @@
 
 #include "common/base/url.h"
 #include "data/stores/http_transfers.h"
+#include "data/stores/object_cache.h"
 
 namespace slabstream {
 
@@ -17,7 +18,7 @@ Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) 
 }
 
 Result<std::shared_ptr<Store>> OpenStore(const std::string& path) {
-  if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess());
+  if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess(), ProcessObjectCache());
   std::error_code error;
   const std::filesystem::file_status about = std::filesystem::status(path, error);
   if (!std::filesystem::exists(about)) return Status::NotFound(path + ": does not exist");

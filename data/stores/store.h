@@ -57,10 +57,11 @@ std::shared_ptr<Store> FolderStore(const std::string& path);
 // The objects in a zip archive that are stored or deflated. Reads its directory. NotFound, InvalidArgument, DataLoss, ResourceExhausted.
 Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;
+class ObjectCache;
 // The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
-// by `transfers`. Asks for nothing yet. It does not list. InvalidArgument: another address, or one with a name, a password, a query or a
-// fragment; as FindS3Place.
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers);
+// by `transfers`, and kept in `cache`, if any; both must outlive it. Asks for nothing yet. It does not list. InvalidArgument: another
+// address, or one with a name, a password, a query or a fragment; as FindS3Place.
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache = nullptr);
 // One file: its only object has the key "file". Does not check that it exists.
 std::shared_ptr<Store> FileStore(const std::string& path);
 

@@ -37,16 +37,16 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
 
 }  // namespace
 
-Result<Survey> SurveySource(VolumeSource& source, ReadProgress* progress) {
+Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most, ReadProgress* progress) {
   const std::vector<SourceLevel>& levels = source.info().levels;
   const auto bytes = [&](std::size_t level) { return levels[level].description.voxel_bytes(); };
   std::size_t level = 0;
-  if (bytes(0) > kExactBytes) {
-    while (level + 1 < levels.size() && bytes(level) > kSurveyBytes) ++level;
+  if (bytes(0) > most.exact) {
+    while (level + 1 < levels.size() && bytes(level) > most.coarse) ++level;
   }
   const VolumeDescription& description = levels[level].description;
-  const bool whole = bytes(level) <= kExactBytes;
-  const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], kSurveyBytes);
+  const bool whole = bytes(level) <= most.exact;
+  const std::vector<Box> boxes = whole ? PiecesOf(levels[level]) : SampleOf(levels[level], most.coarse);
 
   PiecewiseSummary pieces(description);
   if (progress != nullptr) {

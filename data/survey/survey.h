@@ -1,9 +1,9 @@
 // Survey: what is known about a source before anybody draws it. Statistics are those of the whole volume, or, of a large one, of a coarse
 // level or of a sample; so the first picture waits for no pass over all voxels.
 //
-//   level 0 takes at most kExactBytes   range, histogram and ranges of bricks of level 0
-//   else                                range and histogram of the finest level of at most kSurveyBytes, or of a sample of as many bytes of
-//                                       the coarsest one, spread evenly
+//   level 0 takes at most `exact`   range, histogram and ranges of bricks of level 0
+//   else                            range and histogram of the finest level of at most `coarse` or, if that takes more than `exact`, of a
+//                                   sample of `coarse` bytes of the coarsest one, spread evenly
 // This depends on the source alone, never on the memory of a process: a transfer function that is made for the range of a dataset must not
 // depend on it either. Values beyond that range are drawn as the nearest one in it.
 //
@@ -22,16 +22,21 @@
 namespace slabstream {
 
 inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes = std::int64_t{128} << 20;
+struct SurveyBytes {
+  std::int64_t exact = kExactBytes, coarse = kSurveyBytes;
+};
+// Of a source behind an address: the first picture waits until they have come.
+inline constexpr SurveyBytes kFarSurvey = {.exact = 8 << 20, .coarse = 8 << 20};
 
 struct Survey {
   int level = 0;        // of `summary`
   bool sample = false;  // of that level was read, not all of it
-  // Of that level. Ranges of bricks are those of any value if only a sample was read.
+  // Of that level. It has no bricks if only a sample was read.
   std::shared_ptr<const VolumeSummary> summary;
 };
 
 // `progress`, if any, counts what is read, on this thread. Errors of VolumeSource::Read.
-Result<Survey> SurveySource(VolumeSource& source, ReadProgress* progress = nullptr);
+Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most = {}, ReadProgress* progress = nullptr);
 
 // A whole level in memory. ResourceExhausted: it does not fit; errors of VolumeSource::Read.
 Result<std::shared_ptr<const Volume>> ReadLevel(VolumeSource& source, int level, ReadProgress* progress = nullptr);

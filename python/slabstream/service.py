@@ -68,8 +68,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
                **options: Any) -> Frame:
         """Asks for a picture and returns at once.
 
-        `previews`, or an `on_preview`: a picture after each group of boxes, nearest first (see `groups`). Callbacks run on the connection's
-        thread: they must be quick and not wait for anything of the service. `deadline` is in seconds, up to a day.
+        `previews`, or an `on_preview`: a picture of coarse voxels first, if the others take long to read, then one after each group of
+        boxes, nearest first (see `groups`). Callbacks run on the connection's thread: they must be quick and not wait for anything of the
+        service. `deadline` is in seconds, up to a day.
         """
         draft = draft_of(dataset, options)
         self._add_keys([draft])

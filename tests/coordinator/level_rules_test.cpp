@@ -244,6 +244,98 @@ TEST_F(LevelRules, NamesOfLevelsAreNoDatasets) {
   EXPECT_THAT(script.QueryStatus().datasets, SizeIs(2)) << "a status has datasets, not levels";
 }
 
+// ---------------------------------------------------------------- previews from coarse levels
+
+SubmitFrame WithPreviews(RequestId request, const std::string& dataset = "block") {
+  SubmitFrame submit = Frame(request, 1, dataset);
+  submit.frame.previews = true;
+  return submit;
+}
+
+class CoarsePreviews : public LevelRules {
+ protected:
+  // Level 0, which stays where it is.
+  Actions LoadedInParts(const LoadDataset& load) {
+    auto summary = std::make_shared<VolumeSummary>(*SummaryOfLevel(0));
+    summary->stored = StoredAt{.source = "block.ome.zarr"};
+    return script.Step(DatasetLoaded{load.name, load.load, load.load, summary, 0, stamp_});
+  }
+  static std::vector<Index3> SizesOf(const Actions& actions) {
+    std::vector<Index3> sizes;
+    for (const GroupAssignment& group : HandedOut(actions)) sizes.push_back(group.setup.description.geometry.size);
+    return sizes;
+  }
+  void ExpectNothingLeft() {
+    EXPECT_EQ(script.machine.sizes().uses, 0U);
+    EXPECT_EQ(script.machine.sizes().queued, 0U);
+    EXPECT_EQ(script.machine.sizes().running, 0U);
+  }
+  const Index3 fine_ = GeometryOfLevel(0).size, coarse_ = GeometryOfLevel(2).size;
+};
+
+TEST_F(CoarsePreviews, ComeWhileTheLevelOfThePictureIsRead) {
+  script.Client(kClient, WithPreviews(1));
+  Opened();
+  ASSERT_THAT(LoadedNames(), ElementsAre("block", LevelName("block", 2), LevelName("block", 0)));
+  const Actions begun = NothingChanged(Loaded(script.loads[1]));
+  ASSERT_THAT(SizesOf(begun), ElementsAre(coarse_));
+  const auto preview = ToClients<FrameReply>(script.Answer(HandedOut(begun)[0]));
+  ASSERT_THAT(preview, SizeIs(1));
+  EXPECT_EQ(preview[0].message.request, 1U);
+  EXPECT_EQ(preview[0].message.groups_done, 0U);
+  EXPECT_EQ(preview[0].message.group_count, 1U);
+  EXPECT_EQ(script.QueryStatus().frames_done, 0U) << "the request goes on";
+  const Actions followed = NothingChanged(Loaded(script.loads[2]));
+  ASSERT_THAT(SizesOf(followed), ElementsAre(fine_));
+  const auto picture = ToClients<FrameReply>(script.Answer(HandedOut(followed)[0]));
+  ASSERT_THAT(picture, SizeIs(1));
+  EXPECT_EQ(picture[0].message.groups_done, 1U);
+  EXPECT_EQ(script.QueryStatus().frames_done, 1U);
+  ExpectNothingLeft();
+}
+
+TEST_F(CoarsePreviews, DoNotComeIfThePictureIsQuickOrThereFirst) {
+  script.Client(kClient, WithPreviews(1));
+  Opened();
+  const Actions begun = NothingChanged(Loaded(script.loads[2]));
+  EXPECT_THAT(SizesOf(begun), ElementsAre(fine_));
+  EXPECT_THAT(SizesOf(NothingChanged(Loaded(script.loads[1]))), IsEmpty()) << "voxels in memory need no preview from a coarse level";
+  EXPECT_THAT(ToClients<FrameReply>(script.Answer(HandedOut(begun)[0])), SizeIs(1));
+  const Actions at_once = Visit(WithPreviews(2));
+  EXPECT_THAT(SizesOf(at_once), ElementsAre(fine_));
+  EXPECT_THAT(ToClients<FrameReply>(at_once), SizeIs(1));
+  script.Client(kClient, WithPreviews(3, "other"));
+  const LoadDataset load = script.loads.back();
+  EXPECT_THAT(HandedOut(NothingChanged(script.Step(DatasetLoaded{load.name, load.load, load.load, BlockSummary()}))), SizeIs(1))
+      << "a dataset without levels";
+}
+
+TEST_F(CoarsePreviews, ComeWhileThePictureIsReadInParts) {
+  script.Client(kClient, WithPreviews(1));
+  Opened();
+  const Actions quick = NothingChanged(Loaded(script.loads[1])), slow = NothingChanged(LoadedInParts(script.loads[2]));
+  ASSERT_THAT(SizesOf(quick), ElementsAre(coarse_));
+  ASSERT_THAT(SizesOf(slow), ElementsAre(fine_)) << "they run at the same time";
+  const auto picture = ToClients<FrameReply>(script.Answer(HandedOut(slow)[0]));
+  ASSERT_THAT(picture, SizeIs(1));
+  EXPECT_EQ(picture[0].message.groups_done, 1U) << "the picture was there first";
+  EXPECT_THAT(ToClients<FrameReply>(script.Answer(HandedOut(quick)[0])), IsEmpty());
+  ExpectNothingLeft();
+}
+
+TEST_F(CoarsePreviews, EndWithTheirRequestAndFailSilently) {
+  script.Client(kClient, WithPreviews(1));
+  Opened();
+  ASSERT_THAT(SizesOf(NothingChanged(Loaded(script.loads[1]))), ElementsAre(coarse_));
+  ASSERT_THAT(SizesOf(NothingChanged(LoadedInParts(script.loads[2]))), ElementsAre(fine_));
+  EXPECT_THAT(Failures(script.Client(kClient, CancelFrame{.request = 1})), SizeIs(1));
+  ExpectNothingLeft();
+  script.Client(kClient, WithPreviews(2, "other"));
+  const LoadDataset load = script.loads.back();
+  EXPECT_THAT(Failures(script.Step(DatasetFailed{load.name, load.load, Status::DataLoss("damaged")})), SizeIs(1));
+  ExpectNothingLeft();
+}
+
 // ---------------------------------------------------------------- memory
 
 // Of 512 x 512 x 768 voxels at level 0, in one group: 384 MiB with what renderers make of them, a worker has room for 120.

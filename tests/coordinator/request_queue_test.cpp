@@ -169,9 +169,9 @@ TEST(RequestQueue, ExtractTakesOutWhatIsWantedAndNothingElse) {
   EXPECT_EQ(queue.size(), 2U);
   EXPECT_EQ(queue.CountOf(1), 2U);
   EXPECT_EQ(queue.CountOf(2), 0U);
-  EXPECT_TRUE(queue.Contains(1, 2));
-  EXPECT_FALSE(queue.Contains(1, 1));
-  EXPECT_FALSE(queue.Contains(2, 2));
+  EXPECT_NE(queue.Find(1, 2), nullptr);
+  EXPECT_EQ(queue.Find(1, 1), nullptr);
+  EXPECT_EQ(queue.Find(2, 2), nullptr);
   queue.Forget(1);
   EXPECT_EQ(queue.size(), 0U);
 }

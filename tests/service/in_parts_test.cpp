@@ -94,13 +94,15 @@ class InPartsTest : public testing::Test {
 
   // Views that reach for other voxels each.
   static std::vector<FrameRequest> RequestsFor(const RendererKind* renderer) {
-    std::vector<FrameRequest> requests(4, TestRequest(renderer, 30, 3));
+    std::vector<FrameRequest> requests(5, TestRequest(renderer, 30, 3));
     if (renderer->Can(Ability::kPerspective)) requests[1].view.projection = Projection::kPerspective;
     requests[1].policy.decomposition = "subcube";
     requests[2].clipping.box = ClipBox{{10, 20, 30}, {70, 100, 75}, ClipUnit::kVoxels};
     requests[3].view.azimuth_degrees = 200;
     requests[3].view.zoom = 3;
     requests[3].policy.groups = 0;
+    requests[4].view.zoom = 6;  // most of the volume lies outside
+    requests[4].view.elevation_degrees = 50;
     return requests;
   }
   static std::vector<const RendererKind*> VoxelRenderers() {

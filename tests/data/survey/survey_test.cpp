@@ -12,8 +12,8 @@
 namespace slabstream {
 namespace {
 
-using testing::Each;
 using testing::ElementsAre;
+using testing::IsEmpty;
 
 std::shared_ptr<const Volume> SomeVolume(Random& random, const Index3& size, ScalarType type) {
   auto volume = std::make_shared<Volume>(RandomVolume(random, size, type));
@@ -29,7 +29,7 @@ TEST(SurveyTest, OfWhatIsNotLargeIsThatOfAllItsVoxels) {
       const std::shared_ptr<const Volume> volume = SomeVolume(random, size, type);
       std::vector<int> percents;
       ReadProgress progress([&](const ReadShare& read) { percents.push_back(read.percent); });
-      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), &progress);
+      const Result<Survey> survey = SurveySource(*MakeMemorySource(volume, {}), {}, &progress);
       ASSERT_TRUE(survey.ok()) << survey.status().message();
       EXPECT_EQ(survey->level, 0);
       EXPECT_EQ(*survey->summary, Summarize(*volume));
@@ -95,7 +95,19 @@ TEST(SurveyTest, OfALargeVolumeWithoutLevelsIsThatOfASample) {
   EXPECT_TRUE(source.starts_at_blocks()) << "no block is read twice";
   EXPECT_EQ(std::accumulate(survey->summary->histogram.begin(), survey->summary->histogram.end(), std::int64_t{0}), bytes / 2);
   EXPECT_EQ(survey->summary->range, (ValueRange{0, 1023})) << "it is spread over all of the volume";
-  EXPECT_THAT(survey->summary->bricks, Each(AnyValue(source.info().levels[0].description)));
+  EXPECT_THAT(survey->summary->bricks, IsEmpty()) << "any value";
+}
+
+TEST(SurveyTest, BehindAnAddressLittleIsRead) {
+  ComputedSource levels({{512, 512, 512}, {256, 256, 256}, {128, 128, 128}, {64, 64, 64}}, {64, 64, 64});
+  const Result<Survey> survey = SurveySource(levels, kFarSurvey);
+  ASSERT_TRUE(survey.ok()) << survey.status().message();
+  EXPECT_EQ(survey->level, 2);
+  EXPECT_THAT(levels.voxels_read(), ElementsAre(0, 0, 128 * 128 * 128, 0));
+  ComputedSource one({{512, 512, 512}}, {64, 64, 64});
+  ASSERT_TRUE(SurveySource(one, kFarSurvey).ok());
+  EXPECT_GT(2 * one.voxels_read()[0], kFarSurvey.coarse / 2);
+  EXPECT_LE(2 * one.voxels_read()[0], kFarSurvey.coarse);
 }
 
 TEST(SurveyTest, AnErrorEndsIt) {
@@ -104,7 +116,7 @@ TEST(SurveyTest, AnErrorEndsIt) {
   EXPECT_EQ(SurveySource(source).status(), Status::DataLoss("1/0: damaged"));
 }
 
-TEST(UnreadSummaryTest, HasTheStatisticsOfTheSurveyAndBricksOfAnyValue) {
+TEST(UnreadSummaryTest, HasTheStatisticsOfTheSurveyAndNoBricks) {
   Random random(42);
   SCOPED_TRACE(random.trace());
   const VolumeSummary surveyed = Summarize(*SomeVolume(random, {40, 40, 40}, ScalarType::kUint16));
@@ -115,7 +127,7 @@ TEST(UnreadSummaryTest, HasTheStatisticsOfTheSurveyAndBricksOfAnyValue) {
   EXPECT_EQ(summary.range, surveyed.range);
   EXPECT_EQ(summary.histogram, surveyed.histogram);
   EXPECT_EQ(summary.brick_counts, (Index3{5, 5, 5}));
-  EXPECT_EQ(summary.bricks, std::vector(125, AnyValue(finer)));
+  EXPECT_THAT(summary.bricks, IsEmpty());
 }
 
 TEST(ReadLevelTest, IsTheVolume) {

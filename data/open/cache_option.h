@@ -1,0 +1,20 @@
+// --cache: what web servers send is kept on disk (data/stores/object_cache.h). Of all programs that read volumes.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+
+#include "common/cli/add_option.h"
+#include "common/volume/memory_budget.h"
+
+namespace slabstream {
+
+// `bytes`: the budget. 0 if the option is not there.
+inline CLI::Option* AddCacheOption(CLI::App& app, std::uint64_t& bytes) {
+  return AddParsed(app, "--cache", bytes, ParseMemoryLimit,
+                   "Keep on disk what web servers send of volumes, in at most so many bytes: 10G or 512M. The processes of a user share it")
+      ->type_name("SIZE")
+      ->default_str("none");
+}
+
+}  // namespace slabstream

@@ -1,0 +1,198 @@
+#include "data/stores/object_cache.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <xxhash.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "common/base/cache_folder.h"
+#include "common/base/file_descriptor.h"
+#include "common/base/files.h"
+#include "common/base/log.h"
+#include "common/base/pooled_vector.h"
+
+namespace slabstream {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kParts = 16;  // of the budget: one is the largest entry, and what is written between two looks at the folder
+constexpr std::uint64_t kFormat = 0x316A626F62616C73;  // "slabobj1"
+
+// In front of name, version and bytes, in the machine's byte order: the folder is this machine's own.
+struct Head {
+  std::uint64_t format = kFormat;
+  std::uint64_t checksum = 0;                      // of all that follows in the file
+  std::uint64_t size = 0;                          // as in Entry
+  std::uint64_t name = 0, version = 0, bytes = 0;  // lengths
+};
+constexpr std::size_t kUnchecked = 2 * sizeof(std::uint64_t);
+
+std::span<const std::byte> BytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
+
+std::uint64_t ChecksumOf(const Head& head, std::initializer_list<std::span<const std::byte>> parts) {
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
+  XXH3_64bits_reset(state.get());
+  XXH3_64bits_update(state.get(), reinterpret_cast<const std::byte*>(&head) + kUnchecked, sizeof head - kUnchecked);
+  for (const std::span<const std::byte> part : parts) XXH3_64bits_update(state.get(), part.data(), part.size());
+  return XXH3_64bits_digest(state.get());
+}
+
+bool ReadAll(int file, std::span<std::byte> into) {
+  while (!into.empty()) {
+    const ssize_t got = ::read(file, into.data(), into.size());
+    if (got <= 0) return false;
+    into = into.subspan(std::size_t(got));
+  }
+  return true;
+}
+
+// What a file holds of the entry; none: it is damaged, or of another name that has the same hash.
+std::optional<ObjectCache::Entry> ReadEntry(int file, const std::string& name) {
+  struct stat state {};
+  Head head;
+  if (::fstat(file, &state) != 0 || !ReadAll(file, std::as_writable_bytes(std::span(&head, 1))) || head.format != kFormat)
+    return std::nullopt;
+  const auto length = std::uint64_t(state.st_size);
+  if (head.name != name.size() || head.version > length || head.bytes > length ||
+      sizeof head + head.name + head.version + head.bytes != length) {
+    return std::nullopt;
+  }
+  std::string of(head.name, 0), version(head.version, 0);
+  PooledVector<std::byte> bytes(head.bytes);
+  if (!ReadAll(file, std::as_writable_bytes(std::span(of))) || !ReadAll(file, std::as_writable_bytes(std::span(version))) ||
+      !ReadAll(file, bytes) || of != name || ChecksumOf(head, {BytesOf(of), BytesOf(version), bytes}) != head.checksum) {
+    return std::nullopt;
+  }
+  return ObjectCache::Entry{std::move(version), head.size, Bytes(std::move(bytes))};
+}
+
+}  // namespace
+
+struct ObjectCache::State {
+  const std::string folder;
+  const std::uint64_t budget;
+  std::atomic<std::uint64_t> unlooked;  // bytes written since the last look at the folder
+  std::atomic<bool> complained = false;
+  std::mutex looking;
+
+  State(std::string f, std::uint64_t b) : folder(std::move(f)), budget(b), unlooked(b) {}
+
+  std::string PathOf(const std::string& name) const {
+    const XXH128_hash_t hash = XXH3_128bits(name.data(), name.size());
+    return fmt::format("{}/{:02x}/{:014x}{:016x}", folder, hash.high64 >> 56, hash.high64 & 0xFFFFFFFFFFFFFF, hash.low64);
+  }
+
+  // Removes what was used longest ago, if the folder takes more than it may.
+  void MakeRoom() {
+    const std::unique_lock lock(looking, std::try_to_lock);
+    if (!lock) return;  // another thread looks
+    unlooked = 0;
+    struct File {
+      fs::file_time_type used;
+      std::uint64_t bytes = 0;
+      fs::path path;
+    };
+    std::vector<File> files;
+    std::uint64_t all = 0;
+    std::error_code error;
+    for (fs::recursive_directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
+      std::error_code gone;  // other processes remove files, too
+      if (!each->is_regular_file(gone)) continue;
+      const std::uint64_t bytes = each->file_size(gone);
+      const fs::file_time_type used = each->last_write_time(gone);
+      if (gone) continue;
+      files.push_back({used, bytes, each->path()});
+      all += bytes;
+    }
+    const std::uint64_t most = budget / 8 * 7;
+    std::ranges::sort(files, {}, &File::used);
+    for (const File& file : files) {
+      if (all <= most) break;
+      std::error_code gone;
+      fs::remove(file.path, gone);
+      all -= file.bytes;
+    }
+  }
+};
+
+Result<ObjectCache> ObjectCache::Open(std::string folder, std::uint64_t budget) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (const Status status = CheckCanWrite("--cache", folder + "/entry"); !status.ok()) return Status::Unavailable(status.message());
+  auto state = std::make_unique<State>(std::move(folder), budget);
+  state->MakeRoom();
+  return ObjectCache(std::move(state));
+}
+
+ObjectCache::ObjectCache(std::unique_ptr<State> state) : state_(std::move(state)) {}
+ObjectCache::ObjectCache(ObjectCache&&) noexcept = default;
+ObjectCache::~ObjectCache() = default;
+
+std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) {
+  const std::string path = state_->PathOf(name);
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.number() < 0) return std::nullopt;
+  std::optional<Entry> entry = ReadEntry(file.number(), name);
+  if (entry) {
+    ::futimens(file.number(), nullptr);  // it was used now
+  } else {
+    ::unlink(path.c_str());
+  }
+  return entry;
+}
+
+void ObjectCache::Keep(const std::string& name, const Entry& entry) {
+  const std::uint64_t bytes = sizeof(Head) + name.size() + entry.version.size() + entry.bytes.size();
+  if (bytes > state_->budget / kParts) return;
+  if (state_->unlooked.fetch_add(bytes) + bytes > state_->budget / kParts) {
+    state_->MakeRoom();
+    state_->unlooked.fetch_add(bytes);
+  }
+  Head head{.size = entry.size, .name = name.size(), .version = entry.version.size(), .bytes = entry.bytes.size()};
+  head.checksum = ChecksumOf(head, {BytesOf(name), BytesOf(entry.version), entry.bytes.span()});
+  const std::string path = state_->PathOf(name);
+  std::error_code error;
+  fs::create_directories(fs::path(path).parent_path(), error);
+  Result<OutputFile> file = OutputFile::Create(path, 0600);
+  Status written = file.status();
+  if (file.ok()) {
+    file->Append(std::as_bytes(std::span(&head, 1)));
+    file->Append(name);
+    file->Append(entry.version);
+    file->Append(entry.bytes.span());
+    written = file->Finish();
+  }
+  if (!written.ok() && !state_->complained.exchange(true)) LogWarning("what servers send is not kept: " + written.message());
+}
+
+namespace {
+std::unique_ptr<ObjectCache>& OfProcess() {
+  static std::unique_ptr<ObjectCache>& cache = *new std::unique_ptr<ObjectCache>;  // stores may read until the process ends
+  return cache;
+}
+}  // namespace
+
+ObjectCache* ProcessObjectCache() { return OfProcess().get(); }
+
+Status KeepObjects(std::uint64_t budget) {
+  if (budget == 0) return Status::Ok();
+  const Result<std::string> cache = CacheFolder();
+  if (!cache.ok()) return cache.status();
+  Result<ObjectCache> opened = ObjectCache::Open(*cache + "/objects", budget);
+  if (!opened.ok()) return opened.status();
+  OfProcess() = std::make_unique<ObjectCache>(*std::move(opened));
+  return Status::Ok();
+}
+
+}  // namespace slabstream
