@@ -321,7 +321,8 @@ void FrameMachine::State::DismissWorkers() {
 bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   const auto ready = [&](const OpenRequest& open) {
     const PlanMade* const plan = ReadyPlan(open);
-    return plan != nullptr && open.dataset()->seen && !clients.IsBehind(open.client) && frames.MayStart(open.client, *plan, workers);
+    return plan != nullptr && open.dataset()->seen && !AwaitsCoarse(open) && !clients.IsBehind(open.client) &&
+           frames.MayStart(open.client, *plan, workers);
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;

@@ -1,7 +1,8 @@
 // Quick pictures from coarse levels: the first previews of requests whose voxels take long to read.
 //
 // Such a picture has a request of its own, which stands before the client's. It draws what voxels of kCoarsePixels pixels show, without
-// light, and its client gets it as a preview of which no group is done. It ends silently: once nobody wants it, and if it fails.
+// light, and its client gets it as a preview of which no group is done. It ends silently: once nobody wants it, and if it fails. The frame
+// of the client's request begins after it, since workers may have memory for one of the two alone.
 
 #include <algorithm>
 #include <utility>
@@ -46,6 +47,10 @@ bool FrameMachine::State::IsWanted(const OpenRequest& coarse) {
   if (fine == nullptr) return true;
   if (!IsReadInParts(*fine)) return false;
   return coarse.dataset() == nullptr || coarse.dataset()->drawn.front() > fine->drawn.front();
+}
+
+bool FrameMachine::State::AwaitsCoarse(const OpenRequest& request) const {
+  return request.submit.frame.previews && queue.FindCoarse(request.client, request.submit.request) != nullptr;
 }
 
 void FrameMachine::State::DropCoarse() {

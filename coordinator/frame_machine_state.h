@@ -119,6 +119,7 @@ struct FrameMachine::State {
   void SendAnswer(PeerToken client, Answer& answer);
   void QueueCoarse(const OpenRequest& request);
   bool IsWanted(const OpenRequest& coarse);
+  bool AwaitsCoarse(const OpenRequest& request) const;
   void DropCoarse();
   void FreeClient(PeerToken client);
 

@@ -108,9 +108,17 @@ void RequestQueue::VisitFirsts(const std::function<bool(OpenRequest&)>& visit) {
 }
 
 const OpenRequest* RequestQueue::Find(PeerToken client, RequestId request) const {
+  return FindIf(client, [&](const OpenRequest& r) { return r.Is(client, request); });
+}
+
+const OpenRequest* RequestQueue::FindCoarse(PeerToken client, RequestId request) const {
+  return FindIf(client, [&](const OpenRequest& r) { return r.coarse && r.submit.request == request; });
+}
+
+const OpenRequest* RequestQueue::FindIf(PeerToken client, const Predicate& wanted) const {
   const auto queue = clients_.find(client);
   if (queue == clients_.end()) return nullptr;
-  const auto found = std::ranges::find_if(queue->second.requests, [&](const OpenRequest& r) { return r.Is(client, request); });
+  const auto found = std::ranges::find_if(queue->second.requests, wanted);
   return found == queue->second.requests.end() ? nullptr : &*found;
 }
 

@@ -100,13 +100,17 @@ class RequestQueue {
   void VisitInTurn(const std::function<bool(OpenRequest&)>& visit);
   // The first request of each client, in turn, until `visit` returns false.
   void VisitFirsts(const std::function<bool(OpenRequest&)>& visit);
-  const OpenRequest* Find(PeerToken client, RequestId request) const;  // null: it is not there
+  // Null: it is not there.
+  const OpenRequest* Find(PeerToken client, RequestId request) const;
+  const OpenRequest* FindCoarse(PeerToken client, RequestId request) const;  // that makes a preview of it
   std::size_t size() const;
   std::size_t CountOf(PeerToken client) const;  // of what the client has asked for
   // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);
 
  private:
+  const OpenRequest* FindIf(PeerToken client, const Predicate& wanted) const;
+
   struct ClientQueue {
     std::deque<OpenRequest> requests;
     Duration expected{};  // cost of its next frame

@@ -171,24 +171,60 @@ struct LayoutMaker::State {
                  geometry.bounds());
   }
 
+  std::int64_t BytesOf(const LevelBox& at) const {
+    return PaddedBoxOf(at).voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
+  }
+  int LeastBoxes(const ResolvedPolicy& policy) const {
+    return int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes));
+  }
+
+  // The zones that the picture shows of a level (ShownZones), in boxes of whole blocks if one of them is not too large.
+  std::optional<LevelPartition> DivideShownBlocks(const ResolvedPolicy& policy) const {
+    const Box bounds = request.summary->description.geometry.bounds();
+    const Index3 block = request.summary->stored->block.end;
+    if (BytesOf({Intersection({{0, 0, 0}, block}, bounds), 0}) > request.box_bytes_target) return std::nullopt;
+    LevelMap in_blocks = *request.map;
+    Index3 size;
+    for (const Axis axis : kAxes) {
+      size[axis] = (bounds.end[axis] - 1) / block[axis] + 1;
+      in_blocks.side[axis] /= block[axis];
+    }
+    const auto bytes_of = [&](const LevelBox& at) {
+      const Index3 begin = {at.box.begin.x * block.x, at.box.begin.y * block.y, at.box.begin.z * block.z};
+      const Index3 end = {at.box.end.x * block.x, at.box.end.y * block.y, at.box.end.z * block.z};
+      return BytesOf({Intersection({begin, end}, bounds), at.level});
+    };
+    LevelPartition made = DivideByLevels({.map = &in_blocks,
+                                          .size = size,
+                                          .least_boxes = LeastBoxes(policy),
+                                          .most_bytes = request.box_bytes_target,
+                                          .bytes_of = bytes_of,
+                                          .blocks_of = [](std::uint8_t) { return Uniform(1); }});
+    made.partition = made.partition.OfBlocks(block, bounds, request.volume->renderer()->reach());
+    return made;
+  }
+
+  LevelPartition DivideAtZones(const ResolvedPolicy& policy) const {
+    return DivideByLevels({.map = request.map,
+                           .size = request.summary->description.geometry.size,
+                           .least_boxes = LeastBoxes(policy),
+                           .most_bytes = request.box_bytes_target,
+                           .bytes_of = [&](const LevelBox& at) { return BytesOf(at); },
+                           .blocks_of =
+                               [&](std::uint8_t level) {
+                                 Index3 voxels;
+                                 const std::optional<StoredAt>& stored = SummaryOf(level).stored;
+                                 const Vec3 voxel =
+                                     SummaryOf(level).description.geometry.spacing / request.summary->description.geometry.spacing;
+                                 for (const Axis axis : kAxes)
+                                   voxels[axis] = stored ? std::int32_t(stored->block.end[axis] * voxel[axis] + 0.5) : 0;
+                                 return voxels;
+                               }});
+  }
+
   Layout MakeByLevels(const ResolvedPolicy& policy) {
-    const auto sample_bytes = std::int64_t(request.summary->types().bytes_per_voxel());
-    LevelPartition made =
-        DivideByLevels({.map = request.map,
-                        .size = request.summary->description.geometry.size,
-                        .least_boxes = int(std::min<std::int64_t>(std::int64_t{request.slots} * std::max(policy.groups, 1), kMostBoxes)),
-                        .most_bytes = request.box_bytes_target,
-                        .bytes_of = [&](const LevelBox& at) { return PaddedBoxOf(at).voxel_count() * sample_bytes; },
-                        .blocks_of =
-                            [&](std::uint8_t level) {
-                              Index3 voxels;
-                              const std::optional<StoredAt>& stored = SummaryOf(level).stored;
-                              const Vec3 voxel =
-                                  SummaryOf(level).description.geometry.spacing / request.summary->description.geometry.spacing;
-                              for (const Axis axis : kAxes)
-                                voxels[axis] = stored ? std::int32_t(stored->block.end[axis] * voxel[axis] + 0.5) : 0;
-                              return voxels;
-                            }});
+    std::optional<LevelPartition> blocks = request.coarser.empty() ? DivideShownBlocks(policy) : std::nullopt;
+    LevelPartition made = blocks ? *std::move(blocks) : DivideAtZones(policy);
     std::vector<BrickVisibility> visible;
     for (std::size_t level = 0; level <= request.coarser.size(); ++level) {
       const VolumeSummary& summary = SummaryOf(std::uint8_t(level));

@@ -33,10 +33,9 @@ class Finder {
  private:
   std::int64_t Find(const Box& zones) {
     const Box voxels = VoxelsOf(zones);
-    if (!setup_.clip.MayKeep(voxels)) return 0;
-    // Voxels show in the picture as far as they reach.
-    const Camera::ImageExtent extent = ExtentOf(Grown(voxels, setup_.renderer->reach(), bounds_), {}, setup_.camera);
-    if (!InPicture(extent, setup_.camera)) return 0;
+    // Voxels show in the picture as far as they reach, and boxes may end so much before the zone does (Partition::OfBlocks).
+    const Box reached = Grown(voxels, setup_.renderer->reach(), bounds_);
+    if (!setup_.clip.MayKeep(reached) || !InPicture(ExtentOf(reached, {}, setup_.camera), setup_.camera)) return 0;
     if (zones.voxel_count() == 1) {
       map_.of_zone[NumberIn(map_.counts, zones.begin)] = 0;
       return voxels.voxel_count();

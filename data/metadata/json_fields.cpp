@@ -27,12 +27,12 @@ Result<Json> ParseJson(const std::string& object, std::string_view text) {
   return json;
 }
 
-Result<std::optional<Json>> ReadJson(Store& store, const std::string& key) {
-  const Result<Bytes> bytes = ReadNow(store, key);
+Result<std::optional<Json>> JsonReading::Get() {
+  const Result<Bytes> bytes = bytes_.get();
   if (bytes.status().code() == StatusCode::kNotFound) return std::optional<Json>();
   if (!bytes.ok()) return bytes.status();
   const std::string_view text(reinterpret_cast<const char*>(bytes->span().data()), bytes->size());
-  Result<Json> json = ParseJson(store.name() + "/" + key, text);
+  Result<Json> json = ParseJson(object_, text);
   if (!json.ok()) return json.status();
   return std::optional(*std::move(json));
 }

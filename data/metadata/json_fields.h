@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <future>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -21,8 +22,18 @@ inline constexpr std::uint64_t kMostElements = std::uint64_t{1} << 53;  // along
 // DataLoss: no JSON, or values that nest deeper than any metadata do. `object` names it in messages.
 Result<Json> ParseJson(const std::string& object, std::string_view text);
 
-// nullopt: there is no such object. Errors of Store::Read and ParseJson. Waits.
-Result<std::optional<Json>> ReadJson(Store& store, const std::string& key);
+// An object that is being read. Several may be at a time: a server answers them in the time of one.
+class JsonReading {
+ public:
+  JsonReading(Store& store, const std::string& key) : object_(store.name() + "/" + key), bytes_(BeginRead(store, key)) {}
+  // Once. nullopt: there is no such object. Errors of Store::Read and ParseJson. Waits.
+  Result<std::optional<Json>> Get();
+
+ private:
+  std::string object_;
+  std::future<Result<Bytes>> bytes_;
+};
+inline Result<std::optional<Json>> ReadJson(Store& store, const std::string& key) { return JsonReading(store, key).Get(); }
 
 // "path/name"; a path may be empty.
 std::string Join(std::string_view path, std::string_view name);

@@ -37,7 +37,7 @@ class RemoteSource : public VolumeSource {
 struct Marker {
   const SourceFormat* format = nullptr;
   std::string key;
-  std::promise<Result<Bytes>> answer = {};
+  std::future<Result<Bytes>> answer;
 };
 
 }  // namespace
@@ -47,15 +47,12 @@ Result<RemoteFormat> FindRemoteFormat(const std::string& url, std::span<const So
   if (!store.ok()) return store.status();
   std::vector<Marker> markers;
   for (const SourceFormat& format : formats) {
-    for (const std::string_view key : format.markers) markers.push_back({&format, std::string(key)});
-  }
-  for (Marker& marker : markers) {
-    (*store)->Read(marker.key, {}, kMostMetadataBytes, [&marker](Result<Bytes> bytes) { marker.answer.set_value(std::move(bytes)); });
+    for (const std::string_view key : format.markers) markers.push_back({&format, std::string(key), BeginRead(**store, std::string(key))});
   }
   RemoteFormat found;
   std::optional<Status> failure;
   for (Marker& marker : markers) {
-    const Result<Bytes> bytes = marker.answer.get_future().get();  // of all, since they answer into this
+    const Result<Bytes> bytes = marker.answer.get();
     if (bytes.ok()) {
       if (found.format == nullptr) found.format = marker.format;
       found.version = XXH3_64bits_withSeed(bytes->span().data(), bytes->size(), found.version);

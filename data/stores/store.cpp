@@ -1,7 +1,7 @@
 #include "data/stores/store.h"
 
 #include <filesystem>
-#include <future>
+#include <memory>
 #include <utility>
 
 #include "common/base/url.h"
@@ -10,12 +10,14 @@
 
 namespace slabstream {
 
-Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) {
-  std::promise<Result<Bytes>> answer;
-  std::future<Result<Bytes>> read = answer.get_future();
-  store.Read(key, {}, most, [&answer](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); });
-  return read.get();
+std::future<Result<Bytes>> BeginRead(Store& store, const std::string& key, std::uint64_t most) {
+  auto answer = std::make_shared<std::promise<Result<Bytes>>>();
+  std::future<Result<Bytes>> read = answer->get_future();
+  store.Read(key, {}, most, [answer](Result<Bytes> bytes) { answer->set_value(std::move(bytes)); });
+  return read;
 }
+
+Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) { return BeginRead(store, key, most).get(); }
 
 Result<std::shared_ptr<Store>> OpenStore(const std::string& path) {
   if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess(), ProcessObjectCache());

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <limits>
 #include <memory>
 #include <string>
@@ -49,7 +50,9 @@ class Store {
 
 inline constexpr std::uint64_t kMostMetadataBytes = std::uint64_t{16} << 20;
 
-// Waits for a whole object. Errors of Store::Read.
+// Begins to read a whole object. Errors of Store::Read.
+std::future<Result<Bytes>> BeginRead(Store& store, const std::string& key, std::uint64_t most = kMostMetadataBytes);
+// Waits for it.
 Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most = kMostMetadataBytes);
 
 // A folder of the file system; links that lead out of it are not followed. Does not check that it exists.

@@ -3,19 +3,26 @@
 #include <utility>
 
 namespace slabstream::zarr {
-namespace {
 
 using metadata::Field;
 using metadata::Join;
 using metadata::Json;
-using metadata::ReadJson;
 
-Result<std::optional<ZarrNode>> ReadNode3(Store& store, const std::string& path) {
-  const std::string key = Join(path, kNode3);
-  Result<std::optional<Json>> metadata = ReadJson(store, key);
+NodeReading::NodeReading(Store& store, const std::string& path) : store_(store), path_(path), node3_(store, Join(path, kNode3)) {
+  for (const char* const name : {kArray2, kGroup2, kAttributes2}) node2_.emplace_back(store, Join(path, name));
+}
+
+Result<std::optional<ZarrNode>> NodeReading::Get() {
+  Result<std::optional<ZarrNode>> node3 = Node3();
+  return !node3.ok() || node3->has_value() ? node3 : Node2();
+}
+
+Result<std::optional<ZarrNode>> NodeReading::Node3() {
+  Result<std::optional<Json>> metadata = node3_.Get();
   if (!metadata.ok()) return metadata.status();
   if (!metadata->has_value()) return std::optional<ZarrNode>();
-  ZarrNode node{.path = path, .version = 3, .metadata = **std::move(metadata), .metadata_name = store.name() + "/" + key, .keys = {key}};
+  const std::string key = Join(path_, kNode3);
+  ZarrNode node{.path = path_, .version = 3, .metadata = **std::move(metadata), .metadata_name = store_.name() + "/" + key, .keys = {key}};
   const Field field = node.metadata_field(), type = field["node_type"];
   if (!field.is_object()) return field.Wrong("an object");
   if (!type.is_text() || (type.value() != "array" && type.value() != "group")) return type.Wrong("\"array\" or \"group\"");
@@ -24,32 +31,28 @@ Result<std::optional<ZarrNode>> ReadNode3(Store& store, const std::string& path)
   return std::optional(std::move(node));
 }
 
-}  // namespace
-
-Result<std::optional<ZarrNode>> ReadNode(Store& store, const std::string& path) {
-  Result<std::optional<ZarrNode>> node3 = ReadNode3(store, path);
-  if (!node3.ok() || node3->has_value()) return node3;
-  ZarrNode node{.path = path, .version = 2};
+Result<std::optional<ZarrNode>> NodeReading::Node2() {
+  ZarrNode node{.path = path_, .version = 2};
   for (const char* const name : {kArray2, kGroup2}) {
-    const std::string key = Join(path, name);
-    Result<std::optional<Json>> metadata = ReadJson(store, key);
+    const std::string key = Join(path_, name);
+    Result<std::optional<Json>> metadata = node2_[name == kArray2 ? 0 : 1].Get();
     if (!metadata.ok()) return metadata.status();
     if (!metadata->has_value()) continue;
     node.array = name == kArray2;
     node.metadata = **std::move(metadata);
-    node.metadata_name = store.name() + "/" + key;
+    node.metadata_name = store_.name() + "/" + key;
     node.keys.push_back(key);
     break;
   }
   // Some writers leave out .zgroup.
-  const std::string key = Join(path, kAttributes2);
-  Result<std::optional<Json>> attributes = ReadJson(store, key);
+  const std::string key = Join(path_, kAttributes2);
+  Result<std::optional<Json>> attributes = node2_.back().Get();
   if (!attributes.ok()) return attributes.status();
   if (attributes->has_value()) {
     node.attributes = **std::move(attributes);
     node.keys.push_back(key);
   }
-  node.attributes_name = store.name() + "/" + key;
+  node.attributes_name = store_.name() + "/" + key;
   if (node.keys.empty()) return std::optional<ZarrNode>();
   return std::optional(std::move(node));
 }

@@ -29,8 +29,23 @@ struct ZarrNode {
   }
 };
 
-// nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read. Waits.
-Result<std::optional<ZarrNode>> ReadNode(Store& store, const std::string& path);
+// A node that is being read: all objects that may describe it at the same time.
+class NodeReading {
+ public:
+  NodeReading(Store& store, const std::string& path);
+  const std::string& path() const { return path_; }
+  // Once. nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read. Waits.
+  Result<std::optional<ZarrNode>> Get();
+
+ private:
+  Result<std::optional<ZarrNode>> Node3();
+  Result<std::optional<ZarrNode>> Node2();
+
+  Store& store_;
+  std::string path_;
+  metadata::JsonReading node3_;
+  std::vector<metadata::JsonReading> node2_;  // .zarray, .zgroup, .zattrs
+};
 
 // The names of the objects of which a node has at least one.
 inline constexpr const char *kNode3 = "zarr.json", *kArray2 = ".zarray", *kGroup2 = ".zgroup", *kAttributes2 = ".zattrs";

@@ -28,10 +28,10 @@ struct Found {
   std::set<std::string> keys;
 };
 
-Result<ZarrNode> NodeAt(Store& store, const std::string& path, std::set<std::string>& keys) {
-  Result<std::optional<ZarrNode>> node = ReadNode(store, path);
+Result<ZarrNode> NodeOf(const Store& store, NodeReading reading, std::set<std::string>& keys) {
+  Result<std::optional<ZarrNode>> node = reading.Get();
   if (!node.ok()) return node.status();
-  if (!node->has_value()) return Printable(Status::NotFound(NameOf(store, path) + ": no Zarr array or group is there"));
+  if (!node->has_value()) return Printable(Status::NotFound(NameOf(store, reading.path()) + ": no Zarr array or group is there"));
   keys.insert((*node)->keys.begin(), (*node)->keys.end());
   return **std::move(node);
 }
@@ -46,7 +46,7 @@ Result<std::string> OnlyArray(Store& store, const std::string& path) {
   for (const std::string& name : *names) {
     if (!name.ends_with('/') || name.starts_with('.') || ++looked > kMostLooked) continue;
     const std::string child = name.substr(0, name.size() - 1);
-    const Result<std::optional<ZarrNode>> node = ReadNode(store, Join(path, child));
+    const Result<std::optional<ZarrNode>> node = NodeReading(store, Join(path, child)).Get();
     if (node.ok() && node->has_value()) ((*node)->array ? arrays : groups).push_back(child);
   }
   if (arrays.size() == 1) return Join(path, arrays.front());
@@ -70,7 +70,7 @@ Result<Found> FindVolume(Store& store, std::string path) {
   Found found;
   constexpr int kMostSteps = 4;
   for (int step = 0; step < kMostSteps; ++step) {
-    Result<ZarrNode> node = NodeAt(store, path, found.keys);
+    Result<ZarrNode> node = NodeOf(store, NodeReading(store, path), found.keys);
     if (!node.ok()) return node.status();
     if (node->array || IsOmeImage(node->attributes_field(), node->version)) {
       found.node = *std::move(node);
@@ -200,11 +200,12 @@ Result<Pyramid> PyramidOfImage(const ArrayContext& context, const ZarrNode& node
   Pyramid pyramid;
   AxisChoice choice;
   std::vector<std::vector<std::uint64_t>> sizes;
-  for (const OmeLevel& level : image->levels) {
-    const std::string path = Join(node.path, level.path);
-    const Result<ZarrNode> array_node = NodeAt(*context.store, path, keys);
+  std::vector<NodeReading> arrays;
+  for (const OmeLevel& level : image->levels) arrays.emplace_back(*context.store, Join(node.path, level.path));
+  for (NodeReading& reading : arrays) {
+    const std::string array_name = NameOf(*context.store, reading.path());
+    const Result<ZarrNode> array_node = NodeOf(*context.store, std::move(reading), keys);
     if (!array_node.ok()) return array_node.status();
-    const std::string array_name = NameOf(*context.store, path);
     if (!array_node->array) return Status::InvalidArgument(array_name + ": is a group, must be an array");
     const Result<ZarrArray> array = OpenArray(context, *array_node);
     if (!array.ok()) return array.status();

@@ -323,6 +323,23 @@ TEST_F(CoarsePreviews, ComeWhileThePictureIsReadInParts) {
   ExpectNothingLeft();
 }
 
+TEST_F(CoarsePreviews, ComeBeforeFramesThatNeedTheMemory) {
+  script.Client(kClient, WithPreviews(1));
+  Opened();
+  EXPECT_THAT(SizesOf(NothingChanged(LoadedInParts(script.loads[2]))), IsEmpty()) << "the frame waits for the level of its preview";
+  const Actions begun = NothingChanged(Loaded(script.loads[1]));
+  EXPECT_THAT(SizesOf(begun), ElementsAre(coarse_, fine_));
+  script.AnswerAll(begun);
+  ExpectNothingLeft();
+  script.Client(kClient, WithPreviews(2, "other"));
+  Opened();
+  EXPECT_THAT(SizesOf(NothingChanged(LoadedInParts(script.loads[5]))), IsEmpty());
+  const LoadDataset coarse = script.loads[4];
+  EXPECT_THAT(SizesOf(NothingChanged(script.Step(DatasetFailed{coarse.name, coarse.load, Status::DataLoss("damaged")}))),
+              ElementsAre(fine_))
+      << "or for its end";
+}
+
 TEST_F(CoarsePreviews, EndWithTheirRequestAndFailSilently) {
   script.Client(kClient, WithPreviews(1));
   Opened();
