@@ -81,7 +81,7 @@ class Store:
         self.reset()
 
     def reset(self) -> None:
-        self._counts = {"requests": 0, "missing": 0, "bytes": 0}
+        self._counts = {"requests": 0, "missing": 0, "unchanged": 0, "bytes": 0}
 
     def make_coarse(self) -> None:
         for level in range(LEVELS - 1, FIRST_MADE - 1, -1):
@@ -124,14 +124,14 @@ class Store:
                 method, path, *_ = head.split(b"\r\n", 1)[0].decode().split(" ")
                 fields = dict(line.lower().split(": ", 1) for line in head.decode().split("\r\n")[1:] if ": " in line)
                 body = await reader.readexactly(int(fields.get("content-length", 0)))
-                writer.write(await self._answer(method, path, body))
+                writer.write(await self._answer(method, path, body, fields.get("if-none-match", "")))
                 await writer.drain()
         except (asyncio.IncompleteReadError, ConnectionError):
             pass
         finally:
             writer.close()
 
-    async def _answer(self, method: str, path: str, body: bytes) -> bytes:
+    async def _answer(self, method: str, path: str, body: bytes, known: str) -> bytes:
         if path == "/counts":
             return self._message(json.dumps(self._counts).encode())
         if path == "/reset":
@@ -144,13 +144,20 @@ class Store:
         if found is None:
             self._counts["missing"] += 1
             return b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n"
+        if known == self._tag(path):
+            self._counts["unchanged"] += 1
+            return f"HTTP/1.1 304 Not Modified\r\nETag: {known}\r\n\r\n".encode()
         self._counts["bytes"] += len(found)
         return self._message(found, path)
 
     @staticmethod
-    def _message(body: bytes, tag: str = "") -> bytes:
-        """Objects never change, so their paths are their ETags."""
-        named = f'ETag: "{tag}"\r\n' if tag else ""
+    def _tag(path: str) -> str:
+        """Objects never change."""
+        return f'"{path.lower()}"'
+
+    @classmethod
+    def _message(cls, body: bytes, path: str = "") -> bytes:
+        named = f"ETag: {cls._tag(path)}\r\n" if path else ""
         return f"HTTP/1.1 200 OK\r\nContent-Length: {len(body)}\r\n{named}\r\n".encode() + body
 
 

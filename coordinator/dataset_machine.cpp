@@ -18,7 +18,10 @@ void DatasetMachine::State::On(const SeekDataset& event) {
     news.uses[event.use] = DatasetLost{datasets.NoSuchDataset(name), &RefusedRequests::unknown_dataset};
     return;
   }
-  const auto use = uses.insert_or_assign(event.use, Use{.request = event.request, .entries = {{name, Seek(name)}}}).first;
+  const auto use =
+      uses.insert_or_assign(event.use,
+                            Use{.request = event.request, .most_level_bytes = event.most_level_bytes, .entries = {{name, Seek(name)}}})
+          .first;
   if (const Status found = DescendUse(use->second); !found.ok()) {
     news.uses[event.use] = DatasetLost{found, &RefusedRequests::bad_request};
     uses.erase(use);
@@ -85,6 +88,7 @@ Status DatasetMachine::State::DescendUse(Use& use) {
   if (levels == nullptr) return Status::Ok();
   Result<LevelMap> map = LevelsOf(*use.request, *levels);
   if (!map.ok()) return map.status();
+  if (use.most_level_bytes > 0) map = NoneLarger(*std::move(map), use.most_level_bytes, *levels);
   use.map = std::make_shared<const LevelMap>(*std::move(map));
   use.entries.clear();
   for (const int level : use.map->levels) {

@@ -36,6 +36,7 @@ struct DatasetMachine::State {
   // A dataset that a request needs.
   struct Use {
     std::shared_ptr<const FrameRequest> request;
+    std::int64_t most_level_bytes = 0;  // as in SeekDataset
     // Of the table: what it waits for. The dataset, or the levels of it that it draws, finest first, then that of its light volume.
     struct Entry {
       std::string name;

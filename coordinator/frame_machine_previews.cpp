@@ -1,8 +1,9 @@
 // Quick pictures from coarse levels: the first previews of requests whose voxels take long to read.
 //
-// Such a picture has a request of its own, which stands before the client's. It draws what voxels of kCoarsePixels pixels show, without
-// light, and its client gets it as a preview of which no group is done. It ends silently: once nobody wants it, and if it fails. The frame
-// of the client's request begins after it, since workers may have memory for one of the two alone.
+// Such a picture has a request of its own, which stands before the client's. It draws what voxels of kCoarsePixels pixels show, or a
+// coarser level of at most kMostLevelBytes, without light, and its client gets it as a preview of which no group is done. It ends silently:
+// once nobody wants it, and if it fails. The frame of the client's request begins after it, since workers may have memory for one of the
+// two alone.
 
 #include <algorithm>
 #include <utility>
@@ -13,6 +14,7 @@ namespace slabstream {
 namespace {
 
 constexpr double kCoarsePixels = 8;
+constexpr std::int64_t kMostLevelBytes = 16 << 20;
 
 bool IsReadInParts(const OpenRequest::HasDataset& dataset) {
   const auto stored = [](const CoarserVolume& level) { return level.summary->stored.has_value(); };
@@ -32,7 +34,8 @@ void FrameMachine::State::QueueCoarse(const OpenRequest& request) {
   frame.detail = kCoarsePixels * (frame.detail == 0 ? 1 : frame.detail);
   frame.shading = {};
   coarse.use = ++last_use;
-  actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{coarse.use, std::make_shared<const FrameRequest>(frame)});
+  actions.emplace_back(std::in_place_type<ToDatasets>,
+                       SeekDataset{coarse.use, std::make_shared<const FrameRequest>(frame), kMostLevelBytes});
   queue.Push(std::move(coarse));
 }
 

@@ -51,6 +51,7 @@ using UseId = std::uint64_t;  // of a request's dataset; from 1, never given twi
 struct SeekDataset {
   UseId use = 0;
   std::shared_ptr<const FrameRequest> request;  // never null
+  std::int64_t most_level_bytes = 0;            // 0: it draws the levels that it asks for; else no larger ones (NoneLarger)
 };
 struct KeepDataset {
   UseId use = 0;

@@ -163,6 +163,14 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels) {
   return summary;
 }
 
+LevelMap NoneLarger(LevelMap map, std::int64_t bytes, const VolumeLevels& levels) {
+  const auto fits = [&](int level) { return levels.levels[std::size_t(level)].voxel_bytes() <= bytes; };
+  if (std::ranges::all_of(map.levels, fits)) return map;
+  int level = 0;
+  while (level + 1 < int(levels.levels.size()) && !fits(level)) ++level;
+  return {.levels = {std::max(level, map.levels.front())}};
+}
+
 int LightLevelOf(const VolumeLevels& levels) {
   const int last = int(levels.levels.size()) - 1;
   for (int level = 0; level < last; ++level) {

@@ -6,6 +6,7 @@
 // Pure.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -34,6 +35,9 @@ VolumeSummary StatisticsOf(const VolumeLevels& levels);
 //
 // Errors of ResolveRequest and MakeFrameSetup; InvalidArgument: there is no such level; the message says which there are.
 Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& levels);
+
+// `map`, if its levels have at most so many bytes of voxels; else the finest level that has, or the coarsest one.
+LevelMap NoneLarger(LevelMap map, std::int64_t bytes, const VolumeLevels& levels);
 
 // The level that the light volume of a dataset is, or is made from: the finest one of at most kMaxLightSide voxels a side, else the
 // coarsest.

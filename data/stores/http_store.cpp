@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <map>
 #include <mutex>
@@ -119,10 +120,23 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         object->size = kept->size;
       } else if (object.ok() && object->version.starts_with('"')) {
         // Strong ETags alone: two versions may have the same time, or the same weak ETag.
-        PostRead(
-            [self, name, entry = ObjectCache::Entry{object->version, object->size, object->bytes}] { self->cache_->Keep(name, entry); });
+        self->Keep(name, {object->version, object->size, object->bytes});
       }
       done(std::move(object));
+    });
+  }
+
+  // What comes faster than the disk takes it is not kept, so that it does not pile up in memory.
+  void Keep(const std::string& name, ObjectCache::Entry entry) {
+    constexpr std::uint64_t kMostUnwritten = 32 << 20;
+    const std::uint64_t bytes = entry.bytes.size();
+    if (unwritten_.fetch_add(bytes) + bytes > kMostUnwritten) {
+      unwritten_ -= bytes;
+      return;
+    }
+    PostRead([self = shared_from_this(), name, entry = std::move(entry), bytes] {
+      self->cache_->Keep(name, entry);
+      self->unwritten_ -= bytes;
     });
   }
 
@@ -134,6 +148,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::shared_ptr<const S3Access> access_;
   HttpTransfers& transfers_;
   ObjectCache* const cache_;
+  std::atomic<std::uint64_t> unwritten_ = 0;  // bytes on their way to it
   SeenVersions seen_;
 };
 

@@ -300,6 +300,15 @@ TEST(LevelOfTest, ANamedLevelIsTakenOrRefused) {
   EXPECT_EQ(refused.message(), "level is 3, but dataset \"head\" has levels 0 to 2");
 }
 
+TEST(LevelOfTest, LargerLevelsGiveWayToSmallerOnes) {
+  const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);  // of 262144, 32768 and 4096 bytes
+  const LevelMap several = {.levels = {0, 1}, .side = {32, 32, 32}, .counts = {2, 2, 2}, .of_zone = {0, 0, 0, 0, 1, 1, 1, 1}};
+  EXPECT_EQ(NoneLarger(several, 262144, levels), several);
+  EXPECT_EQ(NoneLarger(several, 262143, levels), LevelMap{.levels = {1}});
+  EXPECT_EQ(NoneLarger({.levels = {1}}, 5000, levels), LevelMap{.levels = {2}});
+  EXPECT_EQ(NoneLarger({.levels = {2}}, 100, levels), LevelMap{.levels = {2}});
+}
+
 TEST(LevelOfTest, ASliceThatTheFinestLevelDoesNotHaveIsRefusedAtEveryLevel) {
   const VolumeLevels levels = HalvedLevels({{64, 64, 64}}, 3);
   FrameRequest request = SomeRequest();
