@@ -109,7 +109,7 @@ bool MergeRow(const RowPixels& ours, const RowPixels& theirs, Side side, LocalIm
 }
 
 RowPixels RowOf(const ImageView& view, std::int32_t y, std::int32_t x_begin) {
-  if (y < view.bounds.y_begin || y >= view.bounds.y_end) return {};
+  if (view.bounds.empty() || y < view.bounds.y_begin || y >= view.bounds.y_end) return {};
   const ColumnSpan& row = view.rows[std::size_t(y - view.bounds.y_begin)];
   if (row.begin == row.end) return {};
   const auto offset = std::uint32_t(view.bounds.x_begin - x_begin);
