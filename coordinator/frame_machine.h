@@ -5,6 +5,8 @@
 //   clients    Requests are queued, and wait for their datasets (DatasetNews); the clients are served in turn, one frame each. The machine
 //              reports progress. A request ends when its client cancels it or falls silent. The last answers of a client are kept, so that
 //              it costs nothing to submit a request again.
+//   previews   A request with previews has a quick picture from a coarse level first, while its own voxels are read or if they are read
+//              in parts. Its frame begins after that.
 //   memory     A frame that does not fit the memory of its workers fails before they are given any of it (FramesThatFit). Frames that
 //              fit one by one run one by one.
 //   occupancy  Where a policy needs it, occupied voxels are counted once for each dataset, transfer function and renderer. Requests wait
