@@ -30,7 +30,7 @@ void FrameMachine::State::QueueCoarse(const OpenRequest& request) {
   coarse.pictures.reset();
   FrameRequest& frame = coarse.submit.frame;
   frame.previews = false;
-  frame.level.clear();
+  frame.level = kAutomatic;
   frame.detail = kCoarsePixels * (frame.detail == 0 ? 1 : frame.detail);
   frame.shading = {};
   coarse.use = ++last_use;
