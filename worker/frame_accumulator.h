@@ -23,6 +23,7 @@ class FrameAccumulator {
   // True if the group's image is here: accumulated, being combined, or waiting.
   bool Has(std::uint32_t group) const { return group < groups_done_ + (group_started_ ? 1U : 0U) || waiting_.count(group) > 0; }
   std::uint32_t groups_done() const { return groups_done_; }
+  std::size_t groups_waiting() const { return waiting_.size(); }  // for one in front of them; their images are here
   std::size_t share_count() const { return share_count_; }
   const Status& failure() const { return failure_; }  // the picture is lost: drop the accumulator
 

@@ -487,7 +487,8 @@ std::uint64_t WorkerMachine::State::RoomForVoxels() const {
   for (const auto& [id, frame] : frames) {
     light = std::max(light, frame.light_bytes);
     const auto runs = std::ranges::count_if(frame.groups, [](const auto& group) { return group.second.has_value(); });
-    taken += frame.group_bytes * std::uint64_t(runs) + (frame.accumulator ? frame.picture_bytes : 0);
+    taken += frame.group_bytes * std::uint64_t(runs);
+    if (frame.accumulator) taken += frame.group_bytes * frame.accumulator->groups_waiting() + frame.picture_bytes;
   }
   return config.memory_bytes - std::min(config.memory_bytes, taken + light);
 }

@@ -274,6 +274,25 @@ TEST_F(WorkerBoxesTest, ImagesOfFramesTakeRoomFromCachedVoxels) {
       << "the one that the frame does not need";
 }
 
+TEST_F(WorkerBoxesTest, AnImageThatWaitsForOneInFrontOfItTakesRoomToo) {
+  constexpr std::uint64_t kBox = 128 * 128 * 80;
+  const GroupAssignment behind = Sized(1, 1, {4096, 4096});
+  ASSERT_GT(GroupImageBytes(behind.setup, behind.group.placements), kBox);
+  WorkerConfig config = Config();
+  config.memory_bytes = kIdleMemoryBytes + ImageBytesOf(behind) + kBox + kBox / 2;
+  Start(config);
+  const auto render = All<StartRender>(Feed(Tell(behind))).at(0);
+  EXPECT_THAT(All<DropBox>(Rendered(render)), IsEmpty()) << "the image in front of it is missing, so it waits";
+  std::vector<BoxKey> dropped;
+  const auto note = [&](const Actions& actions) {
+    for (const DropBox& drop : All<DropBox>(actions)) dropped.push_back(drop.padded);
+    return actions;
+  };
+  const Actions fed = note(Feed(Tell(Sized(2, 0, {16, 16}))));
+  note(Rendered(All<StartRender>(fed).at(0)));
+  EXPECT_THAT(dropped, ElementsAre(render.padded)) << "two boxes have no room beside it";
+}
+
 // What renderers derive from voxels grows and shrinks with the frames.
 TEST_F(WorkerBoxesTest, CountsTheBytesThatTheLastFrameOfABoxReported) {
   constexpr std::uint64_t kVoxels = 128U * 128 * 72;
