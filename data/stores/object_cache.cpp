@@ -129,6 +129,7 @@ struct ObjectCache::State {
 Result<ObjectCache> ObjectCache::Open(std::string folder, std::uint64_t budget) {
   std::error_code error;
   fs::create_directories(folder, error);
+  if (error) return Status::Unavailable(fmt::format("--cache: cannot make the folder '{}': {}", folder, error.message()));
   if (const Status status = CheckCanWrite("--cache", folder + "/entry"); !status.ok()) return Status::Unavailable(status.message());
   auto state = std::make_unique<State>(std::move(folder), budget);
   state->MakeRoom();
