@@ -21,11 +21,6 @@ std::int64_t BoxTarget(const FrameSetup& setup, std::span<const HostedWorker> wo
   return target;
 }
 
-// Which parts of the volume boxes are made of; null: all of it, from one level.
-std::shared_ptr<const LevelMap> MapOf(const ResolvedRequest& resolved, const FrameSetup& setup) {
-  return resolved.map != nullptr ? resolved.map : ShownZones(setup);
-}
-
 // Whether the frame fits if it is drawn from this level. Nobody may have loaded it, so it counts as one that is read in parts.
 bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const VolumeLevels& levels, const PlanRequest& request) {
   constexpr Index3 kSomeBlock = {32, 32, 32};
@@ -86,11 +81,11 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
   if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
+  if (resolved.summary->stored && resolved.map == nullptr) return std::nullopt;  // to find its ShownZones may take long
+  LayoutTable::Request wanted{.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
+  if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
-  LayoutTable::Request wanted{
-      .policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = MapOf(resolved, *setup)};
-  if (!layouts_.HasMade(wanted)) return std::nullopt;
   wanted.box_bytes_target = BoxTarget(*setup, request.workers);
   std::shared_ptr<const Layout> layout = layouts_.FindMade(wanted);
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
@@ -140,7 +135,7 @@ LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const Res
           .occupied = request.occupied,
           .slots = std::uint32_t(request.roster.slots.size()),
           .box_bytes_target = BoxTarget(setup, request.workers),
-          .map = MapOf(resolved, setup),
+          .map = resolved.map != nullptr ? resolved.map : ShownZones(setup),
           .coarser = resolved.coarser};
 }
 

@@ -31,6 +31,7 @@
 #include "common/transport/endpoint.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
+#include "data/open/cache_option.h"
 
 namespace slabstream {
 namespace {
@@ -184,7 +185,7 @@ class LocalService {
     std::vector<std::string> arguments = {"--listen",    options_.listen,     "--memory", MemoryArgument(memory_.coordinator),
                                           "--log-level", LogLevelOfChildren()};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
-    AddCache(arguments);
+    AddCacheArgument(arguments, options_.cache);
     if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
     AddMetrics(arguments, 0);
@@ -219,7 +220,7 @@ class LocalService {
     } else {
       arguments.insert(arguments.end(), {"--service", ServiceFileOf(Role::kWorker)});
     }
-    AddCache(arguments);
+    AddCacheArgument(arguments, options_.cache);
     AddMetrics(arguments, number);
     if (Status started = StartChild(number, kWorkerProgram, std::move(arguments)); !started.ok()) return started;
     state_.workers.resize(std::max(state_.workers.size(), number));
@@ -229,10 +230,6 @@ class LocalService {
 
   void AddMetrics(std::vector<std::string>& arguments, std::size_t number) const {
     if (options_.metrics != 0) arguments.insert(arguments.end(), {"--metrics", std::to_string(std::size_t(options_.metrics) + number)});
-  }
-
-  void AddCache(std::vector<std::string>& arguments) const {
-    if (options_.cache != 0) arguments.insert(arguments.end(), {"--cache", MemoryArgument(options_.cache)});
   }
 
   std::string LogLevelOfChildren() const { return options_.log_level.empty() ? "info" : options_.log_level; }

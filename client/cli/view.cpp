@@ -21,6 +21,7 @@
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
 #include "data/layers/layer_reader.h"
+#include "data/open/cache_option.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -177,7 +178,7 @@ Status RunView(const ViewOptions& options) {
                                         "--listen",  "tcp://127.0.0.1:*",
                                         "--workers", std::to_string(WorkersForOneUser()),
                                         "--data",    CatalogueEntry(options.source, options.layers)};
-    if (options.cache != 0) command.insert(command.end(), {"--cache", fmt::format("{}M", options.cache >> 20)});
+    AddCacheArgument(command, options.cache);
     Result<Helper> up = Helper::Start(std::move(command));
     if (!up.ok()) return up.status();
     service.emplace(*std::move(up));

@@ -25,6 +25,9 @@ constexpr std::int64_t kMostBoxes = std::int64_t{1} << 20;
 // thick, cubes of this many voxels a side.
 constexpr std::int64_t kSmallestCube = 36;
 
+// How many units along each axis cover so many voxels.
+Index3 UnitsOver(const Index3& size, const Index3& unit) { return (size - Uniform(1)) / unit + Uniform(1); }
+
 int MostGroups(const LayoutRequest& request, const ResolvedPolicy& policy) {
   const Index3& size = request.summary->description.geometry.size;
   const std::int64_t slots = request.slots;
@@ -118,7 +121,7 @@ struct LayoutMaker::State {
   std::optional<Partition> PartitionInUnits(const ResolvedPolicy& policy, Partition (*make)(const DecompositionRequest&),
                                             const Index3& unit) {
     const Box bounds = request.summary->description.geometry.bounds();
-    const Index3 units = {(bounds.end.x - 1) / unit.x + 1, (bounds.end.y - 1) / unit.y + 1, (bounds.end.z - 1) / unit.z + 1};
+    const Index3 units = UnitsOver(bounds.end, unit);
     const WorkField work = WorkField::Uniform(units);
     const std::int64_t slots = request.slots, count = std::int64_t(CountIn(units));
     const std::int64_t bytes = bounds.voxel_count() * std::int64_t(request.summary->types().bytes_per_voxel());
@@ -184,18 +187,12 @@ struct LayoutMaker::State {
     const Index3 block = request.summary->stored->block.end;
     if (BytesOf({Intersection({{0, 0, 0}, block}, bounds), 0}) > request.box_bytes_target) return std::nullopt;
     LevelMap in_blocks = *request.map;
-    Index3 size;
-    for (const Axis axis : kAxes) {
-      size[axis] = (bounds.end[axis] - 1) / block[axis] + 1;
-      in_blocks.side[axis] /= block[axis];
-    }
+    in_blocks.side = in_blocks.side / block;
     const auto bytes_of = [&](const LevelBox& at) {
-      const Index3 begin = {at.box.begin.x * block.x, at.box.begin.y * block.y, at.box.begin.z * block.z};
-      const Index3 end = {at.box.end.x * block.x, at.box.end.y * block.y, at.box.end.z * block.z};
-      return BytesOf({Intersection({begin, end}, bounds), at.level});
+      return BytesOf({Intersection({at.box.begin * block, at.box.end * block}, bounds), at.level});
     };
     LevelPartition made = DivideByLevels({.map = &in_blocks,
-                                          .size = size,
+                                          .size = UnitsOver(bounds.end, block),
                                           .least_boxes = LeastBoxes(policy),
                                           .most_bytes = request.box_bytes_target,
                                           .bytes_of = bytes_of,

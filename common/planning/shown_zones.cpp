@@ -17,8 +17,8 @@ LevelMap EmptyMap(const Index3& size, const Index3& block) {
   for (const Axis axis : kAxes) {
     const std::int32_t least = std::max(kLeastSide, (size[axis] - 1) / kMostZones + 1);
     map.side[axis] = ((least - 1) / block[axis] + 1) * block[axis];
-    map.counts[axis] = (size[axis] - 1) / map.side[axis] + 1;
   }
+  map.counts = (size - Uniform(1)) / map.side + Uniform(1);
   map.of_zone.assign(CountIn(map.counts), LevelMap::kOutside);
   return map;
 }
@@ -32,7 +32,7 @@ class Finder {
 
  private:
   std::int64_t Find(const Box& zones) {
-    const Box voxels = VoxelsOf(zones);
+    const Box voxels = Intersection({zones.begin * map_.side, zones.end * map_.side}, bounds_);
     // Voxels show in the picture as far as they reach, and boxes may end so much before the zone does (Partition::OfBlocks).
     const Box reached = Grown(voxels, setup_.renderer->reach(), bounds_);
     if (!setup_.clip.MayKeep(reached) || !InPicture(ExtentOf(reached, {}, setup_.camera), setup_.camera)) return 0;
@@ -45,15 +45,6 @@ class Finder {
     Box lower = zones, upper = zones;
     lower.end[longest] = upper.begin[longest] = zones.begin[longest] + zones.size()[longest] / 2;
     return Find(lower) + Find(upper);
-  }
-
-  Box VoxelsOf(const Box& zones) const {
-    Box voxels;
-    for (const Axis axis : kAxes) {
-      voxels.begin[axis] = zones.begin[axis] * map_.side[axis];
-      voxels.end[axis] = std::min(zones.end[axis] * map_.side[axis], bounds_.end[axis]);
-    }
-    return voxels;
   }
 
   const FrameSetup& setup_;

@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <string>
+#include <vector>
 
 #include "common/cli/add_option.h"
 #include "common/volume/memory_budget.h"
@@ -15,6 +17,11 @@ inline CLI::Option* AddCacheOption(CLI::App& app, std::uint64_t& bytes) {
                    "Keep on disk what web servers send of volumes, in at most so many bytes: 10G or 512M. The processes of a user share it")
       ->type_name("SIZE")
       ->default_str("none");
+}
+
+// The same for a program that this one starts.
+inline void AddCacheArgument(std::vector<std::string>& arguments, std::uint64_t bytes) {
+  if (bytes != 0) arguments.insert(arguments.end(), {"--cache", std::to_string(bytes >> 20) + "MiB"});
 }
 
 }  // namespace slabstream

@@ -115,7 +115,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
     if (kept && kept->bytes.size() > get.most) kept.reset();
     if (kept) get.known = kept->version;
     transfers_.Get(std::move(get), [self = shared_from_this(), name, done, kept = std::move(kept)](Result<HttpObject> object) {
-      if (object.ok() && object->unchanged && kept) {
+      if (object.ok() && object->unchanged) {
         object->bytes = kept->bytes;
         object->size = kept->size;
       } else if (object.ok() && object->version.starts_with('"')) {

@@ -3,10 +3,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cstring>
 #include <filesystem>
@@ -19,7 +19,7 @@
 #include "common/base/file_descriptor.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
-#include "common/base/pooled_vector.h"
+#include "data/stores/range_reader.h"
 
 namespace slabstream {
 namespace {
@@ -29,7 +29,8 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kParts = 16;  // of the budget: one is the largest entry, and what is written between two looks at the folder
 constexpr std::uint64_t kFormat = 0x316A626F62616C73;  // "slabobj1"
 
-// In front of name, version and bytes, in the machine's byte order: the folder is this machine's own.
+// In front of bytes, name and version, in the machine's byte order: the folder is this machine's own. The bytes come first, so that those
+// of a file that was read begin where numbers may.
 struct Head {
   std::uint64_t format = kFormat;
   std::uint64_t checksum = 0;                      // of all that follows in the file
@@ -48,33 +49,23 @@ std::uint64_t ChecksumOf(const Head& head, std::initializer_list<std::span<const
   return XXH3_64bits_digest(state.get());
 }
 
-bool ReadAll(int file, std::span<std::byte> into) {
-  while (!into.empty()) {
-    const ssize_t got = ::read(file, into.data(), into.size());
-    if (got <= 0) return false;
-    into = into.subspan(std::size_t(got));
-  }
-  return true;
-}
-
 // What a file holds of the entry; none: it is damaged, or of another name that has the same hash.
-std::optional<ObjectCache::Entry> ReadEntry(int file, const std::string& name) {
-  struct stat state {};
+std::optional<ObjectCache::Entry> ReadEntry(int file, const std::string& name, std::uint64_t most) {
+  const Result<Bytes> all = ReadRange(file, name, {}, most);
   Head head;
-  if (::fstat(file, &state) != 0 || !ReadAll(file, std::as_writable_bytes(std::span(&head, 1))) || head.format != kFormat)
-    return std::nullopt;
-  const auto length = std::uint64_t(state.st_size);
-  if (head.name != name.size() || head.version > length || head.bytes > length ||
+  if (!all.ok() || all->size() < sizeof head) return std::nullopt;
+  std::memcpy(&head, all->span().data(), sizeof head);
+  const std::uint64_t length = all->size();
+  if (head.format != kFormat || head.name != name.size() || head.version > length || head.bytes > length ||
       sizeof head + head.name + head.version + head.bytes != length) {
     return std::nullopt;
   }
-  std::string of(head.name, 0), version(head.version, 0);
-  PooledVector<std::byte> bytes(head.bytes);
-  if (!ReadAll(file, std::as_writable_bytes(std::span(of))) || !ReadAll(file, std::as_writable_bytes(std::span(version))) ||
-      !ReadAll(file, bytes) || of != name || ChecksumOf(head, {BytesOf(of), BytesOf(version), bytes}) != head.checksum) {
+  const Bytes bytes = all->Part(sizeof head, head.bytes), of = all->Part(sizeof head + head.bytes, head.name),
+              version = all->Part(length - head.version, head.version);
+  if (!std::ranges::equal(of.span(), BytesOf(name)) || ChecksumOf(head, {bytes.span(), of.span(), version.span()}) != head.checksum) {
     return std::nullopt;
   }
-  return ObjectCache::Entry{std::move(version), head.size, Bytes(std::move(bytes))};
+  return ObjectCache::Entry{{reinterpret_cast<const char*>(version.span().data()), version.size()}, head.size, bytes};
 }
 
 }  // namespace
@@ -144,7 +135,7 @@ std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) {
   const std::string path = state_->PathOf(name);
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.number() < 0) return std::nullopt;
-  std::optional<Entry> entry = ReadEntry(file.number(), name);
+  std::optional<Entry> entry = ReadEntry(file.number(), name, state_->budget);
   if (entry) {
     ::futimens(file.number(), nullptr);  // it was used now
   } else {
@@ -161,7 +152,7 @@ void ObjectCache::Keep(const std::string& name, const Entry& entry) {
     state_->unlooked.fetch_add(bytes);
   }
   Head head{.size = entry.size, .name = name.size(), .version = entry.version.size(), .bytes = entry.bytes.size()};
-  head.checksum = ChecksumOf(head, {BytesOf(name), BytesOf(entry.version), entry.bytes.span()});
+  head.checksum = ChecksumOf(head, {entry.bytes.span(), BytesOf(name), BytesOf(entry.version)});
   const std::string path = state_->PathOf(name);
   std::error_code error;
   fs::create_directories(fs::path(path).parent_path(), error);
@@ -169,9 +160,9 @@ void ObjectCache::Keep(const std::string& name, const Entry& entry) {
   Status written = file.status();
   if (file.ok()) {
     file->Append(std::as_bytes(std::span(&head, 1)));
+    file->Append(entry.bytes.span());
     file->Append(name);
     file->Append(entry.version);
-    file->Append(entry.bytes.span());
     written = file->Finish();
   }
   if (!written.ok() && !state_->complained.exchange(true)) LogWarning("what servers send is not kept: " + written.message());

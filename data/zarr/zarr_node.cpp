@@ -8,9 +8,13 @@ using metadata::Field;
 using metadata::Join;
 using metadata::Json;
 
-NodeReading::NodeReading(Store& store, const std::string& path) : store_(store), path_(path), node3_(store, Join(path, kNode3)) {
-  for (const char* const name : {kArray2, kGroup2, kAttributes2}) node2_.emplace_back(store, Join(path, name));
-}
+NodeReading::NodeReading(Store& store, const std::string& path)
+    : store_(store),
+      path_(path),
+      node3_(store, Join(path, kNode3)),
+      array2_(store, Join(path, kArray2)),
+      group2_(store, Join(path, kGroup2)),
+      attributes2_(store, Join(path, kAttributes2)) {}
 
 Result<std::optional<ZarrNode>> NodeReading::Get() {
   Result<std::optional<ZarrNode>> node3 = Node3();
@@ -35,7 +39,7 @@ Result<std::optional<ZarrNode>> NodeReading::Node2() {
   ZarrNode node{.path = path_, .version = 2};
   for (const char* const name : {kArray2, kGroup2}) {
     const std::string key = Join(path_, name);
-    Result<std::optional<Json>> metadata = node2_[name == kArray2 ? 0 : 1].Get();
+    Result<std::optional<Json>> metadata = (name == kArray2 ? array2_ : group2_).Get();
     if (!metadata.ok()) return metadata.status();
     if (!metadata->has_value()) continue;
     node.array = name == kArray2;
@@ -46,7 +50,7 @@ Result<std::optional<ZarrNode>> NodeReading::Node2() {
   }
   // Some writers leave out .zgroup.
   const std::string key = Join(path_, kAttributes2);
-  Result<std::optional<Json>> attributes = node2_.back().Get();
+  Result<std::optional<Json>> attributes = attributes2_.Get();
   if (!attributes.ok()) return attributes.status();
   if (attributes->has_value()) {
     node.attributes = **std::move(attributes);

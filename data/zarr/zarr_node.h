@@ -34,7 +34,7 @@ class NodeReading {
  public:
   NodeReading(Store& store, const std::string& path);
   const std::string& path() const { return path_; }
-  // Once. nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read. Waits.
+  // Waits. May be called once. nullopt: no node is there. DataLoss, InvalidArgument: damaged or wrong metadata; errors of Store::Read.
   Result<std::optional<ZarrNode>> Get();
 
  private:
@@ -43,8 +43,7 @@ class NodeReading {
 
   Store& store_;
   std::string path_;
-  metadata::JsonReading node3_;
-  std::vector<metadata::JsonReading> node2_;  // .zarray, .zgroup, .zattrs
+  metadata::JsonReading node3_, array2_, group2_, attributes2_;
 };
 
 // The names of the objects of which a node has at least one.
