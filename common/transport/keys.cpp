@@ -17,7 +17,9 @@ using Text = std::array<char, kTextBytes + 1>;  // with the closing zero
 
 KeyPair MakeKeyPair() {
   Text public_key{}, secret_key{};
-  CHECK_EQ(zmq_curve_keypair(public_key.data(), secret_key.data()), 0) << "ZeroMQ was built without CURVE";
+  do {
+    CHECK_EQ(zmq_curve_keypair(public_key.data(), secret_key.data()), 0) << "ZeroMQ was built without CURVE";
+  } while (public_key.front() == '-');
   return {public_key.data(), secret_key.data()};
 }
 

@@ -12,6 +12,7 @@ struct KeyPair {
   friend bool operator==(const KeyPair&, const KeyPair&) = default;
 };
 
+// The public key does not begin with '-', so that no command line takes it for an option.
 KeyPair MakeKeyPair();
 
 // Whether the text can be a key.

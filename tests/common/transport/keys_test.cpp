@@ -32,6 +32,11 @@ TEST(Keys, PairsBelongTogetherAndDiffer) {
   }
 }
 
+// Every 85th key of CURVE's would begin so: of 1000, one in 10^5 runs would show none.
+TEST(Keys, CommandLinesTakeThemForNoOption) {
+  for (int i = 0; i < 1000; ++i) EXPECT_NE(MakeKeyPair().public_key.front(), '-');
+}
+
 class ConnectionsWithKeys : public KeyedSocketTest, public testing::WithParamInterface<bool> {
  protected:
   ConnectionsWithKeys() : KeyedSocketTest(GetParam()) {}
