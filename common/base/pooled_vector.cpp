@@ -1,9 +1,12 @@
 #include "common/base/pooled_vector.h"
 
+#include <sys/mman.h>
+
 #include <algorithm>
 #include <bit>
 #include <memory>
 #include <mutex>
+#include <new>
 #include <unordered_map>
 
 #include "common/base/aligned_buffer.h"
@@ -13,19 +16,34 @@ namespace {
 
 constexpr std::size_t kLeastKept = std::size_t{1} << 17;  // bytes: smaller blocks come from the heap, and go back to it
 #ifdef __SANITIZE_ADDRESS__
-constexpr std::size_t kMostKept = 0;  // so that the sanitizer sees uses of a block after it was given back
+constexpr bool kSanitized = true;  // nothing is kept or mapped, so that uses of a block after it was given back are seen
 #else
-constexpr std::size_t kMostKept = std::size_t{96} << 20;  // bytes in all
+constexpr bool kSanitized = false;
 #endif
+constexpr std::size_t kMostKept = kSanitized ? 0 : std::size_t{96} << 20, kMostOwnKept = kSanitized ? 0 : std::size_t{32} << 20;  // bytes
 
 // Images of neighbouring views differ in size; rounding lets them reuse each other's blocks. Pages never written take no memory.
 std::size_t BlockBytes(std::size_t bytes) { return std::bit_ceil(bytes); }
 
-void* AllocatePrivate(std::size_t bytes) { return ::operator new(bytes, std::align_val_t(kBufferAlignment)); }
-void FreePrivate(void* block) { ::operator delete(block, std::align_val_t(kBufferAlignment)); }
+void* AllocatePrivate(std::size_t bytes) {
+  if (kSanitized || bytes < kLeastKept) return ::operator new(bytes, std::align_val_t(kBufferAlignment));
+  void* const block = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (block == MAP_FAILED) throw std::bad_alloc();
+  if (bytes >= 2 * kHugePage) (void)::madvise(block, bytes, MADV_HUGEPAGE);  // without huge pages nothing changes
+  return block;
+}
+void FreePrivate(void* block, std::size_t bytes) {
+  if (kSanitized || bytes < kLeastKept) {
+    ::operator delete(block, std::align_val_t(kBufferAlignment));
+  } else {
+    ::munmap(block, bytes);
+  }
+}
 
 class Pool {
  public:
+  explicit Pool(std::size_t most_kept) : most_kept_(most_kept) {}
+
   void* Take(std::size_t bytes) {
     {
       const std::lock_guard lock(mutex_);
@@ -58,7 +76,7 @@ class Pool {
     if (arena_ != nullptr) return Status::Ok();
     Result<std::unique_ptr<SharedArena>> arena = SharedArena::Create();
     if (!arena.ok()) return arena.status();
-    for (const Block& kept : std::exchange(blocks_, {})) FreePrivate(kept.data);
+    for (const Block& kept : std::exchange(blocks_, {})) FreePrivate(kept.data, kept.bytes);
     bytes_ = 0;
     arena_ = *std::move(arena);
     return Status::Ok();
@@ -97,9 +115,9 @@ class Pool {
   };
 
   void Keep(void* data, std::size_t bytes) {
-    if (bytes > kMostKept) return Free(data);
-    while (bytes_ + bytes > kMostKept) {  // those unused for longest
-      Free(blocks_.front().data);
+    if (bytes > most_kept_) return Free(data, bytes);
+    while (bytes_ + bytes > most_kept_) {  // those unused for longest
+      Free(blocks_.front().data, blocks_.front().bytes);
       bytes_ -= blocks_.front().bytes;
       blocks_.erase(blocks_.begin());
     }
@@ -108,15 +126,16 @@ class Pool {
     bytes_ += bytes;
   }
 
-  void Free(void* data) {
+  void Free(void* data, std::size_t bytes) {
     if (arena_ != nullptr && arena_->Contains(data)) {
       arena_->GiveBack(data);
     } else {
-      FreePrivate(data);
+      FreePrivate(data, bytes);
     }
   }
 
-  std::mutex mutex_;
+  const std::size_t most_kept_;
+  std::mutex mutex_;           // guards what follows
   std::vector<Block> blocks_;  // last given back comes last; a few hundred at most
   std::size_t bytes_ = 0;
   std::unique_ptr<SharedArena> arena_;
@@ -125,21 +144,29 @@ class Pool {
 
 // Never destroyed: blocks are given back until the very end of the program.
 Pool& TheBlocks() {
-  static Pool& pool = *new Pool;
+  static Pool& pool = *new Pool(kMostKept);
   return pool;
+}
+Pool& OwnBlocks() {
+  static Pool& pool = *new Pool(kMostOwnKept);
+  return pool;
+}
+
+void* TakeFrom(Pool& (*pool)(), std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : pool().Take(BlockBytes(bytes)); }
+void GiveBackTo(Pool& (*pool)(), void* block, std::size_t bytes) {
+  if (bytes < kLeastKept) {
+    FreePrivate(block, bytes);
+  } else {
+    pool().GiveBack(block, BlockBytes(bytes));
+  }
 }
 
 }  // namespace
 
-void* TakeBlock(std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : TheBlocks().Take(BlockBytes(bytes)); }
-
-void GiveBackBlock(void* block, std::size_t bytes) {
-  if (bytes < kLeastKept) {
-    FreePrivate(block);
-  } else {
-    TheBlocks().GiveBack(block, BlockBytes(bytes));
-  }
-}
+void* TakeBlock(std::size_t bytes) { return TakeFrom(TheBlocks, bytes); }
+void GiveBackBlock(void* block, std::size_t bytes) { GiveBackTo(TheBlocks, block, bytes); }
+void* TakeOwnBlock(std::size_t bytes) { return TakeFrom(OwnBlocks, bytes); }
+void GiveBackOwnBlock(void* block, std::size_t bytes) { GiveBackTo(OwnBlocks, block, bytes); }
 
 Status ShareBlocks() { return TheBlocks().Share(); }
 std::optional<ArenaName> SharedBlocksArena() { return TheBlocks().arena(); }

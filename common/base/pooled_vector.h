@@ -16,10 +16,14 @@
 
 namespace slabstream {
 
-// Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks that were given back are kept for reuse, up to 96 MiB for the
-// process. Any thread.
+// Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks are memory mappings of their own, so they leave no holes in a heap.
+// Those that were given back are kept for reuse, up to 96 MiB for the process. Any thread.
 void* TakeBlock(std::size_t bytes);
 void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
+
+// The same, but no other process ever reads them (ShareBlocks), and up to 32 MiB of them are kept.
+void* TakeOwnBlock(std::size_t bytes);
+void GiveBackOwnBlock(void* block, std::size_t bytes);
 
 // From now on, takes large blocks from a SharedArena of the process. Unavailable: there is none; blocks stay private. Again: no change.
 Status ShareBlocks();

@@ -1,5 +1,6 @@
 // UnwrittenVector<T>: std::vector for bytes that are written right after memory is taken for them, such as a chunk that is read and
-// decoded. New elements are uninitialised unless a value is given. Its storage begins at a 64-byte boundary and comes from the heap.
+// decoded. New elements are uninitialised unless a value is given. Its storage begins at a 64-byte boundary and is reused: chunks come and
+// go on several threads, and their holes in the heap once took as much memory again.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/base/pooled_vector.h"
 
 namespace slabstream {
 
@@ -19,8 +20,8 @@ struct UnwrittenAllocator {
   UnwrittenAllocator() = default;
   template <class U>
   UnwrittenAllocator(const UnwrittenAllocator<U>&) {}  // NOLINT(google-explicit-constructor): rebinding
-  T* allocate(std::size_t count) { return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t(kBufferAlignment))); }
-  void deallocate(T* data, std::size_t) { ::operator delete(data, std::align_val_t(kBufferAlignment)); }
+  T* allocate(std::size_t count) { return static_cast<T*>(TakeOwnBlock(count * sizeof(T))); }
+  void deallocate(T* data, std::size_t count) { GiveBackOwnBlock(data, count * sizeof(T)); }
   template <class U>
   void construct(U* element) {
     ::new (static_cast<void*>(element)) U;

@@ -12,6 +12,11 @@ namespace slabstream {
 
 class ReadContext {
  public:
+  // Tasks at a time beside two for each thread that decodes: enough for a web server that is asked for many chunks at a time
+  // (HttpTransfers::kMostOfAHost). More would gain nothing: what waits here is dropped when nobody wants it any more, what is asked for
+  // comes.
+  static constexpr std::size_t kMostAsked = 32;
+
   struct Limits {
     std::size_t decode_threads = 0;                            // 0: as many as there are cores
     std::uint64_t under_way_bytes = std::uint64_t{128} << 20;  // of chunks that are read or decoded; one chunk may always be
@@ -24,8 +29,8 @@ class ReadContext {
 
   // Runs `task` on a thread that decodes. Any thread.
   void PostDecode(std::function<void()> task);
-  // Runs `task` at once or when there is room for so many bytes, in order. It must see to it that Release is called once for them. It
-  // throws nothing, and begins work rather than doing it, since it may run on the thread of another one that ends.
+  // Runs `task` at once or when there is room for it and for so many bytes, in order. It must see to it that Release is called once for
+  // them. It throws nothing, and begins work rather than doing it, since it may run on the thread of another one that ends.
   void Admit(std::uint64_t bytes, std::function<void()> task);
   void Release(std::uint64_t bytes);
 

@@ -31,6 +31,18 @@ TEST(ReadContextTest, OneTaskMayAlwaysBeUnderWay) {
   EXPECT_EQ(begun, std::vector<int>({1, 2}));
 }
 
+TEST(ReadContextTest, WhatWouldWaitElsewhereWaitsHere) {
+  ReadContext context({.decode_threads = 3});
+  const std::size_t most = ReadContext::kMostAsked + 6;
+  std::size_t begun = 0;
+  for (std::size_t i = 0; i < most + 2; ++i) context.Admit(1, [&] { ++begun; });
+  EXPECT_EQ(begun, most);
+  context.Release(1);
+  EXPECT_EQ(begun, most + 1);
+  for (std::size_t i = 0; i <= most; ++i) context.Release(1);
+  EXPECT_EQ(begun, most + 2);
+}
+
 TEST(ReadContextTest, TasksThatEndAtOnceDoNotNest) {
   ReadContext context({.decode_threads = 1, .under_way_bytes = 1});
   int depth = 0, deepest = 0, ended = 0;
