@@ -23,6 +23,7 @@ SIDE, CHUNK, LEVELS = 8192, 64, 8
 FIRST_MADE = 3  # this level and coarser ones
 EMPTY = 0.4
 NAME = "/volume.ome.zarr/"
+PAGES = b"Access-Control-Allow-Origin: *\r\n"  # of other servers may show it
 
 
 class Formula:
@@ -143,7 +144,7 @@ class Store:
         self._counts["requests"] += 1
         if found is None:
             self._counts["missing"] += 1
-            return b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n"
+            return b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n" + PAGES + b"\r\n"
         if known == self._tag(path):
             self._counts["unchanged"] += 1
             return f"HTTP/1.1 304 Not Modified\r\nETag: {known}\r\n\r\n".encode()
@@ -158,7 +159,7 @@ class Store:
     @classmethod
     def _message(cls, body: bytes, path: str = "") -> bytes:
         named = f"ETag: {cls._tag(path)}\r\n" if path else ""
-        return f"HTTP/1.1 200 OK\r\nContent-Length: {len(body)}\r\n{named}\r\n".encode() + body
+        return f"HTTP/1.1 200 OK\r\nContent-Length: {len(body)}\r\n{named}".encode() + PAGES + b"\r\n" + body
 
 
 async def main() -> None:

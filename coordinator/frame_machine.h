@@ -39,6 +39,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <variant>
@@ -46,6 +47,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/base/web_traffic.h"
 #include "common/planning/placement.h"
 #include "common/wire/control_messages.h"
 #include "coordinator/machines.h"
@@ -68,9 +70,10 @@ struct CoordinatorConfig {
   Duration return_wait = std::chrono::seconds(5);  // for the workers of an earlier coordinator, once one of them is there
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
-  std::size_t max_queued = 1024;              // frames of all clients
-  std::uint64_t share_pixels = kSharePixels;  // of a picture that its client puts together (FramePlan)
-  LogLevel log_level = LogLevel::kOff;        // Notes of lower levels are not made
+  std::size_t max_queued = 1024;                                   // frames of all clients
+  std::uint64_t share_pixels = kSharePixels;                       // of a picture that its client puts together (FramePlan)
+  LogLevel log_level = LogLevel::kOff;                             // Notes of lower levels are not made
+  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;  // of this process; null: it asks no web server
 };
 
 // ---- events

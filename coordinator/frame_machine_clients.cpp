@@ -1,6 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <ranges>
+#include <string>
 #include <utility>
 
 #include "common/planning/levels.h"
@@ -163,7 +166,24 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const StatusQuery& m
     for (const std::string_view ability : kind->AbilityNames()) renderer.abilities.emplace_back(ability);
     for (const RendererParameter& parameter : kind->parameters()) renderer.parameters.emplace_back(parameter.name);
   }
+  reply.web = WebTrafficOfAll();
   actions.emplace_back(std::in_place_type<ToDatasets>, FinishStatus{client, std::move(reply)});
+}
+
+std::vector<WebTraffic> FrameMachine::State::WebTrafficOfAll() const {
+  std::map<std::string, WebTraffic> of_servers;
+  const auto add = [&](const std::vector<WebTraffic>& process) {
+    for (const WebTraffic& traffic : process) {
+      WebTraffic& sum = of_servers[traffic.server];
+      sum.server = traffic.server;
+      sum += traffic;
+    }
+  };
+  if (config.web_traffic) add(config.web_traffic());
+  for (const Member& member : roster.members()) add(member.web);
+  std::vector<WebTraffic> all;
+  for (auto& [server, traffic] : of_servers | std::views::take(kMaxWebServers)) all.push_back(std::move(traffic));
+  return all;
 }
 
 void FrameMachine::State::OnClientMessage(PeerToken client, const ShutDown& message) {

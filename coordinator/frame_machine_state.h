@@ -105,6 +105,7 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const CancelFrame& message);
   void OnClientMessage(PeerToken client, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);
+  std::vector<WebTraffic> WebTrafficOfAll() const;  // of this process and its workers, by server
   void OnClientMessage(PeerToken client, const ShutDown& message);
 
   // ---- requests

@@ -19,6 +19,7 @@
 #include "coordinator/service.h"
 #include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 
 namespace slabstream {
@@ -89,6 +90,7 @@ int Run(int argc, char** argv) {
     options.catalogue = std::move(found.datasets);
     options.folders = {found.folders.begin(), found.folders.end()};
     options.machine.log_level = LeastLogLevel();
+    options.machine.web_traffic = HttpTransfers::TrafficOfProcess;
     LimitMemory(options.machine.memory_bytes);
     if (compress) options.codec = Codec::kZstd;
     return Serve(std::move(options), metrics);

@@ -76,6 +76,7 @@ LiveRoster::News LiveRoster::Hear(const Heartbeat& message, PeerToken from, Time
   member->cached_bytes = message.cached_bytes;
   member->fetched_bytes = std::max(member->fetched_bytes, message.fetched_bytes);
   member->rendered_ranks = std::max(member->rendered_ranks, message.rendered_ranks);
+  member->web = message.web;
   if (message.leaving && !member->leaving) {
     member->leaving = true;
     Vacate(member->id, now);

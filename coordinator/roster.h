@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/base/time.h"
+#include "common/base/web_traffic.h"
 #include "common/planning/frame_plan.h"
 #include "common/wire/control_messages.h"
 #include "coordinator/peer_token.h"
@@ -28,6 +29,7 @@ struct Member {
   std::uint64_t cached_bytes = 0, fetched_bytes = 0;
   std::uint32_t rendered_ranks = 0;
   bool leaving = false;
+  std::vector<WebTraffic> web = {};  // as it said last
 };
 
 class LiveRoster {

@@ -9,7 +9,8 @@
 
 namespace slabstream {
 
-FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names)
+FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names,
+                                   Duration preview_interval)
     : epoch_(assignment.epoch),
       self_(self),
       client_(assignment.client),
@@ -23,16 +24,17 @@ FrameAccumulator::FrameAccumulator(const GroupAssignment& assignment, WorkerId s
       share_count_(assignment.group.schedule.roots.size()),
       pixels_(Share(WholeFrame(assignment.setup), share_, share_count_)),
       names_(names),
+      preview_interval_(preview_interval),
       attempt_(assignment.key.attempt) {}
 
-void FrameAccumulator::Add(GroupImage group, WorkerActions& actions) {
+void FrameAccumulator::Add(GroupImage group, Time now, WorkerActions& actions) {
   CHECK(!Has(group.key.group)) << "group " << group.key.group;
   const std::uint32_t number = group.key.group;
   waiting_.emplace(number, std::move(group));
-  Advance(actions);
+  Advance(now, actions);
 }
 
-bool FrameAccumulator::OnCombined(const CombineDone& done, WorkerActions& actions) {
+bool FrameAccumulator::OnCombined(const CombineDone& done, Time now, WorkerActions& actions) {
   if (combining_ == 0 || done.image != image_) return false;
   --combining_;
   if (!done.status.ok()) {
@@ -42,21 +44,21 @@ bool FrameAccumulator::OnCombined(const CombineDone& done, WorkerActions& action
   std::vector<RankReport>& reports = reports_.back();
   const auto own = std::ranges::find(reports, self_, &RankReport::worker);
   if (own != reports.end()) AddStage(*own, Stage::kCombine, done.span.begin_ns, done.span.end_ns);
-  Advance(actions);
+  Advance(now, actions);
   return true;
 }
 
-void FrameAccumulator::OnHiddenFound(const HiddenFound& found, WorkerActions& actions) {
+void FrameAccumulator::OnHiddenFound(const HiddenFound& found, Time now, WorkerActions& actions) {
   if (combining_ == 0 || found.image != image_) return;
   --combining_;
   hidden_ = found.hidden;
-  Advance(actions);
+  Advance(now, actions);
 }
 
-void FrameAccumulator::Advance(WorkerActions& actions) {
+void FrameAccumulator::Advance(Time now, WorkerActions& actions) {
   while (failure_.ok() && combining_ == 0) {
     if (group_started_) {
-      FinishGroup(actions);
+      FinishGroup(now, actions);
       continue;
     }
     const auto next = waiting_.find(groups_done_);
@@ -99,11 +101,14 @@ void FrameAccumulator::StartGroup(GroupImage group, WorkerActions& actions) {
   }
 }
 
-void FrameAccumulator::FinishGroup(WorkerActions& actions) {
+void FrameAccumulator::FinishGroup(Time now, WorkerActions& actions) {
   group_started_ = false;
   ++groups_done_;
   ReportDone(groups_done_ - 1, actions);
-  if (previews_ || groups_done_ == group_count_) SendPicture(actions);
+  if (groups_done_ == group_count_) return SendPicture(actions);
+  if (!previews_ || (previewed_ && now < *previewed_ + preview_interval_)) return;
+  SendPicture(actions);
+  previewed_ = now;
 }
 
 void FrameAccumulator::Confirm(std::uint32_t group, WorkerActions& actions) {

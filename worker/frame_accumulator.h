@@ -1,8 +1,8 @@
 // FrameAccumulator: a frame, or a share of one, on its display worker. It accumulates the images of groups front to back; an image that
-// comes early waits. After each group it reports GroupDone and sends a preview if wanted; after the last group it sends the frame. If
-// frames use occlusion masks, it first finds the hidden tiles and adds them to the report, except after the last group, when nobody needs
-// them. It outlives attempts: accumulated pixels are right whoever rendered them. It keeps the picture until the frame is over, because the
-// coordinator may ask again (Confirm).
+// comes early waits. After each group it reports GroupDone and sends a preview if they are wanted and the last one is long enough ago;
+// after the last group it sends the frame. If frames use occlusion masks, it first finds the hidden tiles and adds them to the report,
+// except after the last group, when nobody needs them. It outlives attempts: accumulated pixels are right whoever rendered them. It keeps
+// the picture until the frame is over, because the coordinator may ask again (Confirm).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,8 @@ namespace slabstream {
 class FrameAccumulator {
  public:
   // `assignment`: of any group of the frame, of which this worker gets the share `share`. `names` must outlive the accumulator.
-  FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names);
+  // `preview_interval`: from one preview to the next, at least.
+  FrameAccumulator(const GroupAssignment& assignment, WorkerId self, std::size_t share, ImageNames& names, Duration preview_interval);
 
   // True if the group's image is here: accumulated, being combined, or waiting.
   bool Has(std::uint32_t group) const { return group < groups_done_ + (group_started_ ? 1U : 0U) || waiting_.count(group) > 0; }
@@ -30,9 +31,9 @@ class FrameAccumulator {
   // Later reports and pictures carry this attempt.
   void SetAttempt(std::uint32_t attempt) { attempt_ = attempt; }
 
-  void Add(GroupImage group, WorkerActions& actions);                // takes over its images
-  bool OnCombined(const CombineDone& done, WorkerActions& actions);  // false: not one of its combines
-  void OnHiddenFound(const HiddenFound& found, WorkerActions& actions);
+  void Add(GroupImage group, Time now, WorkerActions& actions);                // takes over its images
+  bool OnCombined(const CombineDone& done, Time now, WorkerActions& actions);  // false: not one of its combines
+  void OnHiddenFound(const HiddenFound& found, Time now, WorkerActions& actions);
 
   // If the group is done, reports it again; if the frame is finished, sends it again, once for each attempt.
   void Confirm(std::uint32_t group, WorkerActions& actions);
@@ -40,9 +41,9 @@ class FrameAccumulator {
   void Drop(WorkerActions& actions);  // releases what it holds
 
  private:
-  void Advance(WorkerActions& actions);
+  void Advance(Time now, WorkerActions& actions);
   void StartGroup(GroupImage group, WorkerActions& actions);
-  void FinishGroup(WorkerActions& actions);
+  void FinishGroup(Time now, WorkerActions& actions);
   void ReportDone(std::uint32_t group, WorkerActions& actions) const;
   void SendPicture(WorkerActions& actions);
 
@@ -57,10 +58,12 @@ class FrameAccumulator {
   const std::size_t share_, share_count_;
   const PixelRange pixels_;  // of the share
   ImageNames& names_;
+  const Duration preview_interval_;
 
   std::uint32_t attempt_ = 0;
   std::uint32_t groups_done_ = 0;                    // accumulated, nearest first
   std::optional<std::uint32_t> frame_sent_attempt_;  // the latest attempt for which the finished frame was sent
+  std::optional<Time> previewed_;                    // the last preview
   ImageHandle image_ = 0;                            // 0: none yet
   int combining_ = 0;                                // StartCombine and FindHidden of image_ that have not been answered
   bool group_started_ = false;

@@ -18,6 +18,7 @@
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 #include "worker/service.h"
 
@@ -94,6 +95,7 @@ int Run(int argc, char** argv) {
       options.keys = file->keys();
     }
     options.machine.compression = *ParseCompression(compress);
+    options.machine.web_traffic = HttpTransfers::TrafficOfProcess;
     options.share_memory = !frames_only;
     SetReadMemory(options.machine.memory_bytes);
     if (Status kept = KeepObjects(cache); !kept.ok()) return kept;

@@ -206,8 +206,14 @@ void WorkerMachine::State::KeepTime() {
     next_register = now + config.register_interval;
   }
   if (worker != 0 && now >= next_heartbeat) {
-    actions.push_back(SendControl{
-        Heartbeat{epoch, incarnation, worker, boxes.cached_bytes(), boxes.fetched_bytes(), rendered_ranks, leave_by.has_value()}});
+    actions.push_back(SendControl{Heartbeat{.epoch = epoch,
+                                            .incarnation = incarnation,
+                                            .worker = worker,
+                                            .cached_bytes = boxes.cached_bytes(),
+                                            .fetched_bytes = boxes.fetched_bytes(),
+                                            .rendered_ranks = rendered_ranks,
+                                            .leaving = leave_by.has_value(),
+                                            .web = config.web_traffic ? config.web_traffic() : std::vector<WebTraffic>()}});
     next_heartbeat = now + heartbeat;
   }
 }
@@ -262,7 +268,7 @@ void WorkerMachine::State::On(GroupAssignment&& assignment, const Bytes&) {
   }
 
   if (const std::optional<std::size_t> share = ShareOf(assignment.group, assignment.display, worker)) {
-    if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, *share, names);
+    if (!frame.accumulator) frame.accumulator.emplace(assignment, worker, *share, names, config.preview_interval);
     if (frame.accumulator->groups_done() < assignment.first_group) {
       return Trouble(key, Status::DataLoss(fmt::format("the display worker holds {} groups of the frame, expected {}",
                                                        frame.accumulator->groups_done(), assignment.first_group)));
@@ -342,12 +348,12 @@ void WorkerMachine::State::On(const CombineDone& done) {
   renders.Charge(frame->second.client, Duration(done.span.end_ns - done.span.begin_ns));
   if (GroupRun* run = FindRun(done.key); run != nullptr && run->OnCombined(done, actions)) return AfterRun(*run);
   if (!frame->second.accumulator) return;
-  if (frame->second.accumulator->OnCombined(done, actions)) CheckAccumulator(frame->first, frame->second);
+  if (frame->second.accumulator->OnCombined(done, now, actions)) CheckAccumulator(frame->first, frame->second);
 }
 
 void WorkerMachine::State::On(const HiddenFound& found) {
   const auto frame = frames.find(found.key.frame);
-  if (frame != frames.end() && frame->second.accumulator) frame->second.accumulator->OnHiddenFound(found, actions);
+  if (frame != frames.end() && frame->second.accumulator) frame->second.accumulator->OnHiddenFound(found, now, actions);
 }
 
 void WorkerMachine::State::On(const SendFailed& failed) {
@@ -383,7 +389,7 @@ void WorkerMachine::State::AfterRun(GroupRun& run) {
   if (run.finished()) EndRun(key);
   if (!image) return;
   Frame& frame = frames.at(key.frame);
-  frame.accumulator->Add(std::move(*image), actions);
+  frame.accumulator->Add(std::move(*image), now, actions);
   CheckAccumulator(key.frame, frame);
 }
 

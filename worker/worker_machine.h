@@ -17,7 +17,7 @@
 //   RenderDone        the rank holds its image; its steps of the schedule run in order of rounds: a send goes as soon as everything before
 //                     it is in, a receive waits for its PartialImage; ranks of this same worker combine without a message
 //   root is complete  the group image goes to the display worker. It accumulates groups front to back (early ones wait), reports GroupDone
-//                     (with the tiles hidden by then), sends a preview if wanted, and after the last group the frame
+//                     (with the tiles hidden by then), sends a preview if wanted (FrameAccumulator), and after the last group the frame
 // PartialImages that arrive before their assignment or before the Welcome are kept, within a byte limit and for some time; those of
 // finished frames and older attempts are dropped. A second copy of any message changes nothing.
 //
@@ -31,6 +31,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -41,6 +42,7 @@
 #include "common/base/bytes.h"
 #include "common/base/rare.h"
 #include "common/base/time.h"
+#include "common/base/web_traffic.h"
 #include "common/kernels/combine.h"
 #include "common/wire/any_message.h"
 #include "worker/link_rates.h"
@@ -85,11 +87,13 @@ struct WorkerConfig {
                                                        // and above what images leave of memory_bytes
   std::uint64_t credit_bytes = std::uint64_t{16} << 20;  // chunk bytes requested and not yet stored
   Duration register_interval = std::chrono::seconds(1);
-  Duration chunk_timeout = std::chrono::seconds(3);          // then a chunk is asked for again
-  int chunk_attempts = 10;                                   // then WorkerTrouble
-  Duration drain = std::chrono::seconds(30);                 // from LeaveRequested to the end; 0: at once
-  std::uint64_t early_image_bytes = std::uint64_t{1} << 30;  // payloads of PartialImages kept before their assignment; then WorkerTrouble
-  Duration early_image_patience = std::chrono::seconds(10);  // so long they are kept, at least
+  Duration chunk_timeout = std::chrono::seconds(3);            // then a chunk is asked for again
+  int chunk_attempts = 10;                                     // then WorkerTrouble
+  Duration preview_interval = std::chrono::milliseconds(100);  // from one preview of a frame to the next, at least
+  Duration drain = std::chrono::seconds(30);                   // from LeaveRequested to the end; 0: at once
+  std::uint64_t early_image_bytes = std::uint64_t{1} << 30;    // payloads of PartialImages kept before their assignment; then WorkerTrouble
+  Duration early_image_patience = std::chrono::seconds(10);    // so long they are kept, at least
+  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;  // of this process, unless others tell of it; null: there is none
 };
 
 // The pixels of a PartialImage: runs, or another process' memory.

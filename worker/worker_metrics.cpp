@@ -64,9 +64,7 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Value(image_bytes_, {{"plane", "images"}});
   out.Value(picture_bytes_, {{"plane", "pictures"}});
   out.Single("worker_unsent_total", MetricType::kCounter, "Images and pictures that could not be sent.", unsent_);
-  const HttpCounts web = HttpTransfers::CountsOfProcess();
-  AddWebRequests(out, "worker_web_requests_total", "worker_web_bytes_total",
-                 {web.answered(), web.unchanged, web.retries, web.failures, web.bytes});
+  AddWebTraffic(out, "worker", HttpTransfers::TrafficOfProcess());
   AddProcess(out, memory_limit_);
   return out.Take();
 }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "data/stores/http_transfers.h"
 
 namespace slabstream {
 namespace {
@@ -31,6 +32,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   options.coordinator.worker_endpoint = UniqueEndpoint();
   options.coordinator.voxels_endpoint = UniqueEndpoint();
   CoordinatorConfig& machine = options.coordinator.machine;
+  machine.web_traffic = HttpTransfers::TrafficOfProcess;  // the workers' too, which are of this process
   machine.worker_timeout = machine.client_timeout = machine.stall_timeout = options.worker.chunk_timeout = kPatience;
   Result<std::unique_ptr<CoordinatorService>> coordinator = CoordinatorService::Start(context, std::move(options.coordinator));
   if (!coordinator.ok()) return coordinator.status();

@@ -27,6 +27,11 @@ std::string StatusText(const StatusReply& reply) {
                         worker.worker, worker.pid, worker.host, worker.threads, place, double(worker.cached_bytes) / (1 << 20),
                         double(worker.fetched_bytes) / (1 << 20), worker.rendered_ranks, limit(worker.memory_bytes));
   }
+  for (const WebTraffic& of : reply.web) {
+    text += fmt::format("web server   {}: {} requests ({} of them retries), {} failed, {} answered from the disk, {:.1f} MiB, {:.1f} s\n",
+                        of.server, of.requests, of.retries, of.failures, of.unchanged, double(of.bytes) / (1 << 20),
+                        double(of.milliseconds) / 1000);
+  }
   text += fmt::format("datasets     {}\n", reply.datasets.size());
   for (const DatasetStatus& dataset : reply.datasets) {
     text += fmt::format("  {} {}", dataset.name, NameOf(dataset.state));
@@ -61,6 +66,16 @@ Json StatusJson(const StatusReply& reply) {
   for (const auto& [name, title, abilities, parameters] : reply.renderers) {
     renderers.push_back({{"name", name}, {"title", title}, {"abilities", abilities}, {"parameters", parameters}});
   }
+  Json web = Json::array();
+  for (const WebTraffic& of : reply.web) {
+    web.push_back({{"server", of.server},
+                   {"requests", of.requests},
+                   {"retries", of.retries},
+                   {"failures", of.failures},
+                   {"unchanged", of.unchanged},
+                   {"bytes", of.bytes},
+                   {"ms", of.milliseconds}});
+  }
   return {{"pid", reply.pid},
           {"uptime_ms", reply.uptime_ms},
           {"clients", reply.clients},
@@ -77,6 +92,7 @@ Json StatusJson(const StatusReply& reply) {
           {"memory_bytes", reply.memory_bytes},
           {"workers", std::move(workers)},
           {"datasets", std::move(datasets)},
+          {"web", std::move(web)},
           {"renderers", std::move(renderers)}};
 }
 

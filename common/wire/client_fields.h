@@ -233,6 +233,7 @@ void Fields(auto& io, Is<StatusReply> auto& m) {
   io.Any(m.memory_bytes, &P::memory_bytes, &P::set_memory_bytes);
   io.Message("refused", m.refused, &P::refused, &P::mutable_refused);
   io.Messages("renderers", m.renderers, &P::renderers, &P::mutable_renderers, 256);
+  io.Messages("web", m.web, &P::web, &P::mutable_web, kMaxWebServers);
 }
 
 v1::ShutDown ProtoOf(const ShutDown&);

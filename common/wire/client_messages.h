@@ -29,6 +29,7 @@
 #include <vector>
 
 #include "common/base/merged.h"
+#include "common/base/web_traffic.h"
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
@@ -197,6 +198,7 @@ struct StatusReply {
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   RefusedRequests refused;
   std::vector<RendererStatus> renderers = {};
+  std::vector<WebTraffic> web = {};  // of the coordinator and the present workers; at most kMaxWebServers
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 

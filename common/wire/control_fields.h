@@ -54,6 +54,7 @@ void Fields(auto& io, Is<Heartbeat> auto& m) {
   io.Any(m.fetched_bytes, &P::fetched_bytes, &P::set_fetched_bytes);
   io.Any(m.rendered_ranks, &P::rendered_ranks, &P::set_rendered_ranks);
   io.Any(m.leaving, &P::leaving, &P::set_leaving);
+  io.Messages("web", m.web, &P::web, &P::mutable_web, kMaxWebServers);
 }
 
 v1::Ping ProtoOf(const Ping&);

@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/base/web_traffic.h"
 #include "common/image/occlusion_mask.h"
 #include "common/image/run_header.h"
 #include "common/planning/frame_plan.h"
@@ -75,6 +76,7 @@ struct Heartbeat {
   std::uint64_t fetched_bytes = 0;   // voxels received since the process began
   std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
   bool leaving = false;              // it wants no new work, and Stop once nothing needs it any more; from then on in every heartbeat
+  std::vector<WebTraffic> web = {};  // of the process since it began; at most kMaxWebServers
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 

@@ -25,6 +25,17 @@ static_assert(v1::Stage_MAX == kStageCount);
 inline constexpr WorkerId kMaxWorkerId = std::numeric_limits<WorkerId>::max();
 inline constexpr std::uint64_t kMaxUint64 = std::numeric_limits<std::uint64_t>::max();
 
+void Fields(auto& io, Is<WebTraffic> auto& m) {
+  using P = v1::WebTraffic;
+  io.Text("server", m.server, &P::server, &P::mutable_server, 1, kMaxNameBytes);
+  io.Any(m.requests, &P::requests, &P::set_requests);
+  io.Any(m.retries, &P::retries, &P::set_retries);
+  io.Any(m.failures, &P::failures, &P::set_failures);
+  io.Any(m.unchanged, &P::unchanged, &P::set_unchanged);
+  io.Any(m.bytes, &P::bytes, &P::set_bytes);
+  io.Any(m.milliseconds, &P::milliseconds, &P::set_milliseconds);
+}
+
 // ---- geometry
 
 void Fields(auto& io, Is<Index3> auto& m) {

@@ -20,17 +20,6 @@
 namespace slabstream {
 namespace {
 
-// Everything but what RFC 3986 leaves as it is, and the slashes between parts.
-std::string Encoded(const std::string& key) {
-  std::string url;
-  for (const char c : key) {
-    const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       std::string_view("-._~/").find(c) != std::string_view::npos;
-    url += plain ? std::string(1, c) : fmt::format("%{:02X}", static_cast<unsigned char>(c));
-  }
-  return url;
-}
-
 // Which version of each object was seen first; of the last kMost.
 class SeenVersions {
  public:
@@ -64,7 +53,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
     if (range.bytes == 0) return done(Bytes());
     const bool whole = range.begin == 0 && range.bytes == ByteRange::kAll;
-    HttpGet get{.url = url_ + "/" + Encoded(key), .span = {}, .most = most, .access = access_};
+    HttpGet get{.url = url_ + "/" + EncodedPath(key), .span = {}, .most = most, .access = access_};
     // Where an object ends must be known to read what lies there: servers differ in what they make of "the last n bytes".
     if (!whole && (range.from_end || range.bytes == ByteRange::kAll)) {
       get.only_size = true;

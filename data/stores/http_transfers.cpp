@@ -8,11 +8,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <deque>
 #include <mutex>
 #include <random>
+#include <ranges>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -108,6 +110,7 @@ struct Transfer {
   Time begun;  // the first try
 
   // Of the present try.
+  Time tried;
   CURL* easy = nullptr;
   PooledVector<std::byte> body;
   std::optional<Status> stopped;  // by us, and why
@@ -192,7 +195,7 @@ struct HttpTransfers::Impl {
   CURLM* multi = nullptr;
   mutable std::mutex mutex;  // guards the next two
   std::vector<Owned> asked;
-  std::map<std::string, HttpCounts> counts;
+  std::map<std::string, WebTraffic> traffic;  // by server
   // The thread's own.
   std::map<std::string, Host> hosts;
   std::multimap<Time, Owned> paused;
@@ -239,7 +242,8 @@ struct HttpTransfers::Impl {
     Owned owned = std::move(host.waiting.front());
     host.waiting.pop_front();
     Transfer& transfer = *owned;
-    if (++transfer.tries == 1) transfer.begun = MonotonicNow();
+    transfer.tried = MonotonicNow();
+    if (++transfer.tries == 1) transfer.begun = transfer.tried;
     CURL* easy = idle.empty() ? curl_easy_init() : idle.back();
     if (easy == nullptr) return Answer(std::move(owned), Status::ResourceExhausted(transfer.url + ": no memory to ask for it"));
     if (!idle.empty()) idle.pop_back();
@@ -251,6 +255,7 @@ struct HttpTransfers::Impl {
     curl_easy_setopt(easy, CURLOPT_URL, transfer.url.c_str());
     curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
     curl_easy_setopt(easy, CURLOPT_USERAGENT, UserAgent().c_str());
+    if (const char* const authorities = std::getenv("SSL_CERT_FILE")) curl_easy_setopt(easy, CURLOPT_CAINFO, authorities);
     curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
     curl_easy_setopt(easy, CURLOPT_PIPEWAIT, 1L);  // one connection for all, if the server speaks HTTP/2
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(std::chrono::ceil<milliseconds>(timing.connecting).count()));
@@ -298,11 +303,12 @@ struct HttpTransfers::Impl {
     curl_easy_getinfo(easy, CURLINFO_PRIVATE, &asked_for);
     Transfer& transfer = *asked_for;
     Owned owned = std::move(hosts.at(transfer.host).active.extract(easy).mapped());
-    Count(transfer.host, [&](HttpCounts& count) {
+    Count(transfer.host, [&](WebTraffic& count) {
       ++count.requests;
       count.retries += transfer.tries > 1 ? 1 : 0;
       count.unchanged += transfer.status() == 304 ? 1 : 0;
       count.bytes += transfer.body.size();
+      count.milliseconds += std::uint64_t(std::chrono::duration_cast<milliseconds>(MonotonicNow() - transfer.tried).count());
     });
     curl_multi_remove_handle(multi, easy);
     Decide(std::move(owned), code);  // which asks the handle, and may be the end of the transfer
@@ -389,14 +395,16 @@ struct HttpTransfers::Impl {
   }
 
   void Answer(Owned owned, Result<HttpObject> answer) {
-    if (!answer.ok()) Count(owned->host, [](HttpCounts& count) { ++count.failures; });
+    if (!answer.ok()) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
     owned->done(std::move(answer));
   }
 
   template <class Change>
   void Count(const std::string& host, Change&& change) {
     const std::lock_guard lock(mutex);
-    change(counts[host]);
+    WebTraffic& count = traffic[host];
+    count.server = host;
+    change(count);
   }
 
   void DropAll() {
@@ -420,17 +428,9 @@ HttpTransfers& HttpTransfers::OfProcess() {
   return transfers;
 }
 
-HttpCounts HttpTransfers::CountsOfProcess() {
-  HttpCounts sum;
-  if (!process_asks) return sum;
-  for (const auto& [host, counts] : OfProcess().counts()) {
-    sum.requests += counts.requests;
-    sum.retries += counts.retries;
-    sum.failures += counts.failures;
-    sum.unchanged += counts.unchanged;
-    sum.bytes += counts.bytes;
-  }
-  return sum;
+std::vector<WebTraffic> HttpTransfers::TrafficOfProcess() {
+  if (!process_asks) return {};
+  return OfProcess().traffic();
 }
 
 HttpTransfers::HttpTransfers(const Timing& timing) : impl_(std::make_unique<Impl>(timing)) {}
@@ -449,9 +449,11 @@ void HttpTransfers::Get(HttpGet get, Done done) {
   curl_multi_wakeup(impl_->multi);
 }
 
-std::map<std::string, HttpCounts> HttpTransfers::counts() const {
+std::vector<WebTraffic> HttpTransfers::traffic() const {
   const std::lock_guard lock(impl_->mutex);
-  return impl_->counts;
+  std::vector<WebTraffic> all;
+  for (const auto& [server, traffic] : impl_->traffic | std::views::take(kMaxWebServers)) all.push_back(traffic);
+  return all;
 }
 
 }  // namespace slabstream

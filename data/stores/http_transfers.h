@@ -7,19 +7,22 @@
 //
 // Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may not end at a loopback or
 // link-local address, so that no server on the internet makes this process ask what only this machine sees.
+//
+// Certificates must be signed by an authority that the system knows, or that is in the file SSL_CERT_FILE of the environment.
 #pragma once
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/base/web_traffic.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/s3.h"
 
@@ -41,17 +44,6 @@ struct HttpObject {
   bool unchanged = false;  // it is still the one that was known (HttpGet::known)
 };
 
-// What a server was asked since this process began.
-struct HttpCounts {
-  std::uint64_t requests = 0;   // each try is one
-  std::uint64_t retries = 0;    // of these: after one that failed
-  std::uint64_t failures = 0;   // after which nothing was tried again
-  std::uint64_t unchanged = 0;  // answers without bytes, of objects that were known
-  std::uint64_t bytes = 0;      // of bodies
-
-  std::uint64_t answered() const { return requests - retries - failures - unchanged; }  // with bytes
-};
-
 class HttpTransfers {
  public:
   static constexpr std::size_t kMostOfAHost = 16;  // requests under way at a time; others wait for their turn
@@ -68,7 +60,7 @@ class HttpTransfers {
 
   // That of this process, which is never destroyed, since stores may read until the process ends.
   static HttpTransfers& OfProcess();
-  static HttpCounts CountsOfProcess();  // of all its hosts; nothing if it has asked for nothing
+  static std::vector<WebTraffic> TrafficOfProcess();  // by server; nothing if it has asked for nothing
 
   explicit HttpTransfers(const Timing& timing);
   ~HttpTransfers();  // what is under way ends with Cancelled
@@ -81,7 +73,7 @@ class HttpTransfers {
   using Done = std::function<void(Result<HttpObject>)>;
   void Get(HttpGet get, Done done);
 
-  std::map<std::string, HttpCounts> counts() const;  // by "host:port"
+  std::vector<WebTraffic> traffic() const;  // sorted by server; the first kMaxWebServers
 
  private:
   struct Impl;

@@ -70,7 +70,7 @@ Result<S3Place> FindS3Place(const std::string& address) {
   const std::size_t mark = std::min(address.find(kEndpointMark), address.size());
   const std::string place = address.substr(kBucketScheme.size(), mark - kBucketScheme.size());
   const std::size_t slash = std::min(place.find('/'), place.size());
-  const std::string bucket = place.substr(0, slash), path = place.substr(slash);
+  const std::string bucket = place.substr(0, slash), path = EncodedPath(place.substr(slash));
   const bool plain = bucket.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789.-_") == std::string::npos;
   if (bucket.empty() || !plain) return wrong(fmt::format("'{}' is no name of a bucket", bucket));
   std::string endpoint = mark < address.size() ? address.substr(mark + kEndpointMark.size()) : Environment("AWS_ENDPOINT_URL");

@@ -31,7 +31,7 @@ from .presets import presets
 from .probe import Histogram, JointHistogram, Label, Sample
 from .service import Service, connect
 from .sources import Level, Source, open
-from .status import Dataset, DatasetLevel, Status, Worker
+from .status import Dataset, DatasetLevel, Status, WebTraffic, Worker
 from .transfer import Region, TransferFunction
 from .viewer import Viewer
 
@@ -67,6 +67,7 @@ __all__ = [
     "UnknownOption",
     "Viewer",
     "Volume",
+    "WebTraffic",
     "Worker",
     "connect",
     "load",

@@ -48,6 +48,19 @@ class Worker:
 
 
 @dataclasses.dataclass(frozen=True)
+class WebTraffic:
+    """What the coordinator and the present workers have asked a web server for."""
+
+    server: str     # "host:port"
+    requests: int   # each try is one
+    retries: int    # of these: after one that failed
+    failures: int   # after which nothing was tried again
+    unchanged: int  # answers without bytes, of objects that the disk has
+    bytes: int
+    seconds: float  # requests that ran at a time count each
+
+
+@dataclasses.dataclass(frozen=True)
 class Status:
     endpoint: str
     pid: int
@@ -61,6 +74,7 @@ class Status:
     workers_lost: int
     workers: tuple[Worker, ...]
     datasets: tuple[Dataset, ...]
+    web: tuple[WebTraffic, ...] = ()
 
 
 def _level_of(about: Any) -> DatasetLevel:
@@ -105,4 +119,7 @@ def status_of(message: Any, endpoint: str) -> Status:
             for w in message.workers
         ),
         datasets=tuple(map(dataset_of, message.datasets)),
+        web=tuple(
+            WebTraffic(t.server, t.requests, t.retries, t.failures, t.unchanged, t.bytes, t.milliseconds / 1000) for t in message.web
+        ),
     )

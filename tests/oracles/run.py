@@ -20,12 +20,13 @@ import hdf5_cases
 import n5_cases
 import ome_zarr_cases
 import precomputed_cases
+import s3_cases
 import tiff_cases
 import written_cases
 import zarr_cases
 
 FAMILIES = {"zarr": zarr_cases, "ome-zarr": ome_zarr_cases, "hdf5": hdf5_cases, "n5": n5_cases, "precomputed": precomputed_cases,
-            "tiff": tiff_cases}
+            "tiff": tiff_cases, "s3": s3_cases}
 EVERY = 8  # so many cases apart the program itself converts one, too
 
 
@@ -109,7 +110,10 @@ def converted(program, case, folder):
 
 
 def remove(path):
-    shutil.rmtree(path) if os.path.isdir(path) else os.remove(path)
+    if os.path.isdir(path):
+        shutil.rmtree(path)
+    elif os.path.exists(path):  # it is no address
+        os.remove(path)
 
 
 def run_family(name, a, folder, seed):

@@ -7,6 +7,7 @@
 namespace slabstream {
 namespace {
 
+using std::chrono::milliseconds;
 using testing::Each;
 using testing::IsEmpty;
 using testing::SizeIs;
@@ -56,6 +57,24 @@ TEST_F(DisplayWorkerTest, SendsPreviewsIfAsked) {
   const Actions done = Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
   ASSERT_THAT(All<SendFrame>(done), SizeIs(1));
   EXPECT_EQ(All<SendFrame>(done)[0].message.groups_done, 1U);
+}
+
+TEST_F(DisplayWorkerTest, SendsNoMorePreviewsThanSomebodyCanSee) {
+  const auto pictures = [&](std::uint32_t group) {
+    GroupAssignment assignment = Assignment(1, {kSelf}, group, 5);
+    assignment.previews = true;
+    const Actions rendered = Rendered(All<StartRender>(Feed(Tell(assignment))).at(0));
+    const auto combine = All<StartCombine>(rendered);
+    return All<SendFrame>(combine.empty() ? rendered : Combined(combine.at(0))).size();
+  };
+  const Duration interval = WorkerConfig().preview_interval;
+  EXPECT_EQ(pictures(0), 1U);
+  now += interval - milliseconds(1);
+  EXPECT_EQ(pictures(1), 0U);
+  now += milliseconds(1);
+  EXPECT_EQ(pictures(2), 1U);
+  EXPECT_EQ(pictures(3), 0U);
+  EXPECT_EQ(pictures(4), 1U) << "the frame";
 }
 
 TEST_F(DisplayWorkerTest, KeepsWhatItAccumulatedInEarlierAttempts) {

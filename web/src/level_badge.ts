@@ -1,5 +1,6 @@
-// The badge of a pane: which level of its dataset the picture was drawn from. Pictures of a view that moves may be of coarser levels.
-import { h, put, putText } from "./dom";
+// The badge of a pane: which level of its dataset the picture was drawn from, and what was read for it from files or servers. Pictures of a
+// view that moves may be of coarser levels.
+import { bytes, h, put, putText } from "./dom";
 import type { FrameHeader } from "./session";
 
 // "Level 2 of 0–4"; "" if the dataset has one level.
@@ -14,7 +15,8 @@ export class LevelBadge {
 
   // `count`: levels of the dataset; 0: it is not known yet.
   show(header: FrameHeader, count: number): void {
-    const text = levelText(header, count), sharpens = header.coarseness > 1;
+    const level = levelText(header, count), read = header.statistics.bytes.stored, sharpens = header.coarseness > 1;
+    const text = level !== "" && read > 0 ? `${level}, ${bytes(read)} read` : level;
     putText(this.element, sharpens && text !== "" ? `${text} …` : text);
     put(this.element, "title", sharpens ? "A finer picture follows when the view stands still" : "0 is the finest level");
     put(this.element, "hidden", text === "");

@@ -19,6 +19,7 @@ export class Notices {
   private error = "";
   private phase = "";
   private done = 0; // of the phase, as a share
+  private parts = ""; // of the picture: how many are drawn
   private slow = 0; // the timer of a phase; it shows once it has lasted
   private lasts = false;
 
@@ -42,6 +43,7 @@ export class Notices {
   onProgress(progress: Progress): void {
     const read = progress.phase === "loading" ? progress.read_percent ?? 0 : 0;
     this.done = read > 0 ? read / 100 : progress.group_count > 0 ? progress.groups_done / progress.group_count : 0;
+    this.parts = progress.group_count > 1 ? `${progress.groups_done} of ${progress.group_count} parts` : "";
     this.setPhase(progress.phase === "loading" ? (read > 0 ? `Reading, ${read} %` : "Reading") : progress.phase === "queued" && progress.queue_position > 0 ? `Waiting, place ${progress.queue_position}` : progress.phase === "running" ? "Rendering" : "");
     this.draw();
   }
@@ -71,7 +73,7 @@ export class Notices {
       put(this.progress, "data-measured", this.done > 0);
       if (this.done > 0) put(this.progress, "aria-valuenow", String(Math.round(100 * this.done)));
       else this.progress.removeAttribute("aria-valuenow");
-      putText(this.doing, this.phase.startsWith("Reading") ? this.phase : "");
+      putText(this.doing, this.phase.startsWith("Reading") ? this.phase : this.phase === "Rendering" ? this.parts : "");
       this.bar.style.width = this.done > 0 ? `${100 * this.done}%` : "";
     }
     const workers = this.service?.workers.length ?? 0;

@@ -222,6 +222,7 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       {"abilities", 64},
       {"roots", kMaxShares},
       {"shares", kMaxShares},
+      {"web", kMaxWebServers},
   };
   std::map<std::string, bool> seen;
   AlterEachField(
@@ -254,8 +255,8 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
       [&](const Place& place, const std::string& error) {
         EXPECT_THAT(error, StartsWith(place.path + ": " + std::to_string(limits.at(place.field->name()) + 1)));
       });
-  EXPECT_EQ(seen.size(), limits.size() + 12)
-      << "reports are in four messages, parameters in three; datasets, keys, isosurfaces, gradients, opacities, labels and levels in two";
+  EXPECT_EQ(seen.size(), limits.size() + 13) << "reports are in four messages, parameters in three; datasets, keys, isosurfaces, "
+                                                "gradients, opacities, labels, levels and traffic in two";
 }
 
 TEST(Malformed, MissingFieldsAreNoCrash) {

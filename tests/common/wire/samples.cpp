@@ -33,6 +33,10 @@ RankReport FullReport() {
   return report;
 }
 
+std::vector<WebTraffic> SampleTraffic() {
+  return {{"a:80"}, {kLongName, kMax64, kMax64 - 1, kMax64 - 2, kMax64 - 3, kMax64 - 4, kMax64 - 5}};
+}
+
 VolumeDescription Description() {
   return {{{301, 370, 316}, {0.5, 1, 2.25}, {.unit = LengthUnit::kAngstrom}}, ScalarType::kUint16, {-0.125, 1e300}};
 }
@@ -207,7 +211,7 @@ std::vector<Welcome> SamplesOf() {
 
 template <>
 std::vector<Heartbeat> SamplesOf() {
-  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32, true}};
+  return {{}, {kMax64, kMax64, kMax32, kMax64, kMax64, kMax32, true, SampleTraffic()}};
 }
 
 template <>
@@ -435,6 +439,7 @@ std::vector<StatusReply> SamplesOf() {
                    {"b", DatasetState::kFailed, {}, {}, kLongText, 0, kMax64}};
   full.datasets[2].levels = {Description(), Description()};
   full.refused = {kMax64, kMax64 - 1, kMax64 - 2, 1};
+  full.web = SampleTraffic();
   full.renderers = {{"a", "", {}, {}}, {kLongName, kUmlaut, {"labels", "x"}, {"kernel"}}};
   return {{}, full};
 }

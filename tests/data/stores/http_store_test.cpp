@@ -208,7 +208,7 @@ TEST_F(HttpStoreTest, AServerThatFailsAThirdGivesRightBytesAndIsNotFlooded) {
   EXPECT_EQ(wrong, 0);
   EXPECT_LT(failed, kReads / 50) << "a third to the power of six is 3 of 2000";
   EXPECT_LE(server.most_at_a_time(), int(HttpTransfers::kMostOfAHost));
-  const HttpCounts counts = transfers_.counts().begin()->second;
+  const WebTraffic counts = transfers_.traffic().front();
   EXPECT_LE(counts.requests, server.requests().size()) << "libcurl repeats what meets a connection that is just closed";
   EXPECT_EQ(counts.requests, kReads + counts.retries);
   EXPECT_EQ(counts.failures, std::uint64_t(failed));

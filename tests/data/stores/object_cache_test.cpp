@@ -121,13 +121,13 @@ TEST_F(ObjectCacheTest, AFolderThatCannotBeWrittenIsNamed) {
 // ---------------------------------------------------------------- with a server
 
 // Reads by transfers and a store of their own, as another process would.
-std::string Read(const ScriptedServer& server, ObjectCache& cache, HttpCounts& counts, const ByteRange& range = {}) {
+std::string Read(const ScriptedServer& server, ObjectCache& cache, WebTraffic& counts, const ByteRange& range = {}) {
   HttpTransfers transfers({});
   const std::shared_ptr<Store> store = HttpStore(server.url(), transfers, &cache).value();
   std::promise<Result<Bytes>> answer;
   store->Read("object", range, 1000, [&](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); });
   const Bytes bytes = answer.get_future().get().value();
-  counts = transfers.counts().begin()->second;
+  counts = transfers.traffic().front();
   return TextOf(bytes);
 }
 
@@ -141,7 +141,7 @@ TEST_F(ObjectCacheTest, OnlyWhatTheServerHasChangedIsSentAgain) {
   ObjectCache cache = Open();
   // It is written beside the answer, so it may take a few answers until it is there.
   const auto read_until_kept = [&](const std::string& expected) {
-    HttpCounts counts;
+    WebTraffic counts;
     do {
       EXPECT_EQ(Read(server, cache, counts), expected);
       std::this_thread::yield();
@@ -151,7 +151,7 @@ TEST_F(ObjectCacheTest, OnlyWhatTheServerHasChangedIsSentAgain) {
   };
   read_until_kept("version 1");
   version = 2;
-  HttpCounts counts;
+  WebTraffic counts;
   EXPECT_EQ(Read(server, cache, counts), "version 2");
   EXPECT_EQ(counts.unchanged, 0U);
   read_until_kept("version 2");
@@ -161,7 +161,7 @@ TEST_F(ObjectCacheTest, WithoutAStrongETagNothingIsKept) {
   for (const char* const header : {"", "ETag: W/\"weak\"\r\n", "Last-Modified: Thu, 26 Nov 2026 10:00:00 GMT\r\n"}) {
     const ScriptedServer server([&](const ServerRequest&) { return AnswerText("200 OK", "bytes", header); });
     ObjectCache cache = Open();
-    HttpCounts counts;
+    WebTraffic counts;
     for (int i = 0; i < 3; ++i) EXPECT_EQ(Read(server, cache, counts), "bytes");
     for (const ServerRequest& request : server.requests()) EXPECT_EQ(request.header("if-none-match"), "");
     EXPECT_TRUE(Files().empty());

@@ -42,6 +42,7 @@ class S3Test : public testing::Test {
 TEST_F(S3Test, BucketsAreAmazonsOrThoseOfAnEndpoint) {
   const auto url = [](const std::string& address) { return FindS3Place(address).value().url; };
   EXPECT_EQ(url("s3://bucket/a/b.zarr"), "https://bucket.s3.us-east-1.amazonaws.com/a/b.zarr");
+  EXPECT_EQ(url("s3://bucket/my scan+\u00fc?.zarr"), "https://bucket.s3.us-east-1.amazonaws.com/my%20scan%2B%C3%BC%3F.zarr");
   EXPECT_EQ(url("s3://bu.cket/a"), "https://s3.us-east-1.amazonaws.com/bu.cket/a");
   EXPECT_EQ(url("s3://bucket/em?endpoint=http://127.0.0.1:9000/"), "http://127.0.0.1:9000/bucket/em");
   Set("AWS_REGION", "eu-west-3");
@@ -142,7 +143,7 @@ TEST_F(S3Test, RequestsAreSignedForThisServerAlone) {
   Set("AWS_SESSION_TOKEN", "token");
   HttpTransfers transfers({});
   const auto read = [&](const std::string& key, const ByteRange& range = {}) {
-    const std::shared_ptr<Store> store = HttpStore("s3://bucket/em?endpoint=" + server.url(), transfers).value();
+    const std::shared_ptr<Store> store = HttpStore("s3://bucket/e m?endpoint=" + server.url(), transfers).value();
     std::promise<Result<Bytes>> answer;
     store->Read(key, range, 100, [&](Result<Bytes> bytes) { answer.set_value(std::move(bytes)); });
     const Result<Bytes> bytes = answer.get_future().get();
@@ -151,6 +152,7 @@ TEST_F(S3Test, RequestsAreSignedForThisServerAlone) {
   Set("AWS_SECRET_ACCESS_KEY", kSecret);
   EXPECT_EQ(read("0/c/1/2"), "0123456789");
   EXPECT_EQ(read(".zattrs", {2, 3}), "234");
+  EXPECT_EQ(read("a+b c/\u00fc~"), "0123456789");
   Set("AWS_SECRET_ACCESS_KEY", "another");
   const std::string refused = read("0/c/1/2");
   EXPECT_THAT(refused, HasSubstr("HTTP 403"));

@@ -1,0 +1,36 @@
+// What processes have asked web servers for.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace slabstream {
+
+inline constexpr std::size_t kMaxWebServers = 64;  // that are told of; the first ones by name
+
+// Of one server, since a process began.
+struct WebTraffic {
+  std::string server;              // "host:port"
+  std::uint64_t requests = 0;      // each try is one
+  std::uint64_t retries = 0;       // of these: after one that failed
+  std::uint64_t failures = 0;      // after which nothing was tried again
+  std::uint64_t unchanged = 0;     // answers without bytes, of objects that the disk has
+  std::uint64_t bytes = 0;         // of bodies
+  std::uint64_t milliseconds = 0;  // from the begin of each try to its end; tries that ran at a time count each
+
+  std::uint64_t answered() const { return requests - retries - failures - unchanged; }  // with bytes
+
+  WebTraffic& operator+=(const WebTraffic& more) {
+    requests += more.requests;
+    retries += more.retries;
+    failures += more.failures;
+    unchanged += more.unchanged;
+    bytes += more.bytes;
+    milliseconds += more.milliseconds;
+    return *this;
+  }
+  friend bool operator==(const WebTraffic&, const WebTraffic&) = default;
+};
+
+}  // namespace slabstream
