@@ -58,7 +58,8 @@ std::string CoordinatorMetrics::Text(const std::function<void()>& wake) {
   out.Value(gauge(datasets.ready), {{"state", "ready"}});
   out.Value(gauge(datasets.failed), {{"state", "failed"}});
   out.Single("coordinator_voxel_bytes", MetricType::kGauge, "Voxels in the memory of the coordinator.", datasets.voxel_bytes);
-  AddWebTraffic(out, "coordinator", HttpTransfers::TrafficOfProcess());
+  AddWebTraffic(out, {"coordinator_web_requests_total", "coordinator_web_bytes_total", "coordinator_web_seconds_total"},
+                HttpTransfers::TrafficOfProcess());
   AddProcess(out, memory_limit_);
   return out.Take();
 }

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "common/base/large_buffers.h"
 #include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
@@ -98,6 +99,7 @@ int Run(int argc, char** argv) {
     options.machine.web_traffic = HttpTransfers::TrafficOfProcess;
     options.share_memory = !frames_only;
     SetReadMemory(options.machine.memory_bytes);
+    KeepBlocks(KeptBytes(options.machine.memory_bytes));
     if (Status kept = KeepObjects(cache); !kept.ok()) return kept;
     if (cache_mib != 0) options.machine.cache_bytes = std::uint64_t(cache_mib) << 20;
     return Serve(std::move(options), metrics);

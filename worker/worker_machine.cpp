@@ -488,7 +488,7 @@ void WorkerMachine::State::Tend() {
 
 // What the images of the present frames leave of memory_bytes.
 std::uint64_t WorkerMachine::State::RoomForVoxels() const {
-  std::uint64_t taken = kIdleMemoryBytes + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
+  std::uint64_t taken = IdleMemoryBytes(config.memory_bytes) + (boxes.reads_stored() ? SourceBytes(config.memory_bytes) : 0);
   std::uint64_t light = 0;  // frames share it
   for (const auto& [id, frame] : frames) {
     light = std::max(light, frame.light_bytes);

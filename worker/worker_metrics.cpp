@@ -64,7 +64,8 @@ std::string WorkerMetrics::Text(const std::function<void()>& wake) {
   out.Value(image_bytes_, {{"plane", "images"}});
   out.Value(picture_bytes_, {{"plane", "pictures"}});
   out.Single("worker_unsent_total", MetricType::kCounter, "Images and pictures that could not be sent.", unsent_);
-  AddWebTraffic(out, "worker", HttpTransfers::TrafficOfProcess());
+  AddWebTraffic(out, {"worker_web_requests_total", "worker_web_bytes_total", "worker_web_seconds_total"},
+                HttpTransfers::TrafficOfProcess());
   AddProcess(out, memory_limit_);
   return out.Take();
 }

@@ -92,6 +92,7 @@ void DeclareInfo(const CommandLine& line) {
     AddRequestOption(*sub, *FindRequestOption(name), options->request);
   AddLayerFiles(*sub, options->layers);
   AddReadOptions(*sub);
+  AddCacheOption(*sub, options->cache);
   ResolveSource(*sub, source, options->path, options->request.transfer, [] { return true; });
   sub->add_flag("--json", options->json, "Print JSON");
   RunWith(*sub, line.run, options, RunInfo);
@@ -193,6 +194,7 @@ void DeclareConvert(const CommandLine& line) {
   AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
       ->type_name("SIZE")
       ->default_str("none; 1G for what is not read as a whole");
+  AddCacheOption(*sub, options->cache);
   AddParsed(
       *sub, "--zarr-version", options->zarr_version,
       [](const std::string& option, const std::string& text) -> Result<OmeZarrVersion> {
@@ -218,6 +220,7 @@ void DeclareIndex(const CommandLine& line) {
   AddParsed(*sub, "--memory", options->memory, ParseMemoryLimit, "Memory limit of this process: 2G or 512M")
       ->type_name("SIZE")
       ->default_str("1G");
+  AddCacheOption(*sub, options->cache);
   sub->add_flag("--progress", options->progress, "Show progress on stderr");
   AddReadOptions(*sub);
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });

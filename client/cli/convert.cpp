@@ -16,6 +16,7 @@
 #include "common/base/log.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"
+#include "data/stores/object_cache.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/formats.h"
 
@@ -56,6 +57,7 @@ Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& sourc
 }  // namespace
 
 Status RunConvert(const ConvertOptions& options) {
+  if (Status kept = KeepObjects(options.cache); !kept.ok()) return kept;
   Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
   // --type is also that of raw samples, unless they have one of their own.

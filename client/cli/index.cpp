@@ -17,6 +17,7 @@
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 #include "data/open/unchanged_source.h"
+#include "data/stores/object_cache.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
 
@@ -43,6 +44,7 @@ Result<BrickIndex> Begun(const IndexFile& file, const std::string& name, const S
 }  // namespace
 
 Status RunIndex(const IndexingOptions& options) {
+  if (Status kept = KeepObjects(options.cache); !kept.ok()) return kept;
   const Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
   if (!IsReadInParts(source->path, source->options)) {

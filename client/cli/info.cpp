@@ -33,6 +33,7 @@
 #include "common/volume/summary.h"
 #include "coordinator/catalogue.h"
 #include "data/open/any_volume.h"
+#include "data/stores/object_cache.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/index_file.h"
 #include "data/volume_io/mesh_reader.h"
@@ -368,6 +369,7 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
 }  // namespace
 
 Status RunInfo(const InfoOptions& options) {
+  if (Status kept = KeepObjects(options.cache); !kept.ok()) return kept;
   if (IsPicturePath(options.path)) return RunPictureInfo(options);
   if (const auto source = ParseSourceText(options.path); source.ok() && LooksLikeMesh(source->path)) return RunMeshInfo(options);
   if (Status status = CheckInputVolume(options.path); !status.ok()) return status;

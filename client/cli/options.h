@@ -77,6 +77,7 @@ struct SliceOptions {
 
 struct InfoOptions {
   std::string path;
+  std::uint64_t cache = 0;  // bytes on disk, for what web servers send; 0: none
   LayerFiles layers;
   FrameRequest request;  // its transfer function alone
   bool json = false;
@@ -90,7 +91,8 @@ struct TransferOptions {
 };
 
 struct ConvertOptions {
-  std::string source;  // a path, with options for reading it or without
+  std::string source;       // a path, with options for reading it or without
+  std::uint64_t cache = 0;  // bytes on disk, for what web servers send; 0: none
   std::string output;
   std::optional<SampleType> type;  // of the samples in `output`
   int level = 0;                   // of `source`
@@ -104,6 +106,7 @@ struct ConvertOptions {
 
 struct IndexingOptions {
   std::string source;        // a path, with options for reading it or without
+  std::uint64_t cache = 0;   // bytes on disk, for what web servers send; 0: none
   std::uint64_t memory = 0;  // bytes, limit of this process; 0: the usual one
   bool progress = false;
 };

@@ -34,7 +34,8 @@ Result<MemoryShares> SharesOf(const ConnectionOptions& connection) {
   const auto workers = std::uint64_t(connection.local_workers);
   Result<MemoryShares> shares = ShareMemory(connection.local_memory, connection.local_workers);
   if (!shares.ok()) return Status(shares.status().code(), "--" + shares.status().message());
-  shares->worker = kIdleMemoryBytes + (shares->worker * workers - kIdleMemoryBytes) / workers;
+  const std::uint64_t idle = IdleMemoryBytes(shares->worker);
+  shares->worker = idle + (shares->worker * workers - idle) / workers;
   return shares;
 }
 

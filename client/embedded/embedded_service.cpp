@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/large_buffers.h"
+#include "common/volume/memory_budget.h"
 #include "data/stores/http_transfers.h"
 
 namespace slabstream {
@@ -31,6 +33,7 @@ Result<std::unique_ptr<EmbeddedService>> EmbeddedService::Start(Context& context
   options.coordinator.client_endpoint = UniqueEndpoint();
   options.coordinator.worker_endpoint = UniqueEndpoint();
   options.coordinator.voxels_endpoint = UniqueEndpoint();
+  KeepBlocks(KeptBytes(options.worker.memory_bytes == 0 ? MachineMemoryBytes() : options.worker.memory_bytes));
   CoordinatorConfig& machine = options.coordinator.machine;
   machine.web_traffic = HttpTransfers::TrafficOfProcess;  // the workers' too, which are of this process
   machine.worker_timeout = machine.client_timeout = machine.stall_timeout = options.worker.chunk_timeout = kPatience;

@@ -4,6 +4,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <cstddef>
 #include <thread>
 
 namespace slabstream {
@@ -21,5 +22,10 @@ inline void KeepFrameBuffers() {
   mallopt(M_TRIM_THRESHOLD, kHeapBytes);
   mallopt(M_ARENA_MAX, std::max(2, int(std::thread::hardware_concurrency())));
 }
+
+// From now on, keeps up to so many bytes of the blocks of images (pooled_vector.h) that were given back; never fewer than before. A frame
+// of 8 million pixels takes some hundred MiB of images at each worker, and to take them anew from the system costs more than to render
+// them. Any thread.
+void KeepBlocks(std::size_t bytes);
 
 }  // namespace slabstream

@@ -10,6 +10,7 @@
 #include <unordered_map>
 
 #include "common/base/aligned_buffer.h"
+#include "common/base/large_buffers.h"
 
 namespace slabstream {
 namespace {
@@ -20,7 +21,8 @@ constexpr bool kSanitized = true;  // nothing is kept or mapped, so that uses of
 #else
 constexpr bool kSanitized = false;
 #endif
-constexpr std::size_t kMostKept = kSanitized ? 0 : std::size_t{96} << 20, kMostOwnKept = kSanitized ? 0 : std::size_t{32} << 20;  // bytes
+constexpr std::size_t kUsuallyKept = std::size_t{96} << 20;                   // bytes
+constexpr std::size_t kMostOwnKept = kSanitized ? 0 : std::size_t{32} << 20;  // bytes
 
 // Images of neighbouring views differ in size; rounding lets them reuse each other's blocks. Pages never written take no memory.
 std::size_t BlockBytes(std::size_t bytes) { return std::bit_ceil(bytes); }
@@ -82,6 +84,11 @@ class Pool {
     return Status::Ok();
   }
 
+  void KeepMore(std::size_t bytes) {
+    const std::lock_guard lock(mutex_);
+    most_kept_ = std::max(most_kept_, bytes);
+  }
+
   std::optional<ArenaName> arena() {
     const std::lock_guard lock(mutex_);
     return arena_ == nullptr ? std::nullopt : std::optional(arena_->name());
@@ -134,8 +141,8 @@ class Pool {
     }
   }
 
-  const std::size_t most_kept_;
-  std::mutex mutex_;           // guards what follows
+  std::mutex mutex_;  // guards what follows
+  std::size_t most_kept_;
   std::vector<Block> blocks_;  // last given back comes last; a few hundred at most
   std::size_t bytes_ = 0;
   std::unique_ptr<SharedArena> arena_;
@@ -144,7 +151,7 @@ class Pool {
 
 // Never destroyed: blocks are given back until the very end of the program.
 Pool& TheBlocks() {
-  static Pool& pool = *new Pool(kMostKept);
+  static Pool& pool = *new Pool(kSanitized ? 0 : kUsuallyKept);
   return pool;
 }
 Pool& OwnBlocks() {
@@ -168,6 +175,9 @@ void GiveBackBlock(void* block, std::size_t bytes) { GiveBackTo(TheBlocks, block
 void* TakeOwnBlock(std::size_t bytes) { return TakeFrom(OwnBlocks, bytes); }
 void GiveBackOwnBlock(void* block, std::size_t bytes) { GiveBackTo(OwnBlocks, block, bytes); }
 
+void KeepBlocks(std::size_t bytes) {
+  if (!kSanitized) TheBlocks().KeepMore(bytes);
+}
 Status ShareBlocks() { return TheBlocks().Share(); }
 std::optional<ArenaName> SharedBlocksArena() { return TheBlocks().arena(); }
 

@@ -17,7 +17,7 @@
 namespace slabstream {
 
 // Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks are memory mappings of their own, so they leave no holes in a heap.
-// Those that were given back are kept for reuse, up to 96 MiB for the process. Any thread.
+// Those that were given back are kept for reuse, up to 96 MiB or what KeepBlocks says (large_buffers.h). Any thread.
 void* TakeBlock(std::size_t bytes);
 void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
 

@@ -9,6 +9,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/base/check.h"
 #include "common/image/finite.h"
 #include "common/image/image_view.h"
 #include "common/image/run_payload.h"
@@ -146,6 +147,41 @@ std::vector<std::size_t> FirstPixels(const RunPayload& runs) {
   return first;
 }
 
+// Writes pixels to an image whose bounds contain those of the header. `fills`: they are the same bounds, and what lies between runs becomes
+// empty.
+Status WriteRuns(const RunImageHeader& header, const RunPayload& runs, LocalImage& image, bool fills) {
+  const auto width = std::size_t(image.bounds.width());
+  const std::size_t corner =
+      std::size_t(header.bounds.y_begin - image.bounds.y_begin) * width + std::size_t(header.bounds.x_begin - image.bounds.x_begin);
+  const auto place_of = [&](const Run& run) { return corner + std::size_t{run.row} * width + run.column; };
+  const std::vector<std::size_t> first_pixels = FirstPixels(runs);
+  std::atomic<bool> colours_valid = true, depth_finite = true;
+  tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
+    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
+    std::size_t source = first_pixels[task], written = 0;
+    if (begin > 0) {
+      const Run before = runs.ReadRun(begin - 1);
+      written = place_of(before) + before.pixel_count;
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const Run run = runs.ReadRun(i);
+      const std::size_t target = place_of(run);
+      if (!ColoursAreValid(header.color, runs.rgba(source, run.pixel_count))) colours_valid = false;
+      if (HasDepth(header.format) && !AllFinite(runs.depth(source, run.pixel_count))) depth_finite = false;
+      if (fills) MakeEmpty(image, written, target);
+      written = target + run.pixel_count;
+      runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
+      if (HasDepth(header.format)) runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
+      if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
+      source += run.pixel_count;
+    }
+    if (fills && end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
+  });
+  if (!colours_valid) return BadColour(header.color);
+  if (!depth_finite) return DepthNotFinite();
+  return Status::Ok();
+}
+
 }  // namespace
 
 std::size_t PayloadBytes(const RunImageHeader& header) { return PayloadLayout(header).end; }
@@ -273,35 +309,17 @@ Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std:
 
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
-  const RunPayload runs(header, payload);
   LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
-  const auto place_of = [&](const Run& run) { return std::size_t{run.row} * std::size_t(header.bounds.width()) + run.column; };
-  const std::vector<std::size_t> first_pixels = FirstPixels(runs);
-  std::atomic<bool> colours_valid = true, depth_finite = true;
-  tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
-    const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
-    std::size_t source = first_pixels[task], written = 0;
-    if (begin > 0) {
-      const Run before = runs.ReadRun(begin - 1);
-      written = place_of(before) + before.pixel_count;
-    }
-    for (std::size_t i = begin; i < end; ++i) {
-      const Run run = runs.ReadRun(i);
-      const std::size_t target = place_of(run);
-      if (!ColoursAreValid(header.color, runs.rgba(source, run.pixel_count))) colours_valid = false;
-      if (HasDepth(header.format) && !AllFinite(runs.depth(source, run.pixel_count))) depth_finite = false;
-      MakeEmpty(image, written, target);
-      written = target + run.pixel_count;
-      runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
-      if (HasDepth(header.format)) runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
-      if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
-      source += run.pixel_count;
-    }
-    if (end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
-  });
-  if (!colours_valid) return BadColour(header.color);
-  if (!depth_finite) return DepthNotFinite();
+  if (Status status = WriteRuns(header, RunPayload(header, payload), image, true); !status.ok()) return status;
   return image;
+}
+
+Status ReadRunsInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, LocalImage& image) {
+  if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
+  CHECK(header.format == image.format && image.rows.empty());
+  if (header.bounds.empty()) return Status::Ok();
+  if (!image.bounds.Contains(header.bounds)) return Invalid("its bounds do not lie in those of the image that it belongs to");
+  return WriteRuns(header, RunPayload(header, payload), image, false);
 }
 
 }  // namespace slabstream

@@ -38,6 +38,11 @@ RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding:
 // are decoded in parallel, within the caller's task arena.
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
+// The same into `image`, which stores all its pixels, has the header's format and is empty where the header has runs; its other pixels
+// stay. InvalidArgument, too, if its bounds do not contain the header's; the image then holds whatever was written until the error was
+// found.
+Status ReadRunsInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, LocalImage& image);
+
 // The part of these checks that needs only the header: the image fits its frame, and so how much memory it may take.
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);
 // All of them but the values of pixels: whoever reads those checks them (ValidatePixels).

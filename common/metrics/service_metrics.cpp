@@ -1,7 +1,5 @@
 #include "common/metrics/service_metrics.h"
 
-#include <fmt/format.h>
-
 #include <cstddef>
 
 namespace slabstream {
@@ -19,18 +17,17 @@ void AddRefused(Exposition& out, std::string_view name, std::string_view help, c
   out.Value(refused.over_quota, {{"reason", "over quota"}});
 }
 
-void AddWebTraffic(Exposition& out, std::string_view prefix, std::span<const WebTraffic> servers) {
-  const auto name = [&](std::string_view what) { return fmt::format("{}_web_{}_total", prefix, what); };
-  out.Family(name("requests"), MetricType::kCounter, "Requests of web servers for parts of volumes, by result and server.");
+void AddWebTraffic(Exposition& out, const WebTrafficNames& names, std::span<const WebTraffic> servers) {
+  out.Family(names.requests, MetricType::kCounter, "Requests of web servers for parts of volumes, by result and server.");
   for (const WebTraffic& of : servers) {
     out.Value(of.answered(), {{"result", "done"}, {"server", of.server}});
     out.Value(of.unchanged, {{"result", "unchanged"}, {"server", of.server}});
     out.Value(of.retries, {{"result", "again"}, {"server", of.server}});
     out.Value(of.failures, {{"result", "failed"}, {"server", of.server}});
   }
-  out.Family(name("bytes"), MetricType::kCounter, "Bytes that web servers have sent for them.");
+  out.Family(names.bytes, MetricType::kCounter, "Bytes that web servers have sent for them.");
   for (const WebTraffic& of : servers) out.Value(of.bytes, {{"server", of.server}});
-  out.Family(name("seconds"), MetricType::kCounter, "Time of these requests; those that ran at a time count each.");
+  out.Family(names.seconds, MetricType::kCounter, "Time of these requests; those that ran at a time count each.");
   for (const WebTraffic& of : servers) out.Value(double(of.milliseconds) / 1000, {{"server", of.server}});
 }
 

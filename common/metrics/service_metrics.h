@@ -14,7 +14,10 @@ namespace slabstream {
 void AddStageSeconds(Exposition& out, std::string_view name, std::string_view help, const StageTimes& times);    // by `stage`
 void AddRefused(Exposition& out, std::string_view name, std::string_view help, const RefusedRequests& refused);  // by `reason`
 
-// Of web servers that hold volumes, each by `server`. `prefix`: "worker" becomes worker_web_requests_total and so on.
-void AddWebTraffic(Exposition& out, std::string_view prefix, std::span<const WebTraffic> servers);
+// Of web servers that hold volumes, each by `server`.
+struct WebTrafficNames {
+  std::string_view requests, bytes, seconds;
+};
+void AddWebTraffic(Exposition& out, const WebTrafficNames& names, std::span<const WebTraffic> servers);
 
 }  // namespace slabstream

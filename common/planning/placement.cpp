@@ -88,7 +88,8 @@ std::vector<Rank> SharesOf(const FramePlan& plan) {
   const RendererKind& renderer = *plan.setup.renderer;
   const std::vector<Rank> one = {RootOf(group, plan.display)};
   if (plan.share_pixels == 0 || group.placements.empty() || !renderer.FinishesInShares(plan.setup)) return one;
-  const bool pays = !renderer.FrameIsPicture(plan.setup) || ParseCombining(plan.combine).value().scheme->divides();
+  const bool pays = !renderer.FrameIsPicture(plan.setup) || ParseCombining(plan.combine).value().scheme->divides() ||
+                    WholeFrame(plan.setup).end >= kLargePicture;
   if (!pays) return one;
   std::vector<Rank> candidates;  // the first of each worker
   std::set<WorkerId> workers;

@@ -41,9 +41,12 @@ Rank RootOf(const GroupPlan& group, WorkerId display);
 // FramePlan::share_pixels of a service: smaller shares cost more in messages than they save (docs/time-dilated-cluster.md).
 inline constexpr std::uint64_t kSharePixels = 65536;
 
+// A picture of so many pixels is divided whatever the scheme, since combining it on one path takes longer than rendering it.
+inline constexpr std::uint64_t kLargePicture = std::uint64_t{1} << 20;
+
 // Where the shares of a frame of one group should end: at most one rank of each worker, and if there are fewer shares than workers, other
 // ones from turn to turn. One root: it is not divided, since that would not pay: it pays if the workers divide the picture anyway
-// (CombiningEntry::divides) or if there is work to be done after combining (RendererKind::Finish).
+// (CombiningEntry::divides), if there is work to be done after combining (RendererKind::Finish), or if the picture is large.
 std::vector<Rank> SharesOf(const FramePlan& plan);
 
 }  // namespace slabstream

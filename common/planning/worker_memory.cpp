@@ -121,7 +121,7 @@ std::int64_t BoxBytesFor(const FrameSetup& setup, std::uint64_t limit) {
   constexpr std::uint64_t kLeast = 2 << 20;  // smaller boxes are mostly halo
   // Images of the boxes of a group are small beside the frame.
   const std::uint64_t images = PictureBytes(setup) + std::uint64_t(FrameBytes(setup)) / 2;
-  const std::uint64_t taken = kIdleMemoryBytes + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
+  const std::uint64_t taken = IdleMemoryBytes(limit) + (ReadsInParts(setup) ? SourceBytes(limit) : 0) + LightBytes(setup) + images;
   const double boxes = 2 + DerivedShare(setup);  // of that which is being read nothing is derived yet
   const std::uint64_t box = std::max(kLeast, std::uint64_t(double(limit - std::min(limit, taken)) / boxes));
   return std::min(kBoxBytesTarget, std::int64_t(box - box % (std::bit_floor(box) / 8)));
@@ -141,8 +141,8 @@ Result<int> FramesThatFit(const FramePlan& plan, const VolumeSummary& summary, s
   };
   std::map<WorkerId, std::uint64_t> voxels = MostVoxels(plan, at_most);
   const auto needs = [&](const WorkerLimit& limit) {
-    return kIdleMemoryBytes + (ReadsInParts(plan.setup) ? SourceBytes(limit.bytes) : 0) + LightBytes(plan.setup) + voxels.at(limit.worker) +
-           images;
+    return IdleMemoryBytes(limit.bytes) + (ReadsInParts(plan.setup) ? SourceBytes(limit.bytes) : 0) + LightBytes(plan.setup) +
+           voxels.at(limit.worker) + images;
   };
   const auto has_part = [&](const WorkerLimit& limit) { return limit.bytes != 0 && voxels.contains(limit.worker); };
   const bool all_fit = std::ranges::all_of(

@@ -1,7 +1,7 @@
 // What a frame takes of the memory of one worker. Admission (coordinator), the window and the worker's own cache follow this one rule, so a
 // worker stays under its limit (Register.memory_bytes):
 //
-//   limit >= kIdleMemoryBytes + voxels + images
+//   limit >= IdleMemoryBytes(limit) + voxels + images
 //
 // An unfinished group takes (GroupImageBytes)
 //   the images of all of its ranks        what a root may hold at a time: its own, and those that wait to be combined

@@ -2,6 +2,7 @@
 // kernel's out-of-memory killer. And how much a process of the service may take in all (--memory): shares of the machine.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -32,8 +33,11 @@ std::uint64_t MachineMemoryBytes();
 // folder in which control groups are mounted. The largest int64: none limits it.
 std::int64_t ControlGroupLimit(const std::string& memberships, const std::filesystem::path& mounted);
 
-// What a process of the service takes before it does anything, with its threads and the blocks that it keeps for reuse.
+// What a process of the service takes before it does anything, with its threads and the blocks that it keeps for reuse (KeepBlocks,
+// common/base/large_buffers.h): a sixteenth of its limit, at least half of kIdleMemoryBytes.
 inline constexpr std::uint64_t kIdleMemoryBytes = std::uint64_t{192} << 20;
+inline constexpr std::uint64_t KeptBytes(std::uint64_t limit) { return std::max(kIdleMemoryBytes / 2, limit / 16); }
+inline constexpr std::uint64_t IdleMemoryBytes(std::uint64_t limit) { return kIdleMemoryBytes / 2 + KeptBytes(limit); }
 // Of a limit: for chunks that a process reads and decodes, if it does.
 inline constexpr std::uint64_t SourceBytes(std::uint64_t limit) { return limit > kIdleMemoryBytes ? (limit - kIdleMemoryBytes) / 4 : 0; }
 // Limits of a process that may be stated.

@@ -326,6 +326,27 @@ TEST(ReadRuns, WhatItAcceptsCanBeEncodedAgain) {
   EXPECT_GT(accepted, 100);  // most bits are those of pixels
 }
 
+TEST(ReadRuns, PartsOfAnImageCanBeReadIntoOne) {
+  Random random(34);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 200; ++i) {
+    const PixelFormat format = kFormats[i % 3];
+    const LocalImage image = RandomImage(random, format, kFrame);
+    LocalImage put_together = MakeLocalImage(format, kFrame);
+    for (PixelRange part = {0, 0}; part.end < kWhole.end;) {
+      part = {part.end, std::min(kWhole.end, part.end + random.Integer<std::uint64_t>(1, kWhole.end))};
+      const RunImage runs = EncodeRuns(image, part, kFrame.width());
+      ASSERT_EQ(ReadRunsInto(runs.header, runs.payload, kFrame, put_together), Status::Ok());
+    }
+    for (std::int32_t y = 0; y < kFrame.height(); ++y) {
+      for (std::int32_t x = 0; x < kFrame.width(); ++x) ExpectSamePixel(put_together, image, x, y);
+    }
+  }
+  LocalImage small = MakeLocalImage(PixelFormat::kDepth, {0, 0, 2, 2});
+  const RunImage large = TwoRuns(PixelFormat::kDepth);
+  EXPECT_EQ(ReadRunsInto(large.header, large.payload, kFrame, small).code(), StatusCode::kInvalidArgument);
+}
+
 TEST(ReadRuns, ReadsPayloadsAtAnyAddress) {
   const RunImage image = TwoRuns(PixelFormat::kDepth);
   std::vector<std::byte> shifted(image.payload.size() + 1);
