@@ -12,6 +12,7 @@
 #include <cstring>
 #include <ctime>
 #include <deque>
+#include <iterator>
 #include <mutex>
 #include <random>
 #include <ranges>
@@ -100,11 +101,17 @@ seconds SecondsUntil(const std::string& text) {
   return seconds(date > now ? std::min(std::uint64_t(date - now), kMost) : 0);
 }
 
+// Who waits for an answer, and for which bytes of it.
+struct Asker {
+  std::optional<ByteSpan> span;  // of the object; none: all of it
+  HttpTransfers::Done done;
+};
+
 // One request, from its first try to its end.
 struct Transfer {
   HttpGet get;
-  HttpTransfers::Done done;
-  std::string url;  // that is asked now: of the request, or where a redirect led
+  std::vector<Asker> askers;  // one, or several whose spans get.span covers
+  std::string url;            // that is asked now: of the request, or where a redirect led
   std::string host;
   int tries = 0, redirects = 0;
   Time begun;  // the first try
@@ -127,6 +134,23 @@ struct Transfer {
     curl_off_t bytes = -1;
     curl_easy_getinfo(easy, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &bytes);
     return bytes < 0 ? 0 : std::uint64_t(bytes);
+  }
+
+  // Whether `other`, which waits, may go along with this one, which begins.
+  bool TakesAlong(const Transfer& other) const {
+    const auto is_plain = [](const Transfer& each) {
+      return each.get.span && !each.get.only_size && each.tries == 0 && each.redirects == 0;
+    };
+    if (!is_plain(*this) || !is_plain(other) || get.url != other.get.url) return false;
+    if (get.known != other.get.known || get.access != other.get.access) return false;
+    const std::uint64_t end = get.span->begin + get.span->bytes, other_end = other.get.span->begin + other.get.span->bytes;
+    return other.get.span->begin >= end && other.get.span->begin - end <= HttpTransfers::kMostBetween &&
+           other_end - get.span->begin <= HttpTransfers::kMostTogether;
+  }
+  void TakeAlong(Transfer other) {
+    get.span->bytes = other.get.span->begin + other.get.span->bytes - get.span->begin;
+    get.most = get.span->bytes;
+    std::ranges::move(other.askers, std::back_inserter(askers));
   }
 
   // The value of a header of the answer; empty: there is none.
@@ -242,6 +266,15 @@ struct HttpTransfers::Impl {
     Owned owned = std::move(host.waiting.front());
     host.waiting.pop_front();
     Transfer& transfer = *owned;
+    for (auto other = host.waiting.begin(); other != host.waiting.end();) {
+      if (transfer.TakesAlong(**other)) {
+        transfer.TakeAlong(std::move(**other));
+        host.waiting.erase(other);
+        other = host.waiting.begin();
+      } else {
+        ++other;
+      }
+    }
     transfer.tried = MonotonicNow();
     if (++transfer.tries == 1) transfer.begun = transfer.tried;
     CURL* easy = idle.empty() ? curl_easy_init() : idle.back();
@@ -396,7 +429,16 @@ struct HttpTransfers::Impl {
 
   void Answer(Owned owned, Result<HttpObject> answer) {
     if (!answer.ok()) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
-    owned->done(std::move(answer));
+    for (Asker& asker : owned->askers) {
+      if (!answer.ok() || owned->askers.size() == 1) {
+        asker.done(answer);
+        continue;
+      }
+      HttpObject part = *answer;
+      const std::uint64_t begin = std::min<std::uint64_t>(asker.span->begin - owned->get.span->begin, part.bytes.size());
+      part.bytes = part.bytes.Part(begin, std::min<std::uint64_t>(asker.span->bytes, part.bytes.size() - begin));
+      asker.done(std::move(part));
+    }
   }
 
   template <class Change>
@@ -416,7 +458,9 @@ struct HttpTransfers::Impl {
         curl_easy_cleanup(easy);
         host.waiting.push_back(std::move(transfer));
       }
-      for (Owned& transfer : host.waiting) transfer->done(Status::Cancelled(transfer->get.url + ": the program ends"));
+      for (Owned& transfer : host.waiting) {
+        for (Asker& asker : transfer->askers) asker.done(Status::Cancelled(transfer->get.url + ": the program ends"));
+      }
     }
     for (CURL* const easy : idle) curl_easy_cleanup(easy);
   }
@@ -441,7 +485,7 @@ void HttpTransfers::Get(HttpGet get, Done done) {
   transfer->url = get.url;
   transfer->host = HostAndPort(get.url);
   transfer->get = std::move(get);
-  transfer->done = std::move(done);
+  transfer->askers.push_back({transfer->get.span, std::move(done)});
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->asked.push_back(std::move(transfer));

@@ -5,6 +5,8 @@
 // double from kFirstPause on, and are drawn between half of that and all of it, so that clients that failed together do not come back
 // together. A server that says when to come back (Retry-After) is asked no sooner; if that is later than kLongestPause, the request fails.
 //
+// Parts of one object that wait for their turn and lie side by side, such as the chunks of a shard, become one request.
+//
 // Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may not end at a loopback or
 // link-local address, so that no server on the internet makes this process ask what only this machine sees.
 //
@@ -47,6 +49,8 @@ struct HttpObject {
 class HttpTransfers {
  public:
   static constexpr std::size_t kMostOfAHost = 16;  // requests under way at a time; others wait for their turn
+  // Of a request for several parts: bytes in all, and bytes that nobody has asked for between two parts, which cost less than a request.
+  static constexpr std::uint64_t kMostTogether = std::uint64_t{4} << 20, kMostBetween = std::uint64_t{16} << 10;
   static constexpr int kTries = 6;
   static constexpr Duration kFirstPause = std::chrono::milliseconds(200), kLongestPause = std::chrono::seconds(30);
   static constexpr Duration kConnecting = std::chrono::seconds(10);  // for a connection to be there

@@ -177,6 +177,51 @@ TEST_F(HttpStoreTest, RedirectsAreFollowedWhereTheyMayLead) {
   EXPECT_THAT(refused.message(), HasSubstr("an address of this machine"));
 }
 
+// While all of the host's requests are under way, random parts of two objects wait. Then they need few requests.
+TEST_F(HttpStoreTest, PartsThatWaitSideBySideAreOneRequest) {
+  Random random(72);
+  SCOPED_TRACE(random.trace());
+  std::string object;
+  for (int i = 0; i < 100'000; ++i) object += char('a' + random.Integer(0, 25));
+  std::promise<void> go;
+  const std::shared_future<void> may_go(go.get_future());
+  const ScriptedServer server([&](const ServerRequest& request) -> std::string {
+    if (request.target.starts_with("/wait")) {
+      may_go.wait();
+      return AnswerText("200 OK", "x");
+    }
+    std::size_t begin = 0, last = 0;
+    if (request.target == "/none") return AnswerText("404 x", "");
+    if (std::sscanf(request.header("range").c_str(), "bytes=%zu-%zu", &begin, &last) != 2) return AnswerText("400 x", "");
+    if (begin >= object.size()) return AnswerText("416 x", "", fmt::format("Content-Range: bytes */{}\r\n", object.size()));
+    const std::string part = object.substr(begin, last + 1 - begin);
+    return AnswerText("206 x", part, fmt::format("Content-Range: bytes {}-{}/{}\r\n", begin, begin + part.size() - 1, object.size()));
+  });
+  const std::shared_ptr<Store> store = StoreAt(server.url());
+  constexpr std::size_t kWaiting = HttpTransfers::kMostOfAHost, kParts = 200;
+  std::atomic<std::size_t> left = kWaiting + kParts + 3, wrong = 0;
+  std::promise<void> all;
+  const auto expect = [&](const std::string& key, const ByteRange& range, const std::string& wanted, StatusCode code = StatusCode::kOk) {
+    store->Read(key, range, object.size(), [&, wanted, code](const Result<Bytes>& bytes) {
+      const std::string text = bytes.ok() ? std::string(reinterpret_cast<const char*>(bytes->span().data()), bytes->size()) : "";
+      if (text != wanted || (bytes.ok() ? StatusCode::kOk : bytes.status().code()) != code) ++wrong;
+      if (--left == 0) all.set_value();
+    });
+  };
+  for (std::size_t i = 0; i < kWaiting; ++i) expect(fmt::format("wait{}", i), {}, "x");
+  std::uint64_t begin = 0;
+  for (std::size_t i = 0; i < kParts; ++i) {
+    const auto bytes = std::uint64_t(random.Integer(1, 600)), gap = std::uint64_t(random.Chance(0.2) ? random.Integer(0, 300) : 0);
+    expect("object", {begin, bytes}, begin < object.size() ? object.substr(begin, bytes) : "");
+    begin += bytes + gap;
+  }
+  for (std::uint64_t i = 0; i < 3; ++i) expect("none", {100 * i, 100}, "", StatusCode::kNotFound);
+  go.set_value();
+  all.get_future().get();
+  EXPECT_EQ(wrong, 0U);
+  EXPECT_EQ(server.requests().size(), kWaiting + 2) << "one for each object";
+}
+
 TEST_F(HttpStoreTest, AServerThatFailsAThirdGivesRightBytesAndIsNotFlooded) {
   Random random(71);
   SCOPED_TRACE(random.trace());
