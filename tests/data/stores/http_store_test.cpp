@@ -238,7 +238,7 @@ TEST_F(HttpStoreTest, AServerThatFailsAThirdGivesRightBytesAndIsNotFlooded) {
     return AnswerText("200 OK", request.target);
   });
   const std::shared_ptr<Store> store = StoreAt(server.url());
-  constexpr int kReads = 2000;
+  constexpr int kReads = 20000;
   std::atomic<int> right = 0, wrong = 0, failed = 0;
   std::promise<void> all;
   for (int i = 0; i < kReads; ++i) {
@@ -251,7 +251,7 @@ TEST_F(HttpStoreTest, AServerThatFailsAThirdGivesRightBytesAndIsNotFlooded) {
   }
   all.get_future().get();
   EXPECT_EQ(wrong, 0);
-  EXPECT_LT(failed, kReads / 50) << "a third to the power of six is 3 of 2000";
+  EXPECT_LT(failed, kReads / 50) << "a third to the power of six is 27 of 20000";
   EXPECT_LE(server.most_at_a_time(), int(HttpTransfers::kMostOfAHost));
   const WebTraffic counts = transfers_.traffic().front();
   EXPECT_LE(counts.requests, server.requests().size()) << "libcurl repeats what meets a connection that is just closed";

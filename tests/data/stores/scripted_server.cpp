@@ -30,9 +30,15 @@ ScriptedServer::ScriptedServer(Script script) : script_(std::move(script)), list
     for (int connection = 0; (connection = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC)) >= 0;) {
       {
         const std::lock_guard lock(mutex_);
-        connections_.push_back(connection);
+        connections_.insert(connection);
       }
-      threads_.emplace_back([this, connection] { Serve(connection); });
+      std::thread([this, connection] {
+        Serve(connection);
+        const std::lock_guard lock(mutex_);
+        connections_.erase(connection);
+        ::close(connection);
+        removed_.notify_all();
+      }).detach();
     }
   });
 }
@@ -41,11 +47,10 @@ ScriptedServer::~ScriptedServer() {
   ::shutdown(listener_, SHUT_RDWR);
   accepting_.join();
   {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
     for (const int connection : connections_) ::shutdown(connection, SHUT_RDWR);
+    removed_.wait(lock, [this] { return connections_.empty(); });
   }
-  threads_.clear();
-  for (const int connection : connections_) ::close(connection);
   ::close(listener_);
 }
 

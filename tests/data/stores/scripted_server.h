@@ -2,11 +2,13 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -41,9 +43,9 @@ class ScriptedServer {
   std::uint16_t port_ = 0;
   mutable std::mutex mutex_;  // guards the next two
   std::vector<ServerRequest> requests_;
-  std::vector<int> connections_;
+  std::set<int> connections_;  // each is served by a thread, which removes it
+  std::condition_variable removed_;
   std::atomic<int> at_a_time_ = 0, most_at_a_time_ = 0;
-  std::vector<std::jthread> threads_;  // of the accepting thread alone, until it has ended
   std::jthread accepting_;
 };
 
