@@ -35,7 +35,8 @@ def start():
     iam.create_user(UserName="reader")
     iam.put_user_policy(UserName="reader", PolicyName="all", PolicyDocument=EVERYTHING)
     key = iam.create_access_key(UserName="reader")["AccessKey"]
-    urllib.request.urlopen(urllib.request.Request(f"{url}/moto-api/reset-auth", data=b"0", method="POST")).close()
+    headers = {"Content-Type": "text/plain"}
+    urllib.request.urlopen(urllib.request.Request(f"{url}/moto-api/reset-auth", data=b"0", headers=headers, method="POST")).close()
     return url, key["AccessKeyId"], key["SecretAccessKey"]
 
 
