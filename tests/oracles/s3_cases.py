@@ -3,6 +3,7 @@
 Names have what must be encoded in addresses and signatures. The secret of some cases is wrong: those must be refused.
 """
 import atexit
+import logging
 import os
 import tempfile
 import urllib.request
@@ -14,6 +15,7 @@ from moto.server import ThreadedMotoServer
 
 from case import Case, chunks, pick, sides, values
 
+logging.getLogger("werkzeug").setLevel(logging.ERROR)  # moto's server tells of each request
 CREDENTIALS = os.path.join(tempfile.mkdtemp(prefix="slabstream-s3-"), "credentials")
 os.environ["AWS_SHARED_CREDENTIALS_FILE"] = CREDENTIALS  # of the readers, which start before there is a key
 EVERYTHING = '{"Version": "2012-10-17", "Statement": [{"Effect": "Allow", "Action": "*", "Resource": "*"}]}'
