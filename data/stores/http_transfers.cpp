@@ -428,7 +428,8 @@ struct HttpTransfers::Impl {
   }
 
   void Answer(Owned owned, Result<HttpObject> answer) {
-    if (!answer.ok()) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
+    // That an object is not there is an answer: volumes leave out chunks that hold nothing.
+    if (!answer.ok() && answer.status().code() != StatusCode::kNotFound) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
     for (Asker& asker : owned->askers) {
       if (!answer.ok() || owned->askers.size() == 1) {
         asker.done(answer);
