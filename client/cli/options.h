@@ -91,13 +91,13 @@ struct TransferOptions {
 };
 
 struct ConvertOptions {
-  std::string source;       // a path, with options for reading it or without
-  std::uint64_t cache = 0;  // bytes on disk, for what web servers send; 0: none
+  std::string source;  // a path, with options for reading it or without
   std::string output;
   std::optional<SampleType> type;  // of the samples in `output`
   int level = 0;                   // of `source`
   Box box = {};                    // in voxels of that level; an end of 0: to the last one
   std::uint64_t memory = 0;        // bytes, limit of this process; 0: none
+  std::uint64_t cache = 0;         // bytes on disk, for what web servers send; 0: none
   OmeZarrVersion zarr_version = OmeZarrVersion::k05;
   bool progress = false;
 
@@ -106,8 +106,8 @@ struct ConvertOptions {
 
 struct IndexingOptions {
   std::string source;        // a path, with options for reading it or without
-  std::uint64_t cache = 0;   // bytes on disk, for what web servers send; 0: none
   std::uint64_t memory = 0;  // bytes, limit of this process; 0: the usual one
+  std::uint64_t cache = 0;   // bytes on disk, for what web servers send; 0: none
   bool progress = false;
 };
 

@@ -13,8 +13,8 @@ namespace slabstream {
 // than made them, then leave holes in several heaps. With a fixed threshold, messages that carry pictures of up to 1100 x 1100 pixels find
 // memory in a heap, instead of having it mapped, cleared and unmapped for each frame, and nothing larger leaves a hole. A heap (64 MiB at
 // most) keeps the free memory at its end, so strips of pictures that arrive one after the other use the memory of the last frame's strips.
-// There are as many heaps as cores, not glibc's eight a core: chunks of stored voxels are read, decoded and freed by different threads, and
-// what lies free in one heap is of no use to the others. Called once, first thing in main. Images have blocks of their own:
+// There are as many heaps as cores, not glibc's eight a core: small chunks of stored voxels are read, decoded and freed by different
+// threads, and what lies free in one heap is of no use to the others. Called once, first thing in main. Images have blocks of their own:
 // pooled_vector.h.
 inline void KeepFrameBuffers() {
   constexpr int kFrameBytes = 20 << 20, kHeapBytes = 64 << 20;

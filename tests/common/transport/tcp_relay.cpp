@@ -49,22 +49,17 @@ bool Readable(int socket) {
 
 }  // namespace
 
-TcpRelay::TcpRelay(int port) : port_(port), listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
-  sockaddr_in address = Loopback(0);
-  socklen_t bytes = sizeof(address);
-  CHECK(::bind(listener_, reinterpret_cast<sockaddr*>(&address), bytes) == 0 && ::listen(listener_, 8) == 0);
-  CHECK(::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &bytes) == 0);
-  listening_port_ = ntohs(address.sin_port);
+TcpRelay::TcpRelay(int port) : port_(port) {
   thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
 TcpRelay::~TcpRelay() {
   thread_.request_stop();
   thread_.join();
-  ::close(listener_);
+  ::close(listener_.socket);
 }
 
-std::string TcpRelay::endpoint() const { return "tcp://127.0.0.1:" + std::to_string(listening_port_); }
+std::string TcpRelay::endpoint() const { return "tcp://127.0.0.1:" + std::to_string(listener_.port); }
 
 std::string TcpRelay::Recorded() const {
   std::string all;
@@ -110,8 +105,8 @@ bool TcpRelay::Replay(const std::vector<std::string>& pieces) const {
 
 void TcpRelay::Run(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
-    if (!Readable(listener_)) continue;
-    const int from = ::accept(listener_, nullptr, nullptr), to = ConnectTo(port_);
+    if (!Readable(listener_.socket)) continue;
+    const int from = ::accept(listener_.socket, nullptr, nullptr), to = ConnectTo(port_);
     {
       const std::lock_guard lock(mutex_);
       ++connections_;

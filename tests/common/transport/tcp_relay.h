@@ -8,6 +8,8 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/loopback_listener.h"
+
 namespace slabstream {
 
 class TcpRelay {
@@ -40,7 +42,7 @@ class TcpRelay {
   void Pass(int from, int to, const std::stop_token& stop);
 
   const int port_;
-  int listener_ = -1, listening_port_ = 0;
+  const LoopbackListener listener_ = ListenOnLoopback();
   mutable std::mutex mutex_;
   std::vector<std::string> pieces_;  // guarded by mutex_, as are the next three
   int connections_ = 0;

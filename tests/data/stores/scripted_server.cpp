@@ -1,8 +1,6 @@
 #include "tests/data/stores/scripted_server.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -17,17 +15,9 @@
 
 namespace slabstream {
 
-ScriptedServer::ScriptedServer(Script script) : script_(std::move(script)), listener_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  CHECK_EQ(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), size), 0);
-  CHECK_EQ(::listen(listener_, 128), 0);
-  CHECK_EQ(::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-  port_ = ntohs(address.sin_port);
+ScriptedServer::ScriptedServer(Script script) : script_(std::move(script)) {
   accepting_ = std::jthread([this] {
-    for (int connection = 0; (connection = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC)) >= 0;) {
+    for (int connection = 0; (connection = ::accept4(listener_.socket, nullptr, nullptr, SOCK_CLOEXEC)) >= 0;) {
       {
         const std::lock_guard lock(mutex_);
         connections_.insert(connection);
@@ -44,17 +34,17 @@ ScriptedServer::ScriptedServer(Script script) : script_(std::move(script)), list
 }
 
 ScriptedServer::~ScriptedServer() {
-  ::shutdown(listener_, SHUT_RDWR);
+  ::shutdown(listener_.socket, SHUT_RDWR);
   accepting_.join();
   {
     std::unique_lock lock(mutex_);
     for (const int connection : connections_) ::shutdown(connection, SHUT_RDWR);
     removed_.wait(lock, [this] { return connections_.empty(); });
   }
-  ::close(listener_);
+  ::close(listener_.socket);
 }
 
-std::string ScriptedServer::url() const { return fmt::format("http://127.0.0.1:{}", port_); }
+std::string ScriptedServer::url() const { return fmt::format("http://127.0.0.1:{}", port()); }
 
 std::vector<ServerRequest> ScriptedServer::requests() const {
   const std::lock_guard lock(mutex_);

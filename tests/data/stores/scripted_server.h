@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "tests/support/loopback_listener.h"
+
 namespace slabstream {
 
 struct ServerRequest {
@@ -31,7 +33,7 @@ class ScriptedServer {
   ~ScriptedServer();
 
   std::string url() const;  // "http://127.0.0.1:PORT"
-  std::uint16_t port() const { return port_; }
+  std::uint16_t port() const { return listener_.port; }
   std::vector<ServerRequest> requests() const;  // so far
   int most_at_a_time() const { return most_at_a_time_; }
 
@@ -39,8 +41,7 @@ class ScriptedServer {
   void Serve(int connection);
 
   const Script script_;
-  int listener_ = -1;
-  std::uint16_t port_ = 0;
+  const LoopbackListener listener_ = ListenOnLoopback();
   mutable std::mutex mutex_;  // guards the next two
   std::vector<ServerRequest> requests_;
   std::set<int> connections_;  // each is served by a thread, which removes it

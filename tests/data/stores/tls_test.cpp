@@ -1,8 +1,6 @@
 // Servers that speak TLS: whose certificates are believed, and what a user reads of those that are not.
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
 #include <openssl/pem.h>
 #include <openssl/ssl.h>
 #include <openssl/x509v3.h>
@@ -19,6 +17,7 @@
 #include "data/stores/http_transfers.h"
 #include "data/stores/store.h"
 #include "tests/data/stores/scripted_server.h"
+#include "tests/support/loopback_listener.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -85,33 +84,25 @@ struct Authority {
 // Answers each connection once.
 class TlsServer {
  public:
-  TlsServer(X509& certificate, EVP_PKEY& key) : context_(SSL_CTX_new(TLS_server_method())), listener_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  TlsServer(X509& certificate, EVP_PKEY& key) : context_(SSL_CTX_new(TLS_server_method())) {
     CHECK_EQ(SSL_CTX_use_certificate(context_.get(), &certificate), 1);
     CHECK_EQ(SSL_CTX_use_PrivateKey(context_.get(), &key), 1);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    CHECK_EQ(::bind(listener_, reinterpret_cast<const sockaddr*>(&address), size), 0);
-    CHECK_EQ(::listen(listener_, 16), 0);
-    CHECK_EQ(::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size), 0);
-    url_ = "https://127.0.0.1:" + std::to_string(ntohs(address.sin_port));
     thread_ = std::jthread([this] {
-      for (int connection = 0; (connection = ::accept(listener_, nullptr, nullptr)) >= 0;) {
+      for (int connection = 0; (connection = ::accept(listener_.socket, nullptr, nullptr)) >= 0;) {
         Serve(connection);
         ::close(connection);
       }
     });
   }
   ~TlsServer() {
-    ::shutdown(listener_, SHUT_RDWR);
+    ::shutdown(listener_.socket, SHUT_RDWR);
     thread_.join();
-    ::close(listener_);
+    ::close(listener_.socket);
   }
   TlsServer(const TlsServer&) = delete;
   TlsServer& operator=(const TlsServer&) = delete;
 
-  const std::string& url() const { return url_; }
+  std::string url() const { return "https://127.0.0.1:" + std::to_string(listener_.port); }
 
  private:
   void Serve(int connection) {
@@ -126,8 +117,7 @@ class TlsServer {
   }
 
   const TlsContext context_;
-  const int listener_;
-  std::string url_;
+  const LoopbackListener listener_ = ListenOnLoopback();
   std::jthread thread_;
 };
 
