@@ -15,17 +15,16 @@
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/image/local_image.h"
+#include "common/image/picture_image.h"
 #include "common/transport/socket.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
 
-// A picture: premultiplied float RGBA (and depth) on its bounds within `size`; everything outside is empty.
 struct Picture {
   ImageSize size;
   PictureGeometry geometry;
-  LocalImage image;
+  PictureImage image;  // its bounds lie within `size`
   bool final = true;
   std::uint32_t groups_done = 1, group_count = 1;
   FrameStatistics statistics;  // final only

@@ -16,23 +16,38 @@ struct RunsOfShare {
   Bytes runs;
 };
 
-// Errors of ReadRuns.
-Result<LocalImage> PutTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame) {
-  if (shares.size() == 1) return ReadRuns(*shares.front().header, shares.front().runs.span(), frame);
+PixelBounds BoundsOf(const std::vector<RunsOfShare>& shares) {
   PixelBounds bounds;
   for (const RunsOfShare& share : shares) bounds = Union(bounds, share.header->bounds);
-  LocalImage picture = MakeLocalImage(shares.front().header->format, bounds);
+  return bounds;
+}
+
+// Errors of ReadRuns.
+Result<PictureImage> PutCodesTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame) {
+  StraightImage picture = MakeStraightImage(BoundsOf(shares));
   for (const auto& [header, runs] : shares) {
-    // Shares that were resampled overlap at their seams. They come as floats.
-    if (header->color != ColorCoding::kFloat32) {
-      if (Status status = ReadRunsInto(*header, runs.span(), frame, picture); !status.ok()) return status;
-      continue;
-    }
-    const Result<LocalImage> share = ReadRuns(*header, runs.span(), frame);
-    if (!share.ok()) return share.status();
-    AddImage(picture, *share);
+    if (Status status = ReadCodesInto(*header, runs.span(), frame, picture); !status.ok()) return status;
   }
-  return picture;
+  return PictureImage(std::move(picture));
+}
+
+// Errors of ReadRuns.
+Result<PictureImage> PutTogether(const std::vector<RunsOfShare>& shares, const PixelBounds& frame) {
+  const auto is_code = [](const RunsOfShare& share) { return share.header->color == ColorCoding::kStraight8; };
+  if (std::ranges::all_of(shares, is_code)) return PutCodesTogether(shares, frame);
+  const auto read = [&](const RunsOfShare& share) { return ReadRuns(*share.header, share.runs.span(), frame); };
+  if (shares.size() == 1) {
+    Result<LocalImage> picture = read(shares.front());
+    if (!picture.ok()) return picture.status();
+    return PictureImage(*std::move(picture));
+  }
+  LocalImage picture = MakeLocalImage(shares.front().header->format, BoundsOf(shares));
+  for (const RunsOfShare& each : shares) {
+    const Result<LocalImage> share = read(each);
+    if (!share.ok()) return share.status();
+    AddImage(picture, *share);  // shares that were resampled overlap at their seams
+  }
+  return PictureImage(std::move(picture));
 }
 
 }  // namespace
@@ -51,7 +66,7 @@ Result<Picture> DecodePicture(FrameReply& reply, const std::vector<Bytes>& runs,
     if (Status status = ValidateRunHeader(header, frame); !status.ok()) return Status::DataLoss(status.message());
     shares.push_back({&header, *std::move(unpacked)});
   }
-  Result<LocalImage> image = PutTogether(shares, frame);
+  Result<PictureImage> image = PutTogether(shares, frame);
   if (!image.ok()) return Status::DataLoss(image.status().message());
   Picture picture;
   picture.image = *std::move(image);

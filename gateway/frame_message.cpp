@@ -33,27 +33,6 @@ Json TimelineJson(const FrameStatistics& statistics) {
 
 }  // namespace
 
-PixelBounds ContentBounds(const LocalImage& image) {
-  const PixelBounds& bounds = image.bounds;
-  const auto width = std::size_t(bounds.width()), height = std::size_t(bounds.height());
-  std::size_t top = height, bottom = 0, left = width, right = 0;
-  for (std::size_t y = 0; y < height; ++y) {
-    const float* const row = &image.rgba[4 * y * width];
-    const auto shows = [row](std::size_t x) { return row[4 * x + 3] > 0; };
-    std::size_t first = 0;
-    while (first < width && !shows(first)) ++first;
-    if (first == width) continue;
-    std::size_t last = width;
-    while (last > right && !shows(last - 1)) --last;
-    top = std::min(top, y);
-    bottom = y + 1;
-    left = std::min(left, first);
-    right = std::max(right, last);
-  }
-  if (top == height) return {};
-  return {bounds.x_begin + int(left), bounds.y_begin + int(top), bounds.x_begin + int(right), bounds.y_begin + int(bottom)};
-}
-
 Json StatisticsJson(const FrameStatistics& statistics, Duration latency, bool timeline) {
   const FrameSummary summary = Summarize(statistics);
   Json stages = Json::object();
@@ -93,7 +72,7 @@ RenderedView JoinPictures(std::vector<Picture> pictures, ImageSize size) {
     view.image = std::move(pictures.front().image);
     return view;
   }
-  std::vector<LocalImage> images;
+  std::vector<PictureImage> images;
   for (Picture& picture : pictures) images.push_back(std::move(picture.image));
   view.image = SideBySide(images, size);
   return view;
@@ -105,7 +84,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
   if (!picture.ok()) return picture.status();
   // Outside of what was rendered is background, unless something was drawn onto the picture.
   const PixelBounds bounds =
-      view.format.annotations.any() ? PixelBounds{0, 0, view.size.width, view.size.height} : ContentBounds(view.image);
+      view.format.annotations.any() ? PixelBounds{0, 0, view.size.width, view.size.height} : view.image.ContentBounds();
   EncodedView encoded{.seq = view.seq, .header = {}, .bytes = nullptr, .encoding = {}, .type = final ? "png" : "jpeg"};
   std::vector<std::byte> bytes;
   if (!bounds.empty() && final) {

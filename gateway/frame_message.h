@@ -21,7 +21,7 @@ struct RenderedView {
   double scale = 1;
   double coarseness = 1;  // of what is shown: 1 if a smaller one would change nothing
   ImageSize size;         // of the whole picture
-  LocalImage image;
+  PictureImage image;
   PictureFormat format;
   PictureKey key;
   std::vector<PictureGeometry> panes;  // of the pictures side by side
@@ -43,9 +43,6 @@ struct EncodedView {
 
 // Lossless, or as JPEG of `quality`. Cancelled: `given_up` became true. NotFound: the font of annotations.
 Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality, const std::atomic<bool>& given_up);
-
-// The smallest rectangle that holds all pixels that are not empty; empty if there are none.
-PixelBounds ContentBounds(const LocalImage& image);
 
 // What comes before the encoded rectangle in the message.
 std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip);

@@ -71,7 +71,7 @@ void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, co
   if (!frames.ok()) return reply(Failure(frames.status()));
   const auto encode = [request = *slice](ServiceLink::Rendered rendered) {
     PictureNotes notes{.key = std::move(rendered.key)};
-    std::vector<LocalImage> images;
+    std::vector<PictureImage> images;
     for (Picture& picture : rendered.pictures) {
       images.push_back(std::move(picture.image));
       notes.panes.push_back(picture.geometry);

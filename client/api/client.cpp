@@ -49,15 +49,10 @@ Progress ProgressOf(const FrameProgress& progress) {
           .workers = int(progress.workers)};
 }
 
-// Copies `values`, those of the pixels in `bounds`, to their places in `whole`, a picture that is `width` pixels wide. A pixel has
-// `channels` values.
-void PutRows(std::span<const float> values, const PixelBounds& bounds, int width, int channels, std::vector<float>& whole) {
-  const std::size_t row = std::size_t(channels) * std::size_t(bounds.width());
-  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
-    const auto from = values.subspan(std::size_t(y - bounds.y_begin) * row, row);
-    const std::size_t to = std::size_t(channels) * (std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));
-    std::ranges::copy(from, whole.begin() + std::ptrdiff_t(to));
-  }
+// Calls function(y, first) for each row of the bounds; `first` is its first pixel in a picture that is `width` pixels wide.
+template <class Function>
+void ForEachRow(const PixelBounds& bounds, int width, Function&& function) {
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) function(y, std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));
 }
 
 // A request that is under way; cancelled unless it has ended.
@@ -114,17 +109,21 @@ int Image::group_count() const noexcept { return int(impl_->picture.group_count)
 std::chrono::nanoseconds Image::latency() const noexcept { return impl_->picture.latency; }
 
 std::vector<float> Image::Rgba() const {
-  const LocalImage& image = impl_->picture.image;
+  const PictureImage& image = impl_->picture.image;
   std::vector<float> rgba(4 * std::size_t(width()) * std::size_t(height()));
-  PutRows(image.rgba, image.bounds, width(), 4, rgba);
+  ForEachRow(image.bounds(), width(), [&](int y, std::size_t first) { image.ReadColors(y, &rgba[4 * first]); });
   return rgba;
 }
 
 std::vector<float> Image::Depth() const {
-  const LocalImage& image = impl_->picture.image;
-  if (!HasDepth(image.format)) return {};
+  const PictureImage& image = impl_->picture.image;
+  if (!image.has_depth()) return {};
   std::vector<float> depth(std::size_t(width()) * std::size_t(height()), std::numeric_limits<float>::infinity());
-  PutRows(image.depth, image.bounds, width(), 1, depth);
+  auto from = image.floats()->depth.begin();
+  ForEachRow(image.bounds(), width(), [&](int, std::size_t first) {
+    std::copy_n(from, image.bounds().width(), depth.begin() + std::ptrdiff_t(first));
+    from += image.bounds().width();
+  });
   return depth;
 }
 

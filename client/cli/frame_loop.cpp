@@ -94,7 +94,7 @@ class FrameLoop {
     if (!lowered.empty() && !std::exchange(told_lowered_, true)) PrintWarning(lowered);
     std::vector<RankReport> reports = std::exchange(picture.statistics.reports, {});  // many, which the sink does not need
     FrameRecord& record = records_[index];
-    record = {jobs_[index].output, picture.latency, received, picture.statistics, IsEmpty(picture.image), picture.direct};
+    record = {jobs_[index].output, picture.latency, received, picture.statistics, picture.image.IsEmpty(), picture.direct};
     if (options_.keep_reports) record.statistics.reports = std::move(reports);
     if (options_.pictures != nullptr) waiting_.emplace(index, std::move(picture));
     return Status::Ok();

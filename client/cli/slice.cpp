@@ -31,7 +31,7 @@ Status RunSlice(const SliceOptions& options) {
   const Result<PictureKey> key = KeyFor(connection->client(), slice.format.annotations, frames->front());
   if (!key.ok()) return key.status();
   PictureNotes notes{.key = *key};
-  std::vector<LocalImage> images;
+  std::vector<PictureImage> images;
   for (const FrameRequest& frame : *frames) {
     Result<Picture> picture = connection->client().Render(frame);
     if (!picture.ok()) return picture.status();
@@ -39,9 +39,9 @@ Status RunSlice(const SliceOptions& options) {
     notes.panes.push_back(picture->geometry);
   }
   const ImageSize whole = slice.size();
-  const LocalImage all = SideBySide(images, slice.frame.size);
+  const PictureImage all = SideBySide(images, slice.frame.size);
   if (Status status = WritePicture(all, whole, options.output, slice.format, notes); !status.ok()) return status;
-  WarnOf(connection->client(), frames->front(), std::ranges::all_of(images, IsEmpty), slice.shown_window());
+  WarnOf(connection->client(), frames->front(), all.IsEmpty(), slice.shown_window());
   std::cout << fmt::format("wrote {} {}x{}\n", options.output, whole.width, whole.height);
   return Status::Ok();
 }

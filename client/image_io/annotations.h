@@ -60,6 +60,7 @@ class AnnotationLayers {
 
   // Puts row y of the annotations over that of the picture: premultiplied RGBA.
   void PutOver(int y, std::span<float> rgba) const;
+  bool empty() const { return layers_.empty(); }
 
  private:
   std::vector<ColoredInk> layers_;  // the last one on top

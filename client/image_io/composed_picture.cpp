@@ -11,9 +11,9 @@ namespace slabstream {
 
 bool HoldsStraight8(const PictureFormat& format) { return format.png_bits == 8 && format.background.a == 0 && !format.annotations.any(); }
 
-Result<ComposedPicture> ComposedPicture::Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
+Result<ComposedPicture> ComposedPicture::Make(const PictureImage& image, ImageSize size, const PictureFormat& format,
                                               std::span<const PictureGeometry> panes, const PictureKey& key) {
-  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds)));
+  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds())));
   Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, panes, key);
   if (!annotations.ok()) return annotations.status();
   return ComposedPicture(image, size, format.background, *std::move(annotations));
@@ -24,16 +24,36 @@ void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) 
   const float behind[4] = {background_.r * alpha, background_.g * alpha, background_.b * alpha, alpha};
   for (std::size_t i = 0; i < rgba.size(); i += 4) std::copy_n(behind, 4, &rgba[i]);
   std::fill(depth.begin(), depth.end(), std::numeric_limits<float>::infinity());
-  const PixelBounds& b = image_->bounds;
+  const PixelBounds& b = image_->bounds();
   if (!b.empty() && y >= b.y_begin && y < b.y_end) {
     const auto left = std::size_t(b.x_begin), width = std::size_t(b.width());
-    const std::size_t first = std::size_t(y - b.y_begin) * width;
     float* const out = rgba.data() + 4 * left;
-    OverRow(image_->rgba.data() + 4 * first, out, out, width);
-    if (!depth.empty()) std::copy_n(image_->depth.data() + first, width, depth.data() + left);
+    std::vector<float> colors(4 * width);
+    image_->ReadColors(y, colors.data());
+    OverRow(colors.data(), out, out, width);
+    if (!depth.empty()) std::copy_n(image_->floats()->depth.data() + std::size_t(y - b.y_begin) * width, width, depth.data() + left);
   }
   annotations_.PutOver(y, rgba);
 }
+
+template <class Code>
+void ComposedPicture::CodeRow(int y, std::span<Code> codes) const {
+  std::vector<float> rgba(codes.size());
+  Row(y, rgba, {});
+  StraightCodes(rgba.data(), codes.size() / 4, codes.data());
+}
+
+void ComposedPicture::StraightRow(int y, std::span<std::uint8_t> codes) const {
+  const StraightImage* const image = image_->codes();
+  if (image == nullptr || !IsImageAlone()) return CodeRow(y, codes);
+  std::ranges::fill(codes, std::uint8_t{0});
+  const PixelBounds& b = image->bounds;
+  if (b.empty() || y < b.y_begin || y >= b.y_end) return;
+  const std::size_t row = 4 * std::size_t(b.width());
+  std::copy_n(image->codes.data() + std::size_t(y - b.y_begin) * row, row, codes.data() + 4 * std::size_t(b.x_begin));
+}
+
+void ComposedPicture::StraightRow(int y, std::span<std::uint16_t> codes) const { CodeRow(y, codes); }
 
 std::vector<std::byte> MovieFrame(const ComposedPicture& picture) {
   const auto width = std::size_t(picture.size().width), height = std::size_t(picture.size().height);

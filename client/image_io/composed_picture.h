@@ -2,13 +2,14 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "client/image_io/annotations.h"
 #include "common/base/status.h"
-#include "common/image/local_image.h"
+#include "common/image/picture_image.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
@@ -30,27 +31,34 @@ bool HoldsStraight8(const PictureFormat& format);
 // Rows are made one by one, so that no second copy of the picture is needed. Any thread.
 class ComposedPicture {
  public:
-  // `image` is premultiplied and must outlive this; its bounds lie within `size`, pixels outside are empty. `panes`: of pictures side by
+  // `image` must outlive this; its bounds lie within `size`. `panes`: of pictures side by
   // side, of equal widths, at least one. NotFound: the font of annotations.
-  static Result<ComposedPicture> Make(const LocalImage& image, ImageSize size, const PictureFormat& format,
+  static Result<ComposedPicture> Make(const PictureImage& image, ImageSize size, const PictureFormat& format,
                                       std::span<const PictureGeometry> panes, const PictureKey& key = {});
-  static Result<ComposedPicture> Make(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureGeometry& geometry,
-                                      const PictureKey& key = {}) {
+  static Result<ComposedPicture> Make(const PictureImage& image, ImageSize size, const PictureFormat& format,
+                                      const PictureGeometry& geometry, const PictureKey& key = {}) {
     return Make(image, size, format, {&geometry, 1}, key);
   }
 
   ImageSize size() const { return size_; }
-  bool has_depth() const { return HasDepth(image_->format); }
+  bool has_depth() const { return image_->has_depth(); }
 
   // Row y of the picture: size().width * 4 premultiplied floats, and as many depths as the row has pixels if `depth` is not empty
   // (+infinity where nothing is seen).
   void Row(int y, std::span<float> rgba, std::span<float> depth) const;
+  // The same row in the codes of a PNG of 8 or 16 bits (StraightCodes).
+  void StraightRow(int y, std::span<std::uint8_t> codes) const;
+  void StraightRow(int y, std::span<std::uint16_t> codes) const;
 
  private:
-  ComposedPicture(const LocalImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
+  ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
       : image_(&image), size_(size), background_(background), annotations_(std::move(annotations)) {}
 
-  const LocalImage* image_;
+  template <class Code>
+  void CodeRow(int y, std::span<Code> codes) const;
+  bool IsImageAlone() const { return background_.a == 0 && annotations_.empty(); }
+
+  const PictureImage* image_;
   ImageSize size_;
   StraightColor background_;
   AnnotationLayers annotations_;

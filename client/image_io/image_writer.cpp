@@ -17,7 +17,6 @@
 #include "common/base/check.h"
 #include "common/base/files.h"
 #include "common/base/version.h"
-#include "common/image/sample_codes.h"
 
 namespace slabstream {
 namespace {
@@ -34,11 +33,9 @@ FileType TypeOf(const std::string& path) {
 template <class Code>
 bool WritePngRows(const ComposedPicture& picture, const PictureEncoder::WriteRow& write) {
   const auto width = std::size_t(picture.size().width);
-  std::vector<float> rgba(4 * width);
   std::vector<Code> codes(4 * width);
   for (int y = 0; y < picture.size().height; ++y) {
-    picture.Row(y, rgba, {});
-    StraightCodes(rgba.data(), width, codes.data());
+    picture.StraightRow(y, codes);
     if (!write(y, codes.data())) return false;
   }
   return true;
@@ -131,7 +128,7 @@ Status CheckCanWritePicture(const std::string& path) {
   return status.ok() ? FindEncoder().status() : status;
 }
 
-Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
+Status WritePicture(const PictureImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes) {
   if (Status status = CheckPicturePath(path); !status.ok()) return status;
   const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
@@ -149,7 +146,7 @@ Status WritePicture(const LocalImage& image, ImageSize size, const std::string& 
   return Status::Unavailable(fmt::format("cannot write '{}': {}", path, FirstLine(*failure)));
 }
 
-Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
+Result<std::vector<std::byte>> PngFile(const PictureImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
   const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
   if (!picture.ok()) return picture.status();
   std::vector<std::byte> file;

@@ -14,7 +14,7 @@
 
 #include "client/image_io/composed_picture.h"
 #include "common/base/status.h"
-#include "common/image/local_image.h"
+#include "common/image/picture_image.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
@@ -38,14 +38,14 @@ Status CheckPicturePath(const std::string& path);
 // picture is made.
 Status CheckCanWritePicture(const std::string& path);
 
-// `image` is premultiplied, its bounds lie within `size`; pixels outside are empty. Both formats are written row by row, so that writing
+// The bounds of `image` lie within `size`. Both formats are written row by row, so that writing
 // needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
 // NotFound: the font of annotations.
-Status WritePicture(const LocalImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
+Status WritePicture(const PictureImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes = {});
 
 // The bytes of the .png file that WritePicture would write. NotFound: the font of annotations.
-Result<std::vector<std::byte>> PngFile(const LocalImage& image, ImageSize size, const PictureFormat& format,
+Result<std::vector<std::byte>> PngFile(const PictureImage& image, ImageSize size, const PictureFormat& format,
                                        const PictureNotes& notes = {});
 
 }  // namespace slabstream

@@ -105,14 +105,11 @@ std::optional<std::vector<std::byte>> EncodePng(const ComposedPicture& picture, 
   png_set_IHDR(writer.png, writer.info, png_uint_32(bounds.width()), png_uint_32(bounds.height()), 8, PNG_COLOR_TYPE_RGBA,
                PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_write_info(writer.png, writer.info);
-  std::vector<float> rgba(4 * std::size_t(picture.size().width));
-  std::vector<std::uint8_t> codes(4 * std::size_t(bounds.width()));
-  const std::size_t first = 4 * std::size_t(bounds.x_begin);
+  std::vector<std::uint8_t> codes(4 * std::size_t(picture.size().width));
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
     if (given_up.load(std::memory_order_relaxed)) return std::nullopt;
-    picture.Row(y, rgba, {});
-    StraightCodes(rgba.data() + first, std::size_t(bounds.width()), codes.data());
-    png_write_row(writer.png, codes.data());
+    picture.StraightRow(y, codes);
+    png_write_row(writer.png, codes.data() + 4 * std::size_t(bounds.x_begin));
   }
   png_write_end(writer.png, nullptr);
   return std::move(writer.bytes);

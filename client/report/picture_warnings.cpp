@@ -47,13 +47,6 @@ std::string VisibleText(const TransferFunction& transfer) {
 
 }  // namespace
 
-bool IsEmpty(const LocalImage& image) {
-  for (std::size_t i = 3; i < image.rgba.size(); i += 4) {
-    if (image.rgba[i] > 0) return false;
-  }
-  return true;
-}
-
 std::optional<std::string> RangeWarning(std::string_view option, double low, double high, const ValueRange& values) {
   if (high > double(values.min) && low < double(values.max)) return std::nullopt;
   if (values.min == values.max && low <= double(values.min) && double(values.max) <= high) return std::nullopt;

@@ -6,13 +6,9 @@
 #include <string_view>
 
 #include "common/frame/frame_request.h"
-#include "common/image/local_image.h"
 #include "common/wire/client_messages.h"
 
 namespace slabstream {
-
-// Whether no pixel shows anything.
-bool IsEmpty(const LocalImage& image);
 
 // Colours from `low` to `high` (data values), as `option` says, meet none of the volume's values. Nothing: they do.
 std::optional<std::string> RangeWarning(std::string_view option, double low, double high, const ValueRange& values);

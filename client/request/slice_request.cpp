@@ -68,14 +68,13 @@ Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice) {
   return frames;
 }
 
-LocalImage SideBySide(std::span<const LocalImage> images, ImageSize size) {
+PictureImage SideBySide(std::span<const PictureImage> images, ImageSize size) {
   LocalImage all = MakeLocalImage(PixelFormat::kRgba, {0, 0, size.width * std::int32_t(images.size()), size.height});
   for (std::size_t i = 0; i < images.size(); ++i) {
-    const LocalImage& image = images[i];
-    const auto width = std::size_t(image.bounds.width());
-    for (std::int32_t y = image.bounds.y_begin; y < image.bounds.y_end; ++y) {
-      const auto to = std::size_t(y) * std::size_t(all.bounds.width()) + i * std::size_t(size.width) + std::size_t(image.bounds.x_begin);
-      std::copy_n(&image.rgba[4 * std::size_t(y - image.bounds.y_begin) * width], 4 * width, &all.rgba[4 * to]);
+    const PixelBounds& bounds = images[i].bounds();
+    for (std::int32_t y = bounds.y_begin; y < bounds.y_end; ++y) {
+      const auto to = std::size_t(y) * std::size_t(all.bounds.width()) + i * std::size_t(size.width) + std::size_t(bounds.x_begin);
+      images[i].ReadColors(y, &all.rgba[4 * to]);
     }
   }
   return all;

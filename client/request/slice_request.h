@@ -13,7 +13,7 @@
 #include "client/request/value_window.h"
 #include "common/base/status.h"
 #include "common/frame/frame_request.h"
-#include "common/image/local_image.h"
+#include "common/image/picture_image.h"
 
 namespace slabstream {
 
@@ -40,6 +40,6 @@ struct SliceRequest {
 Result<std::vector<FrameRequest>> FramesOf(const SliceRequest& slice);
 
 // Puts the pictures of those frames beside each other, from left to right.
-LocalImage SideBySide(std::span<const LocalImage> images, ImageSize size);
+PictureImage SideBySide(std::span<const PictureImage> images, ImageSize size);
 
 }  // namespace slabstream

@@ -147,36 +147,50 @@ std::vector<std::size_t> FirstPixels(const RunPayload& runs) {
   return first;
 }
 
-// Writes pixels to an image whose bounds contain those of the header. `fills`: they are the same bounds, and what lies between runs becomes
-// empty.
-Status WriteRuns(const RunImageHeader& header, const RunPayload& runs, LocalImage& image, bool fills) {
-  const auto width = std::size_t(image.bounds.width());
-  const std::size_t corner =
-      std::size_t(header.bounds.y_begin - image.bounds.y_begin) * width + std::size_t(header.bounds.x_begin - image.bounds.x_begin);
+// Of an image with bounds that contain those of the runs: calls write(source, target, count, before) for each run, in parallel. Its pixels
+// are those from `source` on in the payload, and from `target` on in the image; the run before it ends at `before`, 0 for the first.
+template <class Write>
+void ForEachRun(const PixelBounds& runs_bounds, const RunPayload& runs, const PixelBounds& bounds, Write&& write) {
+  const auto width = std::size_t(bounds.width());
+  const std::size_t corner = std::size_t(runs_bounds.y_begin - bounds.y_begin) * width + std::size_t(runs_bounds.x_begin - bounds.x_begin);
   const auto place_of = [&](const Run& run) { return corner + std::size_t{run.row} * width + run.column; };
   const std::vector<std::size_t> first_pixels = FirstPixels(runs);
-  std::atomic<bool> colours_valid = true, depth_finite = true;
   tbb::parallel_for(std::size_t{0}, first_pixels.size(), [&](std::size_t task) {
     const std::size_t begin = task * kRunsPerTask, end = std::min<std::size_t>(begin + kRunsPerTask, runs.run_count());
-    std::size_t source = first_pixels[task], written = 0;
+    std::size_t source = first_pixels[task], before = 0;
     if (begin > 0) {
-      const Run before = runs.ReadRun(begin - 1);
-      written = place_of(before) + before.pixel_count;
+      const Run last = runs.ReadRun(begin - 1);
+      before = place_of(last) + last.pixel_count;
     }
     for (std::size_t i = begin; i < end; ++i) {
       const Run run = runs.ReadRun(i);
-      const std::size_t target = place_of(run);
-      if (!ColoursAreValid(header.color, runs.rgba(source, run.pixel_count))) colours_valid = false;
-      if (HasDepth(header.format) && !AllFinite(runs.depth(source, run.pixel_count))) depth_finite = false;
-      if (fills) MakeEmpty(image, written, target);
-      written = target + run.pixel_count;
-      runs.ReadRgba(source, run.pixel_count, &image.rgba[4 * target]);
-      if (HasDepth(header.format)) runs.ReadDepth(source, run.pixel_count, &image.depth[target]);
-      if (HasVoxel(header.format)) runs.ReadVoxel(source, run.pixel_count, &image.voxel[target]);
-      source += run.pixel_count;
+      const std::size_t target = place_of(run), count = run.pixel_count;
+      write(source, target, count, before);
+      source += count;
+      before = target + count;
     }
-    if (fills && end == runs.run_count()) MakeEmpty(image, written, std::size_t(header.bounds.pixel_count()));
   });
+}
+
+// Where the last run ends in an image of these bounds; 0: there is none.
+std::size_t EndOfRuns(const RunPayload& runs, const PixelBounds& bounds) {
+  if (runs.run_count() == 0) return 0;
+  const Run last = runs.ReadRun(runs.run_count() - 1);
+  return std::size_t{last.row} * std::size_t(bounds.width()) + last.column + last.pixel_count;
+}
+
+// Writes all pixels of an image with the bounds of the header.
+Status WriteRuns(const RunImageHeader& header, const RunPayload& runs, LocalImage& image) {
+  std::atomic<bool> colours_valid = true, depth_finite = true;
+  ForEachRun(header.bounds, runs, image.bounds, [&](std::size_t source, std::size_t target, std::size_t count, std::size_t before) {
+    if (!ColoursAreValid(header.color, runs.rgba(source, count))) colours_valid = false;
+    if (HasDepth(header.format) && !AllFinite(runs.depth(source, count))) depth_finite = false;
+    MakeEmpty(image, before, target);
+    runs.ReadRgba(source, count, &image.rgba[4 * target]);
+    if (HasDepth(header.format)) runs.ReadDepth(source, count, &image.depth[target]);
+    if (HasVoxel(header.format)) runs.ReadVoxel(source, count, &image.voxel[target]);
+  });
+  MakeEmpty(image, EndOfRuns(runs, image.bounds), std::size_t(image.bounds.pixel_count()));
   if (!colours_valid) return BadColour(header.color);
   if (!depth_finite) return DepthNotFinite();
   return Status::Ok();
@@ -310,16 +324,21 @@ Status ValidatePixels(const RunImageHeader& header, const RunPayload& runs, std:
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame) {
   if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
   LocalImage image = MakeUnwrittenImage(header.format, header.bounds);
-  if (Status status = WriteRuns(header, RunPayload(header, payload), image, true); !status.ok()) return status;
+  if (Status status = WriteRuns(header, RunPayload(header, payload), image); !status.ok()) return status;
   return image;
 }
 
-Status ReadRunsInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, LocalImage& image) {
+Status ReadCodesInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, StraightImage& image) {
   if (Status status = ValidateRunTable(header, payload, frame); !status.ok()) return status;
-  CHECK(header.format == image.format && image.rows.empty());
   if (header.bounds.empty()) return Status::Ok();
-  if (!image.bounds.Contains(header.bounds)) return Invalid("its bounds do not lie in those of the image that it belongs to");
-  return WriteRuns(header, RunPayload(header, payload), image, false);
+  CHECK(header.color == ColorCoding::kStraight8);
+  CHECK(image.bounds.Contains(header.bounds));
+  const RunPayload runs(header, payload);
+  ForEachRun(header.bounds, runs, image.bounds, [&](std::size_t source, std::size_t target, std::size_t count, std::size_t) {
+    const std::span<const std::byte> codes = runs.rgba(source, count);
+    std::memcpy(&image.codes[4 * target], codes.data(), codes.size());
+  });
+  return Status::Ok();
 }
 
 }  // namespace slabstream

@@ -17,6 +17,7 @@
 #include "common/base/status.h"
 #include "common/image/local_image.h"
 #include "common/image/run_header.h"
+#include "common/image/straight_image.h"
 
 namespace slabstream {
 
@@ -38,10 +39,9 @@ RunImage EncodePicture(const LocalImage& image, ColorCoding color = ColorCoding:
 // are decoded in parallel, within the caller's task arena.
 Result<LocalImage> ReadRuns(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame);
 
-// The same into `image`, which stores all its pixels, has the header's format and is empty where the header has runs; its other pixels
-// stay. InvalidArgument, too, if its bounds do not contain the header's; the image then holds whatever was written until the error was
-// found.
-Status ReadRunsInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, LocalImage& image);
+// Checks an image in the coding kStraight8 alike, and copies its codes into `image`, whose bounds contain the header's; its other pixels
+// stay.
+Status ReadCodesInto(const RunImageHeader& header, std::span<const std::byte> payload, const PixelBounds& frame, StraightImage& image);
 
 // The part of these checks that needs only the header: the image fits its frame, and so how much memory it may take.
 Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame);

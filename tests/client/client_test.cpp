@@ -54,8 +54,8 @@ TEST_F(ClientTest, ProgressPreviewAndPicture) {
   EXPECT_EQ(event->request, id);
   EXPECT_TRUE(picture.final);
   EXPECT_GT(picture.latency, Duration::zero());
-  EXPECT_EQ(picture.image.bounds, (PixelBounds{4, 6, 20, 18}));
-  EXPECT_EQ(picture.image.rgba[3], 0.5F);
+  EXPECT_EQ(picture.image.bounds(), (PixelBounds{4, 6, 20, 18}));
+  EXPECT_EQ(picture.image.floats()->rgba[3], 0.5F);
   EXPECT_FALSE(client.Next(Duration::zero()).has_value());
 }
 
@@ -332,7 +332,7 @@ TEST_F(ClientTest, DamagedRepliesNeverCrash) {
   for (int round = 0; round < 500; ++round) {
     const Result<Picture> picture = client.Render(SmallRequest());
     if (!picture.ok()) continue;
-    EXPECT_TRUE((PixelBounds{0, 0, 32, 24}).Contains(picture->image.bounds));
+    EXPECT_TRUE((PixelBounds{0, 0, 32, 24}).Contains(picture->image.bounds()));
   }
 }
 

@@ -89,8 +89,8 @@ TEST_F(DirectPicturesTest, ComeFromAWorkerThatTheServiceNames) {
     const Outcome outcome = Render(brings);
     ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
     EXPECT_TRUE(outcome.picture->direct);
-    EXPECT_EQ(outcome.picture->image.bounds, (PixelBounds{4, 6, 20, 18}));
-    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
+    EXPECT_EQ(outcome.picture->image.bounds(), (PixelBounds{4, 6, 20, 18}));
+    EXPECT_EQ(outcome.picture->image.floats()->rgba[5], 0.001F * 5);
     EXPECT_EQ(outcome.asked, 1);
   }
 }
@@ -100,7 +100,7 @@ TEST_F(DirectPicturesTest, ArePutTogetherFromTheirShares) {
     const Outcome outcome = Render(brings);
     ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
     EXPECT_EQ(outcome.picture->direct, brings == Brings::kTwoShares);
-    const LocalImage& image = outcome.picture->image;
+    const LocalImage& image = *outcome.picture->image.floats();
     EXPECT_EQ(image.bounds, (PixelBounds{0, 6, 32, 20}));
     for (std::int32_t y = 6; y < 20; ++y) {
       for (std::int32_t x = 0; x < 32; ++x) {
@@ -119,7 +119,7 @@ TEST_F(DirectPicturesTest, AreAskedForAgainIfTheyAreLost) {
     const Outcome outcome = Render(brings);
     ASSERT_TRUE(outcome.picture.ok()) << outcome.picture.status().message();
     EXPECT_FALSE(outcome.picture->direct);
-    EXPECT_EQ(outcome.picture->image.rgba[5], 0.001F * 5);
+    EXPECT_EQ(outcome.picture->image.floats()->rgba[5], 0.001F * 5);
     EXPECT_EQ(outcome.asked, 2);
     EXPECT_EQ(outcome.asked_with_door, 1) << "the second one comes through the coordinator";
   }

@@ -27,7 +27,7 @@ std::vector<float> SamplesOf(const Picture& picture) {
   constexpr std::size_t kChannels = 5;
   std::vector<float> samples(kChannels * std::size_t(picture.size.width) * std::size_t(picture.size.height));
   for (std::size_t i = 4; i < samples.size(); i += kChannels) samples[i] = std::numeric_limits<float>::infinity();
-  const LocalImage& image = picture.image;
+  const LocalImage& image = *picture.image.floats();
   std::size_t from = 0;
   for (std::int32_t y = image.bounds.y_begin; y < image.bounds.y_end; ++y) {
     for (std::int32_t x = image.bounds.x_begin; x < image.bounds.x_end; ++x, ++from) {

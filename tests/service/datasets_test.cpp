@@ -38,7 +38,7 @@ class DatasetsTest : public MultiProcessTest {
     request.dataset = dataset;
     return request;
   }
-  bool Shows(const LocalImage& picture, const Volume& volume) const {
+  bool Shows(const PictureImage& picture, const Volume& volume) const {
     const FrameRequest request = RequestOf("ball");
     return LargestDifference(picture, RenderDirectly(request, volume), request.size) <= AllowedDifference(request);
   }
@@ -142,7 +142,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
     return client_->Render(request).value().image;
   };
   for (const LabelMode mode : {LabelMode::kTint, LabelMode::kSurface, LabelMode::kHighlight}) {
-    const LocalImage by_number = shown({2, 2}, mode);
+    const PictureImage by_number = shown({2, 2}, mode);
     EXPECT_LE(LargestDifference(shown({.name = "right"}, mode), by_number, request.size), AllowedDifference(request));
     EXPECT_LE(LargestDifference(shown({.name = "*ght"}, mode), by_number, request.size), AllowedDifference(request));
     EXPECT_GT(LargestDifference(shown({.name = "l*"}, mode), by_number, request.size), 0.1);

@@ -79,7 +79,7 @@ class InPartsTest : public testing::Test {
     constexpr float kRounding = 1e-6F;
     Expect(request, RenderDirectly(same, level, summary), kRounding);
   }
-  void Expect(const FrameRequest& request, const LocalImage& expected, float rounding) {
+  void Expect(const FrameRequest& request, const PictureImage& expected, float rounding) {
     const Result<Picture> picture = Render(request);
     ASSERT_TRUE(picture.ok()) << picture.status().message();
     EXPECT_GT(HighestAlpha(picture->image), 0.1);
@@ -350,7 +350,7 @@ TEST_F(InPartsTest, LevelsChangeNeitherPlaceNorScale) {
       request.level = "0";
       const Result<Picture> finest = Render(request);
       ASSERT_TRUE(finest.ok()) << finest.status().message();
-      const PixelBounds expected = Silhouette(finest->image, request.size);
+      const PixelBounds expected = Silhouette(*finest->image.floats(), request.size);
       ASSERT_GT(expected.width(), 50);
       const double pixels_a_voxel = 260 / (2 * BoundingRadius(ball_->description.geometry));
       for (int level = 1; level < 3; ++level) {
@@ -358,7 +358,7 @@ TEST_F(InPartsTest, LevelsChangeNeitherPlaceNorScale) {
         request.level = std::to_string(level);
         const Result<Picture> coarse = Render(request);
         ASSERT_TRUE(coarse.ok()) << coarse.status().message();
-        const PixelBounds found = Silhouette(coarse->image, request.size);
+        const PixelBounds found = Silhouette(*coarse->image.floats(), request.size);
         const double most = 1 + 1.5 * (1 << level) * pixels_a_voxel;  // a coarse voxel, and half of one under perspective
         EXPECT_NEAR(found.x_begin, expected.x_begin, most);
         EXPECT_NEAR(found.x_end, expected.x_end, most);
@@ -384,7 +384,7 @@ TEST_F(InPartsTest, LevelsOfOnePictureAreTheSameHoweverMuchIsHeldByHoweverManyWo
     request.clipping.box = ClipBox{{0, 0, 0}, {60, 100, 75}, ClipUnit::kVoxels};
     requests.push_back(request);
   }
-  std::vector<LocalImage> held;
+  std::vector<PictureImage> held;
   constexpr std::uint64_t kNoLimit = 0;
   Start(path, 1, kNoLimit);
   for (const FrameRequest& request : requests) {
@@ -445,7 +445,7 @@ class IndexedTest : public InPartsTest {
   }
 
   struct Drawn {
-    LocalImage image;
+    PictureImage image;
     std::uint64_t voxel_bytes = 0;
   };
   std::vector<Drawn> Draw(const std::vector<FrameRequest>& requests) {

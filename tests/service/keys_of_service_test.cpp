@@ -152,7 +152,7 @@ TEST_F(KeysOfServiceTest, SharesOfPicturesAddUpToThoseOfOneRenderer) {
         request.straight8 = true;  // shares that are resampled come as floats all the same
         const Result<Picture> codes = client.Render(request);
         ASSERT_TRUE(codes.ok()) << codes.status().message();
-        LocalImage colors = picture->image;
+        LocalImage colors = *picture->image.floats();
         colors.format = PixelFormat::kRgba;
         colors.depth.clear();
         EXPECT_LE(LargestDifference(codes->image, colors, request.size), 1.01F / 255);

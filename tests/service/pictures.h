@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/client.h"
+#include "common/image/sample_codes.h"
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
 #include "common/planning/frame_plan.h"
@@ -70,8 +71,19 @@ inline PixelValue PixelAt(const LocalImage& image, int x, int y) {
   return value;
 }
 
+inline PixelValue PixelAt(const PictureImage& image, int x, int y) {
+  if (image.floats() != nullptr) return PixelAt(*image.floats(), x, y);
+  const StraightImage& codes = *image.codes();
+  PixelValue value;
+  const PixelBounds& b = codes.bounds;
+  if (!b.Contains({x, y, x + 1, y + 1})) return value;
+  FromStraightCodes(&codes.codes[4 * (std::size_t(y - b.y_begin) * std::size_t(b.width()) + std::size_t(x - b.x_begin))], 1, value.rgba);
+  return value;
+}
+
 // Largest difference of a channel (or of depths) over all pixels of the frame; infinite where one has a depth and the other none.
-inline float LargestDifference(const LocalImage& a, const LocalImage& b, ImageSize size) {
+template <class A, class B>
+float LargestDifference(const A& a, const B& b, ImageSize size) {
   float largest = 0;
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
@@ -95,7 +107,9 @@ inline double ExpectedAlpha(const FrameRequest& request) {
   return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
 }
 
-inline double HighestAlpha(const LocalImage& image) {
+// Of a picture that came as floats.
+inline double HighestAlpha(const PictureImage& picture) {
+  const LocalImage& image = *picture.floats();
   float highest = 0;
   for (std::size_t i = 3; i < image.rgba.size(); i += 4) highest = std::max(highest, image.rgba[i]);
   return highest;

@@ -1,5 +1,6 @@
 // Files are read back with OpenImageIO, unconverted, and compared with what the format promises.
 #include "client/image_io/image_writer.h"
+#include "common/image/sample_codes.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/temporary_directory.h"
 
@@ -74,6 +75,20 @@ TEST_F(ImageWriterTest, PngHoldsStraightAlphaWithoutATransferCurve) {
   EXPECT_THAT(file.At(2, 1), ElementsAre(code(0.5), code(0.25), 0, code(0.5)));
   EXPECT_THAT(file.At(3, 1), ElementsAre(1, code(0.5), code(0.25), 1));
   EXPECT_THAT(file.At(2, 2), ElementsAre(0, 0, 0, 0));  // row 0 is the top one
+}
+
+TEST_F(ImageWriterTest, PngIsTheSameOfThePictureAndOfItsCodes) {
+  const LocalImage floats = TwoPixels(PixelFormat::kRgba);
+  StraightImage codes = MakeStraightImage(floats.bounds);
+  StraightCodes(floats.rgba.data(), 2, codes.codes.data());
+  EXPECT_EQ(PngFile(codes, kSize, {}).value(), PngFile(floats, kSize, {}).value());
+  // A background shows through where the picture is translucent, as far as its codes say it.
+  const PictureFormat white{.background = {1, 1, 1, 1}};
+  ASSERT_EQ(WritePicture(codes, kSize, Path("codes.png"), white), Status::Ok());
+  ASSERT_EQ(WritePicture(floats, kSize, Path("floats.png"), white), Status::Ok());
+  const FileImage of_codes = Read(Path("codes.png")), of_floats = Read(Path("floats.png"));
+  ASSERT_EQ(of_codes.samples.size(), of_floats.samples.size());
+  for (std::size_t i = 0; i < of_codes.samples.size(); ++i) EXPECT_NEAR(of_codes.samples[i], of_floats.samples[i], 1.01 / 255) << i;
 }
 
 TEST_F(ImageWriterTest, PngOf16BitsKeepsFinerSteps) {
