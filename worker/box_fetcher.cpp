@@ -52,13 +52,23 @@ BoxFetcher::HeldBox* BoxFetcher::FindRequested(DatasetId dataset, const ChunkPla
   return nullptr;
 }
 
-BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, const SampleTypes& types,
+void BoxFetcher::NoteUse(const Use& use, DatasetId dataset) {
+  const auto [found, is_new] = users_.try_emplace({use.client, dataset}, FrameUses{use.frame, use_counter_, use_counter_});
+  FrameUses& uses = found->second;
+  if (uses.frame != use.frame) uses = {use.frame, use_counter_, uses.begin};
+  latest_client_ = use.client;
+  needed_since_ = uses.begin_before;
+  if (users_.size() > kMostUsers) users_.erase(std::ranges::min_element(users_, {}, [](const auto& user) { return user.second.begin; }));
+}
+
+BoxFetcher::Generation BoxFetcher::Acquire(const Use& use, DatasetId dataset, const Box& box, const SampleTypes& types,
                                            const std::optional<StoredAt>& stored, const std::vector<FilledBox>& filled,
                                            WorkerActions& actions) {
   std::vector<FilledBox> inside;
   for (const FilledBox& part : filled) {
     if (const Box common = Intersection(part.box, box); !common.empty()) inside.push_back({common, part.sample});
   }
+  NoteUse(use, dataset);
   HeldBox* best = nullptr;
   for (auto& [generation, padded] : boxes_) {
     if (padded.retired || padded.key.dataset != dataset || padded.key.types != types || !padded.Covers(box, inside)) continue;
@@ -81,6 +91,7 @@ BoxFetcher::Generation BoxFetcher::Acquire(DatasetId dataset, const Box& box, co
     ++best->pins;
   }
   best->last_use = ++use_counter_;
+  best->client = use.client;
   return best->key.generation;
 }
 
@@ -329,13 +340,23 @@ void BoxFetcher::Trim(WorkerActions& actions) {
     if (entry->second.pins == 0 && entry->second.retired) Drop(entry->first, actions);
   }
   while (cached_bytes() > most_cached()) {
-    const HeldBox* oldest = nullptr;
-    for (const auto& [generation, padded] : boxes_) {
-      if (padded.pins == 0 && (oldest == nullptr || padded.last_use < oldest->last_use)) oldest = &padded;
-    }
-    if (oldest == nullptr) return;  // all are needed
-    Drop(oldest->key.generation, actions);
+    const HeldBox* const next = NextToDrop();
+    if (next == nullptr) return;
+    Drop(next->key.generation, actions);
   }
+}
+
+// First what nobody may need again, oldest first; then what the latest client has used, newest first; then what others have, oldest first.
+BoxFetcher::HeldBox* BoxFetcher::NextToDrop() {
+  const auto order = [this](const HeldBox& padded) {
+    if (padded.last_use < needed_since_) return std::pair(0, padded.last_use);
+    return padded.client == latest_client_ ? std::pair(1, use_counter_ - padded.last_use) : std::pair(2, padded.last_use);
+  };
+  HeldBox* next = nullptr;
+  for (auto& [generation, padded] : boxes_) {
+    if (padded.pins == 0 && (next == nullptr || order(padded) < order(*next))) next = &padded;
+  }
+  return next;
 }
 
 void BoxFetcher::Drop(Generation padded, WorkerActions& actions) {

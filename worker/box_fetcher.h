@@ -8,9 +8,12 @@
 //      within chunk_timeout, or arrives damaged, is requested again, chunk_attempts times; then the padded box is given up (TakeFailures).
 //   3. complete(padded box): it can be rendered from. Release when that is done; the padded box stays cached.
 // Clients that wait for voxels at the same time have equal parts of the credit.
-// Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then the least recently used above
-// cache_bytes or the room (SetRoom). Padded boxes that are waited for begin to take memory one after the other, as far as there is room;
-// the one that is needed next always does, unless others are needed at the same time (RequestChunks).
+// Trim drops unpinned padded boxes: those that a complete one covers (the same box with a smaller halo), then others as far as they exceed
+// cache_bytes or the room (SetRoom). A client's frames mostly need the same padded boxes in the same order, nearest first. So if there is
+// no room for all of them, those that were used last are needed again last, and go first: dropping the least recently used would leave
+// none that the next frame finds. Boxes that neither this frame nor the one before it has used go before them.
+// Padded boxes that are waited for begin to take memory one after the other, as far as there is room; the one that is needed next always
+// does, unless others are needed at the same time (RequestChunks).
 #pragma once
 
 #include <algorithm>
@@ -47,9 +50,15 @@ class BoxFetcher {
 
   void SetRoom(std::uint64_t bytes) { room_ = bytes; }  // for all padded boxes, those in use too; without a call there is no limit
 
+  // Whose frame needs a padded box.
+  struct Use {
+    ClientId client = 0;
+    FrameId frame = 0;
+  };
+
   // `stored`: where the voxels can be read (FrameSetup::stored). What is missing is then asked for block by block, without what `filled`
   // fills.
-  Generation Acquire(DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
+  Generation Acquire(const Use& use, DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
                      const std::vector<FilledBox>& filled, WorkerActions& actions);
   void Release(Generation padded);  // once for each Acquire
   // Of acquired padded boxes.
@@ -105,6 +114,7 @@ class BoxFetcher {
     bool retired = false;  // not to be acquired again; dropped when unpinned
     std::uint64_t bytes = 0;
     std::uint64_t last_use = 0;
+    ClientId client = 0;              // that acquired it last
     std::vector<Generation> sources;  // pinned
     std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
     std::uint64_t cell_bytes = 0;     // of the padded box's cells; 0: there are none, or no chunk of them has come yet
@@ -130,9 +140,17 @@ class BoxFetcher {
     bool storing = false;
   };
   using ChunkName = std::pair<Generation, ChunkPlace>;
+  // When a client's last two frames of a dataset began to use padded boxes, in uses (last_use).
+  struct FrameUses {
+    FrameId frame = 0;
+    std::uint64_t begin = 0, begin_before = 0;
+  };
+  static constexpr std::size_t kMostUsers = 256;
 
   HeldBox* Find(Generation padded);  // null: dropped
   HeldBox* FindRequested(DatasetId dataset, const ChunkPlace& chunk);
+  void NoteUse(const Use& use, DatasetId dataset);
+  HeldBox* NextToDrop();  // null: all are pinned
   OpenBox PlanCopies(HeldBox& padded);
   std::uint64_t BegunBytes() const;
   std::uint64_t most_cached() const { return std::min(config_.cache_bytes, room_); }
@@ -151,6 +169,9 @@ class BoxFetcher {
   std::uint64_t cached_bytes_ = 0;  // of boxes_
   Generation last_generation_ = 0;
   std::uint64_t use_counter_ = 0;
+  std::map<std::pair<ClientId, DatasetId>, FrameUses> users_;
+  ClientId latest_client_ = 0;      // that acquired a padded box
+  std::uint64_t needed_since_ = 0;  // in uses: its frames may need again what was used since then
   std::uint64_t fetched_bytes_ = 0;
   std::vector<Failure> failures_;
 };

@@ -21,13 +21,14 @@ void RenderQueue::Add(ClientId client, const GroupKey& key, Rank rank, const Pla
   }
   const Box voxels = PaddedBox(placement.at(), *setup);
   const std::uint8_t level = placement.level;
-  const BoxFetcher::Generation padded =
-      boxes_.Acquire(DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
+  const BoxFetcher::Use use{client, key.frame};
   BoxFetcher::Generation light = 0;
   if (setup->light) {
     const auto& [dataset, description, stored] = *setup->light;
-    light = boxes_.Acquire(dataset, description.geometry.bounds(), {description.type, {}}, stored, {}, actions);
+    light = boxes_.Acquire(use, dataset, description.geometry.bounds(), {description.type, {}}, stored, {}, actions);
   }
+  const BoxFetcher::Generation padded =
+      boxes_.Acquire(use, DatasetOf(*setup, level), voxels, TypesOf(*setup), StoredOf(*setup, level), placement.filled, actions);
   Job& job = waiting_[{client, key, rank}] = {placement, setup, hidden, padded, light};
   job.waited = !Complete(job);
 }

@@ -16,6 +16,7 @@ namespace {
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Le;
 using testing::Not;
 using testing::SizeIs;
 
@@ -211,17 +212,62 @@ TEST_F(WorkerBoxesTest, FetchesAllWhereThereIsNoRoomForWhatItWouldCopyFrom) {
   EXPECT_THAT(All<OpenBox>(told).at(0).copies, IsEmpty());
 }
 
-TEST_F(WorkerBoxesTest, DropsTheOldestUnusedBoxAboveItsBudget) {
-  WorkerConfig config = Config();
-  config.cache_bytes = 2 * 128 * 128 * 80;
-  Start(config);
-  BoxKey oldest;
-  for (std::uint32_t group = 0; group < 2; ++group) {
-    const auto render = All<StartRender>(Feed(Tell(Assignment(1, {kSelf}, group, 3)))).at(0);
-    if (group == 0) oldest = render.padded;
-    Rendered(render);
+// Frames of volumes that do not fit: kParts boxes in as many groups, and a cache of kCached of them.
+class FramesThatDoNotFitTest : public WorkerMachineTest {
+ protected:
+  static constexpr std::uint32_t kParts = 6, kCached = 3, kFetched = kParts - (kCached - 1);
+
+  void SetUp() override {
+    WorkerMachineTest::SetUp();
+    WorkerConfig config = Config();
+    config.cache_bytes = kCached * 128 * 128 * 80;
+    Start(config);
   }
-  EXPECT_THAT(All<DropBox>(Tell(Assignment(1, {kSelf}, 2, 3))), ElementsAre(testing::Field(&DropBox::padded, oldest)));
+
+  // The parts of the dataset that were fetched for the client's next frame, which shows them from `first` on.
+  std::vector<std::uint32_t> Fetched(ClientId client, DatasetId dataset, std::uint32_t parts = kParts, std::uint32_t first = 0) {
+    ++frame_;
+    std::vector<std::uint32_t> fetched;
+    for (std::uint32_t group = 0; group < parts; ++group) {
+      GroupAssignment part = Assignment(frame_, {kSelf}, group, parts);
+      part.client = client;
+      part.setup.dataset = dataset;
+      part.setup.description.geometry.size = {128, 128, 64 * 2 * kParts};
+      const auto z = std::int32_t(64 * (first + group));
+      part.group.placements[0].box = {{0, 0, z}, {128, 128, z + 64}};
+      const Actions told = Tell(part);
+      if (!All<SendChunkRequest>(told).empty()) fetched.push_back(first + group);
+      Rendered(All<StartRender>(Feed(told)).at(0));
+    }
+    return fetched;
+  }
+
+ private:
+  FrameId frame_ = 0;
+};
+
+TEST_F(FramesThatDoNotFitTest, FindBoxesOfTheFrameBefore) {
+  EXPECT_THAT(Fetched(1, 1), SizeIs(kParts));
+  for (int frame = 0; frame < 10; ++frame) EXPECT_THAT(Fetched(1, 1), SizeIs(Le(kFetched))) << "one is in use, the others are found";
+}
+
+TEST_F(FramesThatDoNotFitTest, LeaveTheBoxesOfAnotherClientThatIsStillThere) {
+  Fetched(1, 1);
+  EXPECT_THAT(Fetched(2, 2, 1), ElementsAre(0));
+  for (int frame = 0; frame < 5; ++frame) {
+    Fetched(1, 1);
+    EXPECT_THAT(Fetched(2, 2, 1), IsEmpty());
+  }
+}
+
+TEST_F(FramesThatDoNotFitTest, TakeTheRoomOfBoxesThatNobodyNeedsAnyMore) {
+  Fetched(1, 1);
+  EXPECT_THAT(Fetched(1, 1, kCached - 1), IsEmpty());
+  for (int frame = 0; frame < 2; ++frame) Fetched(1, 1, kCached - 1, kParts);  // the view has moved
+  EXPECT_THAT(Fetched(1, 1, kCached - 1, kParts), IsEmpty());
+  Fetched(2, 2);  // somebody else comes, and client 1 has gone
+  Fetched(2, 2);
+  EXPECT_THAT(Fetched(2, 2), SizeIs(Le(kFetched)));
 }
 
 // The first of two groups of a frame of `size`, or the second. Ray casting.
