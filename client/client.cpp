@@ -12,6 +12,7 @@
 #include "client/direct_pictures.h"
 #include "common/base/any_of.h"
 #include "common/base/log.h"
+#include "common/base/merged.h"
 #include "common/base/overloaded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
@@ -41,23 +42,28 @@ struct OpenQuestion {
   bool order = false;  // services answer those at once; a wakeup ends the wait for one
 };
 
+using OrderReply = std::variant<StatusReply, ShutDownReply, KeysReply, DataReply>;
+
+template <class T, class Variant>
+constexpr bool kIsIn = false;
+template <class T, class... Types>
+constexpr bool kIsIn<T, std::variant<Types...>> = AnyOf<T, Types...>;
+template <class T>
+concept Answer = kIsIn<T, QuestionReply> || kIsIn<T, OrderReply>;
+
 struct Event {
   RequestId request = 0;
-  std::variant<FrameProgress, Picture, Status, SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, StatusReply,
-               ShutDownReply, KeysReply, DataReply>
-      what;
+  Merged<std::variant<FrameProgress, Picture, Status>, QuestionReply, OrderReply> what;
 };
 
 // Answers to orders are for those who wait for them.
 ClientEvent ToClientEvent(Event event) {
-  const auto what = Overloaded{
-      [](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
-      [](AnyOf<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply> auto& reply) -> decltype(ClientEvent::what) {
-        return QuestionReply(std::move(reply));
-      },
-      [](AnyOf<StatusReply, ShutDownReply, KeysReply, DataReply> auto&) -> decltype(ClientEvent::what) {
-        return Status::Internal("the service answered another question");
-      }};
+  const auto what =
+      Overloaded{[](AnyOf<FrameProgress, Picture, Status> auto& known) -> decltype(ClientEvent::what) { return std::move(known); },
+                 []<Answer T>(T& reply) -> decltype(ClientEvent::what) {
+                   if constexpr (kIsIn<T, QuestionReply>) return QuestionReply(std::move(reply));
+                   return Status::Internal("the service answered another question");
+                 }};
   return {event.request, std::visit(what, event.what)};
 }
 
@@ -221,8 +227,7 @@ void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
                  [&](const FrameFailed& failed) { End(failed.request, failed.status); },
                  [&](const ClientPong& pong) { Handle(pong); },
                  [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
-                 [&](AnyOf<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, StatusReply, ShutDownReply,
-                           KeysReply, DataReply> auto& reply) { End(reply.nonce, std::move(reply)); },
+                 [&](Answer auto& reply) { End(reply.nonce, std::move(reply)); },
                  [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
 }

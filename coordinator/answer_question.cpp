@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/shown_zones.h"
 #include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
@@ -80,6 +81,8 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   }
   return QuestionReply(std::move(reply));
 }
+
+Result<QuestionReply> Answer(const PrefetchQuery& query, const Dataset&) { return QuestionReply(PrefetchReply{.nonce = query.nonce}); }
 
 // ---- voxels that nobody holds are read for the answer
 
@@ -163,12 +166,24 @@ Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion
   return AnswerSummary(query, *asked.summary);
 }
 
+Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& asked, Prefetcher& prefetcher) {
+  PrefetchReply reply{.nonce = query.nonce, .fetches = asked.summary->stored && Prefetcher::Fetches(*asked.summary->stored)};
+  if (!reply.fetches) return QuestionReply(reply);
+  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, asked.dataset, asked.summary);
+  if (!resolved.ok()) return resolved.status();
+  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
+  if (!setup.ok()) return setup.status();
+  const Status begun = prefetcher.Fetch(*setup->stored, ShownBlocks(*setup, Prefetcher::kMostBlocks));
+  return begun.ok() ? QuestionReply(reply) : Result<QuestionReply>(begun);
+}
+
 }  // namespace
 
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher) {
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
+    if (const auto* prefetch = std::get_if<PrefetchQuery>(&asked.question)) return Fetch(*prefetch, asked, prefetcher);
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
   }
   const ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};

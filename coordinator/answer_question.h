@@ -1,12 +1,14 @@
-// The answers to questions about what a dataset holds. Pure; they may take milliseconds.
+// The answers to questions about what a dataset holds. They may take milliseconds, and longer if voxels are read for them.
 #pragma once
 
 #include "coordinator/dataset_machine.h"
+#include "coordinator/prefetcher.h"
 #include "coordinator/voxel_server.h"
 
 namespace slabstream {
 
 // Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples);
+// `prefetcher` begins with what a PrefetchQuery asks for. Any thread.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher);
 
 }  // namespace slabstream

@@ -249,7 +249,8 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   return PostResult(
-      answers_, "an answer to a question", [action, samples = voxels_.Find(action.dataset)] { return AnswerTo(action, samples); },
+      answers_, "an answer to a question",
+      [action, samples = voxels_.Find(action.dataset), prefetcher = prefetcher_] { return AnswerTo(action, samples, *prefetcher); },
       EndOf<QuestionAnswered>(action.id));
 }
 

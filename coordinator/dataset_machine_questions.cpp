@@ -4,6 +4,16 @@
 #include "coordinator/dataset_machine_state.h"
 
 namespace slabstream {
+namespace {
+
+// The picture that a question is about; null: it is about the dataset.
+FrameRequest* FrameOf(Question& question) {
+  if (auto* pick = std::get_if<PickQuery>(&question)) return &pick->frame;
+  if (auto* prefetch = std::get_if<PrefetchQuery>(&question)) return &prefetch->frame;
+  return nullptr;
+}
+
+}  // namespace
 
 void DatasetMachine::State::Ask(PeerToken client, Question question) {
   const std::string& name = DatasetOf(question);
@@ -28,11 +38,11 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
 // about the finest level of all. Errors of LevelsOf.
 Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
   int level = 0;
-  if (auto* pick = std::get_if<PickQuery>(&open.question)) {
-    const Result<LevelMap> drawn = LevelsOf(pick->frame, levels);
+  if (FrameRequest* const frame = FrameOf(open.question)) {
+    const Result<LevelMap> drawn = LevelsOf(*frame, levels);
     if (!drawn.ok()) return drawn.status();
     level = drawn->levels.front();
-    pick->frame = AtLevel(pick->frame, levels.levels.front().geometry, levels.levels[std::size_t(level)].geometry);
+    *frame = AtLevel(*frame, levels.levels.front().geometry, levels.levels[std::size_t(level)].geometry);
   }
   open.entry = LevelName(open.entry, level);
   open.check = Seek(open.entry);

@@ -124,6 +124,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const PrefetchQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
   void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);

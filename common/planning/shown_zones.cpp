@@ -1,6 +1,8 @@
 #include "common/planning/shown_zones.h"
 
 #include <algorithm>
+#include <cmath>
+#include <set>
 #include <utility>
 
 #include "common/planning/picture_extent.h"
@@ -23,34 +25,48 @@ LevelMap EmptyMap(const Index3& size, const Index3& block) {
   return map;
 }
 
-class Finder {
+// Parts of a level, `side` voxels each, from coarse to fine: calls found(number of the part, its voxels) for those that the picture shows.
+template <class Found>
+class ShownParts {
  public:
-  Finder(const FrameSetup& setup, LevelMap& map) : setup_(setup), bounds_(setup.description.geometry.bounds()), map_(map) {}
+  ShownParts(const FrameSetup& setup, const Index3& side, Found found)
+      : setup_(setup), bounds_(setup.description.geometry.bounds()), side_(side), found_(std::move(found)) {}
 
-  // Of all zones: voxels of those that the picture shows.
-  std::int64_t Find() { return Find({{0, 0, 0}, map_.counts}); }
-
- private:
-  std::int64_t Find(const Box& zones) {
-    const Box voxels = Intersection({zones.begin * map_.side, zones.end * map_.side}, bounds_);
-    // Voxels show in the picture as far as they reach, and boxes may end so much before the zone does (Partition::OfBlocks).
+  // `parts`: numbers.
+  void Find(const Box& parts) {
+    const Box voxels = Intersection({parts.begin * side_, parts.end * side_}, bounds_);
+    // Voxels show in the picture as far as they reach, and boxes may end so much before the part does (Partition::OfBlocks).
     const Box reached = Grown(voxels, setup_.renderer->reach(), bounds_);
-    if (!setup_.clip.MayKeep(reached) || !InPicture(ExtentOf(reached, {}, setup_.camera), setup_.camera)) return 0;
-    if (zones.voxel_count() == 1) {
-      map_.of_zone[NumberIn(map_.counts, zones.begin)] = 0;
-      return voxels.voxel_count();
-    }
-    const auto length = [&](Axis axis) { return zones.size()[axis] > 1 ? voxels.size()[axis] : 0; };
+    if (!setup_.clip.MayKeep(reached) || !InPicture(ExtentOf(reached, {}, setup_.camera), setup_.camera)) return;
+    if (parts.voxel_count() == 1) return found_(parts.begin, voxels);
+    const auto length = [&](Axis axis) { return parts.size()[axis] > 1 ? voxels.size()[axis] : 0; };
     const Axis longest = std::ranges::max(kAxes, {}, length);
-    Box lower = zones, upper = zones;
-    lower.end[longest] = upper.begin[longest] = zones.begin[longest] + zones.size()[longest] / 2;
-    return Find(lower) + Find(upper);
+    Box lower = parts, upper = parts;
+    lower.end[longest] = upper.begin[longest] = parts.begin[longest] + parts.size()[longest] / 2;
+    Find(lower);
+    Find(upper);
   }
 
+ private:
   const FrameSetup& setup_;
   const Box bounds_;
-  LevelMap& map_;
+  const Index3 side_;
+  Found found_;
 };
+
+// In which order zones matter: what is near first, since it may hide what is far, in layers about two zones thick. Of a layer, what is
+// in the middle of the picture first.
+std::pair<double, double> Place(const Box& zone, const Camera& camera) {
+  constexpr double kZonesInLayer = 2;
+  const Camera::ImageExtent extent = ExtentOf(zone, {}, camera);
+  const Vec3 sides = ToVec3(zone.size()) * camera.spacing;
+  const double layer = kZonesInLayer * std::max({sides.x, sides.y, sides.z});
+  const auto beside = [](double begin, double end, int size) {
+    return std::abs(std::clamp(0.5 * (begin + end), 0.0, double(size)) / size - 0.5);
+  };
+  const double x = beside(extent.x_begin, extent.x_end, camera.width), y = beside(extent.y_begin, extent.y_end, camera.height);
+  return {std::floor(extent.nearest / layer), x * x + y * y};
+}
 
 }  // namespace
 
@@ -58,8 +74,39 @@ std::shared_ptr<const LevelMap> ShownZones(const FrameSetup& setup) {
   if (!setup.stored || !setup.coarser.empty()) return nullptr;
   const VolumeGeometry& geometry = setup.description.geometry;
   LevelMap map = EmptyMap(geometry.size, setup.stored->block.end);
-  const std::int64_t shown = Finder(setup, map).Find();
+  std::int64_t shown = 0;  // voxels
+  ShownParts find(setup, map.side, [&](const Index3& zone, const Box& voxels) {
+    map.of_zone[NumberIn(map.counts, zone)] = 0;
+    shown += voxels.voxel_count();
+  });
+  find.Find({{0, 0, 0}, map.counts});
   return 2 * shown > geometry.bounds().voxel_count() ? nullptr : std::make_shared<const LevelMap>(std::move(map));
+}
+
+std::vector<Box> ShownBlocks(const FrameSetup& setup, std::size_t most) {
+  const VolumeGeometry& geometry = setup.description.geometry;
+  const Index3& side = setup.stored->block.end;
+  const LevelMap map = EmptyMap(geometry.size, side);
+  std::vector<std::pair<std::pair<double, double>, Box>> zones;  // by Place
+  ShownParts find(setup, map.side, [&](const Index3&, const Box& zone) { zones.emplace_back(Place(zone, setup.camera), zone); });
+  find.Find({{0, 0, 0}, map.counts});
+  std::ranges::sort(zones);
+  std::vector<Box> blocks;
+  std::set<Box> met;
+  for (const auto& [place, zone] : zones) {
+    const Box padded = Grown(zone, setup.halo, geometry.bounds());
+    const Index3 first = padded.begin / side, last = (padded.end - Uniform(1)) / side;
+    for (Index3 at = first; at.z <= last.z; ++at.z) {
+      for (at.y = first.y; at.y <= last.y; ++at.y) {
+        for (at.x = first.x; at.x <= last.x; ++at.x) {
+          if (blocks.size() == most) return blocks;
+          const Box block = Intersection({at * side, (at + Uniform(1)) * side}, geometry.bounds());
+          if (met.insert(block).second) blocks.push_back(block);
+        }
+      }
+    }
+  }
+  return blocks;
 }
 
 }  // namespace slabstream

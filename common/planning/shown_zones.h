@@ -5,7 +5,9 @@
 // not looked at more closely.
 #pragma once
 
+#include <cstddef>
 #include <memory>
+#include <vector>
 
 #include "common/frame/frame_setup.h"
 #include "common/planning/level_map.h"
@@ -15,5 +17,9 @@ namespace slabstream {
 // Pure. A map of one level. Null: the frame's volume is not read in parts, has coarser levels beside it, or the picture shows more than
 // half of it; its boxes are then those of all views.
 std::shared_ptr<const LevelMap> ShownZones(const FrameSetup& setup);
+
+// Pure. The blocks (StoredAt::block) of the frame's volume, which is read in parts, that boxes of the zones need that the picture shows: no
+// more than `most`, those that matter first. Near before far, and of what is about as near, in the middle of the picture before its edge.
+std::vector<Box> ShownBlocks(const FrameSetup& setup, std::size_t most);
 
 }  // namespace slabstream

@@ -437,4 +437,18 @@ void Fields(auto& io, Is<PickReply> auto& m) {
   io.Finite("depth", m.depth, &P::depth, &P::set_depth);
 }
 
+v1::PrefetchQuery ProtoOf(const PrefetchQuery&);
+void Fields(auto& io, Is<PrefetchQuery> auto& m) {
+  using P = v1::PrefetchQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+}
+
+v1::PrefetchReply ProtoOf(const PrefetchReply&);
+void Fields(auto& io, Is<PrefetchReply> auto& m) {
+  using P = v1::PrefetchReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Any(m.fetches, &P::fetches, &P::set_fetches);
+}
+
 }  // namespace slabstream

@@ -21,6 +21,9 @@ class ReadContext {
     std::size_t decode_threads = 0;                            // 0: as many as there are cores
     std::uint64_t under_way_bytes = std::uint64_t{128} << 20;  // of chunks that are read or decoded; one chunk may always be
     std::uint64_t cache_bytes = std::uint64_t{64} << 20;       // of decoded chunks that may be needed again
+    // Chunks are read so that the disk keeps them (ObjectCache), and not decoded: sources find none. What the disk has counts as right
+    // without asking the server.
+    bool only_keeps = false;
   };
   explicit ReadContext(const Limits& limits);
   ~ReadContext();
@@ -35,6 +38,7 @@ class ReadContext {
   void Release(std::uint64_t bytes);
 
   ChunkCache& cache();
+  bool only_keeps() const;
 
  private:
   struct State;

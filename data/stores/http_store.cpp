@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <deque>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "common/base/printable.h"
+#include "common/base/time.h"
 #include "common/base/url.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
@@ -20,34 +23,50 @@
 namespace slabstream {
 namespace {
 
-// Which version of each object was seen first; of the last kMost.
+// Which version of each object was seen first, and when the server said so last; of the last kMost.
 class SeenVersions {
  public:
   // False: another version of the object was seen before.
   bool Agrees(const std::string& key, const std::string& version) {
     if (version.empty()) return true;
     const std::lock_guard lock(mutex_);
-    const auto [found, is_new] = versions_.try_emplace(key, version);
-    if (!is_new) return found->second == version;
+    const auto [found, is_new] = seen_.try_emplace(key, Seen{version});
+    if (!is_new) return found->second.version == version;
     order_.push_back(key);
     if (order_.size() > kMost) {
-      versions_.erase(order_.front());
+      seen_.erase(order_.front());
       order_.pop_front();
     }
     return true;
   }
+  // The server says that this is its version of an object that Agrees has met.
+  void NoteSaid(const std::string& key, const std::string& version) {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = seen_.find(key); found != seen_.end() && found->second.version == version) found->second.said = MonotonicNow();
+  }
+  // Whether the server said a short while ago that it has this version of the object.
+  bool IsFresh(const std::string& key, const std::string& version) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = seen_.find(key);
+    return found != seen_.end() && found->second.version == version && found->second.said && MonotonicNow() - *found->second.said < kFresh;
+  }
 
  private:
+  struct Seen {
+    std::string version;
+    std::optional<Time> said;
+  };
   static constexpr std::size_t kMost = 65536;
-  std::mutex mutex_;
-  std::map<std::string, std::string> versions_;
+  static constexpr Duration kFresh = std::chrono::minutes(1);
+  mutable std::mutex mutex_;  // guards what follows
+  std::map<std::string, Seen> seen_;
   std::deque<std::string> order_;
 };
 
 class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStoreImpl> {
  public:
-  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, ObjectCache* cache)
-      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), cache_(cache) {}
+  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, ObjectCache* cache, KeptObjects kept)
+      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), cache_(cache), kept_(kept) {}
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
@@ -73,7 +92,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         if (most == 0) return done(Printable(Status::ResourceExhausted(get.url + ": nothing may be read of it")));
       }
     }
-    Get(std::move(get), [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
+    Get(key, std::move(get), [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
       if (!object.ok()) return done(object.status());
       if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
       const bool cut = range.bytes != ByteRange::kAll && range.bytes > most && object->size > range.begin + most;
@@ -90,20 +109,24 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string& name() const override { return url_; }
 
  private:
-  // Bytes that the disk has come from there, once the server says that they are still right. The disk is asked, and gets what the server
-  // sends, on threads that read files.
-  void Get(HttpGet get, HttpTransfers::Done done) {
+  // Bytes that the disk has come from there, if the server has said within kFresh that they are still right, or says so now. The disk is
+  // asked, and gets what the server sends, on threads that read files.
+  void Get(const std::string& key, HttpGet get, HttpTransfers::Done done) {
     if (cache_ == nullptr) return transfers_.Get(std::move(get), std::move(done));
-    PostRead(
-        [self = shared_from_this(), get = std::move(get), done = std::move(done)]() mutable { self->GetOrFind(std::move(get), done); });
+    PostRead([self = shared_from_this(), key, get = std::move(get), done = std::move(done)]() mutable {
+      self->GetOrFind(key, std::move(get), done);
+    });
   }
 
-  void GetOrFind(HttpGet get, const HttpTransfers::Done& done) {
+  void GetOrFind(const std::string& key, HttpGet get, const HttpTransfers::Done& done) {
     const std::string name = get.span ? fmt::format("{} {}+{}", get.url, get.span->begin, get.span->bytes) : get.url;
     std::optional<ObjectCache::Entry> kept = cache_->Find(name);
     if (kept && kept->bytes.size() > get.most) kept.reset();
+    if (kept && (kept_ == KeptObjects::kAreTaken || seen_.IsFresh(key, kept->version))) {
+      return done(HttpObject{.bytes = std::move(kept->bytes), .size = kept->size, .version = std::move(kept->version)});
+    }
     if (kept) get.known = kept->version;
-    transfers_.Get(std::move(get), [self = shared_from_this(), name, done, kept = std::move(kept)](Result<HttpObject> object) {
+    transfers_.Get(std::move(get), [self = shared_from_this(), key, name, done, kept = std::move(kept)](Result<HttpObject> object) {
       if (object.ok() && object->unchanged) {
         object->bytes = kept->bytes;
         object->size = kept->size;
@@ -111,7 +134,9 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         // Strong ETags alone: two versions may have the same time, or the same weak ETag.
         self->Keep(name, {object->version, object->size, object->bytes});
       }
+      const std::string version = object.ok() ? object->version : "";
       done(std::move(object));
+      if (!version.empty()) self->seen_.NoteSaid(key, version);
     });
   }
 
@@ -137,13 +162,14 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::shared_ptr<const S3Access> access_;
   HttpTransfers& transfers_;
   ObjectCache* const cache_;
+  const KeptObjects kept_;
   std::atomic<std::uint64_t> unwritten_ = 0;  // bytes on their way to it
   SeenVersions seen_;
 };
 
 }  // namespace
 
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache) {
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache, KeptObjects kept) {
   std::string url = address;
   std::shared_ptr<const S3Access> access;
   if (address.starts_with(kBucketScheme)) {
@@ -161,7 +187,7 @@ Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfe
   }
   if (url.find_first_of("?#") != std::string::npos) return wrong("must have no '?' or '#'");
   while (url.ends_with('/') && url.size() > path) url.pop_back();
-  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers, cache));
+  return std::shared_ptr<Store>(std::make_shared<HttpStoreImpl>(std::move(url), std::move(access), transfers, cache, kept));
 }
 
 }  // namespace slabstream

@@ -61,14 +61,16 @@ std::shared_ptr<Store> FolderStore(const std::string& path);
 Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;
 class ObjectCache;
+enum class KeptObjects : std::uint8_t { kAreChecked, kAreTaken };  // in the cache: the server is asked whether they are still right, or not
 // The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
 // by `transfers`, and kept in `cache`, if any; both must outlive it. Asks for nothing yet. It does not list. InvalidArgument: another
 // address, or one with a name, a password, a query or a fragment; as FindS3Place.
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache = nullptr);
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache = nullptr,
+                                         KeptObjects kept = KeptObjects::kAreChecked);
 // One file: its only object has the key "file". Does not check that it exists.
 std::shared_ptr<Store> FileStore(const std::string& path);
 
 // An address (IsUrl), folder, zip archive (.zip, .ozx) or file. NotFound: there is nothing. Errors of HttpStore and ZipStore.
-Result<std::shared_ptr<Store>> OpenStore(const std::string& path);
+Result<std::shared_ptr<Store>> OpenStore(const std::string& path, KeptObjects kept = KeptObjects::kAreChecked);
 
 }  // namespace slabstream

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "data/metadata/open_store_for.h"
 #include "data/sources/chunked_source.h"
 #include "data/zarr/zarr_node.h"
 #include "data/zarr/zarr_pyramid.h"
@@ -26,7 +27,7 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStore(path);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();

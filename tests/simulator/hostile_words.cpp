@@ -65,7 +65,7 @@ ClientToCoordinator HostileWords::OfClient(const Policy& policy) {
 }
 
 ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
-  switch (random_.Integer(0, 12)) {
+  switch (random_.Integer(0, 13)) {
     case 0:
     case 1: {
       SubmitFrame submit = RandomRequest(random_, policy, Number(), random_.Chance(0.5) ? Number32() : random_.Integer(1U, 86400000U));
@@ -95,6 +95,7 @@ ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
       add.description.geometry.size = Uniform(random_.Integer(1, kMaxVolumeSide));
       return add;
     }
+    case 12: return PrefetchQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
     default: return SampleQuery{.nonce = Number(), .dataset = random_.Chance(0.5) ? "volume" : "nonesuch", .points = {{1, 2, 3}}};
   }
 }

@@ -560,6 +560,16 @@ std::vector<PickReply> SamplesOf() {
 }
 
 template <>
+std::vector<PrefetchQuery> SamplesOf() {
+  return {{.frame = Request()}, {kMax64, Request()}};
+}
+
+template <>
+std::vector<PrefetchReply> SamplesOf() {
+  return {{}, {kMax64, true}};
+}
+
+template <>
 std::vector<AddVolume> SamplesOf() {
   return {{.name = "a", .description = Description(), .layers = {}, .labels = {}},
           {kMax64,

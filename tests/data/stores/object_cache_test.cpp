@@ -168,5 +168,44 @@ TEST_F(ObjectCacheTest, WithoutAStrongETagNothingIsKept) {
   }
 }
 
+TEST_F(ObjectCacheTest, AStoreMayTakeWhatIsKeptWithoutAskingForIt) {
+  std::atomic<int> asked = 0;
+  ScriptedServer server([&](const ServerRequest&) {
+    ++asked;
+    return AnswerText("200 OK", "served", "ETag: \"v2\"\r\n");
+  });
+  ObjectCache cache = Open();
+  cache.Keep(server.url() + "/volume/old", {"\"v1\"", 4, BytesOf("kept")});
+  HttpTransfers transfers({});
+  const std::shared_ptr<Store> checks = HttpStore(server.url() + "/volume", transfers, &cache).value(),
+                               takes = HttpStore(server.url() + "/volume", transfers, &cache, KeptObjects::kAreTaken).value();
+  EXPECT_EQ(TextOf(ReadNow(*takes, "old").value()), "kept");
+  EXPECT_EQ(asked, 0);
+  EXPECT_EQ(TextOf(ReadNow(*takes, "new").value()), "served");
+  EXPECT_EQ(asked, 1);
+  EXPECT_EQ(TextOf(ReadNow(*checks, "old").value()), "served");
+  EXPECT_EQ(asked, 2);
+}
+
+TEST_F(ObjectCacheTest, WhatTheServerHasJustSaidIsNotAskedAgain) {
+  std::atomic<int> asked = 0;
+  ScriptedServer server([&](const ServerRequest& request) {
+    ++asked;
+    if (request.header("if-none-match") == "\"v1\"") return AnswerText("304 Not Modified", "", "ETag: \"v1\"\r\n");
+    return AnswerText("200 OK", "served", "ETag: \"v1\"\r\n");
+  });
+  ObjectCache cache = Open();
+  HttpTransfers transfers({});
+  const std::shared_ptr<Store> store = HttpStore(server.url(), transfers, &cache).value();
+  EXPECT_EQ(TextOf(ReadNow(*store, "object").value()), "served");
+  while (!cache.Find(server.url() + "/object")) std::this_thread::yield();
+  const int before = asked;
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(TextOf(ReadNow(*store, "object").value()), "served");
+  EXPECT_EQ(asked, before);
+  const std::shared_ptr<Store> later = HttpStore(server.url(), transfers, &cache).value();
+  EXPECT_EQ(TextOf(ReadNow(*later, "object").value()), "served");
+  EXPECT_EQ(asked, before + 1) << "another process does not know what the server said";
+}
+
 }  // namespace
 }  // namespace slabstream

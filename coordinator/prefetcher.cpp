@@ -1,0 +1,142 @@
+#include "coordinator/prefetcher.h"
+
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "common/base/guarded.h"
+#include "common/base/log.h"
+#include "common/base/url.h"
+#include "data/open/any_volume.h"
+#include "data/open/open_source.h"
+#include "data/stores/object_cache.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::size_t kMostWishes = 8, kMostSources = 8;
+constexpr std::size_t kMostFetched = 1 << 16;  // blocks that are remembered
+
+// Few threads and little memory: nothing is decoded.
+SourceContext MakeContext() {
+  return std::make_shared<ReadContext>(
+      ReadContext::Limits{.decode_threads = 1, .under_way_bytes = std::uint64_t{32} << 20, .cache_bytes = 0, .only_keeps = true});
+}
+
+}  // namespace
+
+struct Prefetcher::State : std::enable_shared_from_this<State> {
+  using Place = std::pair<std::string, std::uint64_t>;  // a source, and its version
+  using Block = std::tuple<Place, int, Box>;            // at a level
+  struct Wish {
+    Place place;
+    std::shared_ptr<VolumeSource> source;
+    int level = 0;
+    std::deque<Box> blocks;
+    Time until;
+  };
+
+  std::mutex mutex;  // guards what follows
+  SourceContext context;
+  std::map<Place, std::shared_ptr<VolumeSource>> sources;
+  std::deque<Wish> wishes;  // newest first
+  std::set<Block> fetched;  // or under way
+  std::size_t under_way = 0;
+  std::stop_source stop;
+
+  // The next block to fetch; none: nobody wants any, or enough are under way.
+  std::optional<Wish> TakeNext() {
+    const std::lock_guard lock(mutex);
+    std::erase_if(wishes, [now = MonotonicNow()](const Wish& wish) { return wish.blocks.empty() || wish.until < now; });
+    if (stop.stop_requested() || under_way == kAtOnce) return std::nullopt;
+    for (Wish& wish : wishes) {
+      while (!wish.blocks.empty()) {
+        const Box block = wish.blocks.front();
+        wish.blocks.pop_front();
+        if (fetched.size() >= kMostFetched) fetched.clear();
+        if (!fetched.insert({wish.place, wish.level, block}).second) continue;
+        ++under_way;
+        return Wish{wish.place, wish.source, wish.level, {block}, wish.until};
+      }
+    }
+    return std::nullopt;
+  }
+
+  void FetchNext() {
+    while (std::optional<Wish> next = TakeNext()) {
+      const Box block = next->blocks.front();
+      const ScalarType type = next->source->info().levels[std::size_t(next->level)].description.type;
+      // Nothing is decoded, so what comes is the value of chunks that are not there.
+      const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(block.voxel_count()) * BytesPerSample(type));
+      const auto done = [self = shared_from_this(), unused, next = *next](const Status& status) { self->End(next, status); };
+      const Status begun = Guarded("fetching ahead", [&] {
+        next->source->Read(next->level, block, *unused, stop.get_token(), done);
+        return Status::Ok();
+      });
+      if (!begun.ok()) End(*next, begun);
+    }
+  }
+
+  void End(const Wish& ended, const Status& status) {
+    {
+      const std::lock_guard lock(mutex);
+      --under_way;
+      if (!status.ok()) {  // frames that need it say what is wrong
+        fetched.erase({ended.place, ended.level, ended.blocks.front()});
+        std::erase_if(wishes, [&](const Wish& wish) { return wish.place == ended.place; });
+        sources.erase(ended.place);
+      }
+    }
+    if (!status.ok()) LogDebug("fetches nothing ahead: " + status.message());
+    FetchNext();
+  }
+
+  Result<std::shared_ptr<VolumeSource>> SourceAt(const StoredAt& stored) {
+    const Place place{stored.source, stored.version};
+    SourceContext of_sources;
+    {
+      const std::lock_guard lock(mutex);
+      if (const auto found = sources.find(place); found != sources.end()) return found->second;
+      if (context == nullptr) context = MakeContext();
+      of_sources = context;
+    }
+    const Result<SourceText> text = ParseSourceText(stored.source);
+    if (!text.ok()) return text.status();
+    Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, of_sources);
+    if (!source.ok()) return source;
+    if ((*source)->info().version != stored.version) return Status::Unavailable(text->path + ": has changed since it was opened");
+    const std::lock_guard lock(mutex);
+    if (sources.size() >= kMostSources) sources.clear();
+    sources.try_emplace(place, *source);
+    return source;
+  }
+};
+
+Prefetcher::Prefetcher() : state_(std::make_shared<State>()) {}
+Prefetcher::~Prefetcher() { state_->stop.request_stop(); }
+
+bool Prefetcher::Fetches(const StoredAt& stored) {
+  const Result<SourceText> text = ParseSourceText(stored.source);
+  return text.ok() && IsUrl(text->path) && ProcessObjectCache() != nullptr;
+}
+
+Status Prefetcher::Fetch(const StoredAt& stored, std::vector<Box> blocks) {
+  Result<std::shared_ptr<VolumeSource>> source = state_->SourceAt(stored);
+  if (!source.ok()) return source.status();
+  {
+    const std::lock_guard lock(state_->mutex);
+    state_->wishes.push_front(
+        {{stored.source, stored.version}, *std::move(source), stored.level, {blocks.begin(), blocks.end()}, MonotonicNow() + kLasts});
+    if (state_->wishes.size() > kMostWishes) state_->wishes.pop_back();
+  }
+  state_->FetchNext();
+  return Status::Ok();
+}
+
+}  // namespace slabstream
