@@ -19,7 +19,7 @@ namespace slabstream {
 class Prefetcher {
  public:
   static constexpr std::size_t kAtOnce = 8;         // half of the requests that a process has under way (HttpTransfers::kMostOfAHost)
-  static constexpr std::size_t kMostBlocks = 4096;  // of a wish
+  static constexpr std::size_t kMostBlocks = 1024;  // of a wish: what lies behind so many is mostly hidden
   static constexpr Duration kLasts = std::chrono::seconds(1);
 
   Prefetcher();
