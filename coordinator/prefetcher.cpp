@@ -13,13 +13,15 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/url.h"
-#include "data/open/any_volume.h"
-#include "data/open/open_source.h"
+#include "data/open/same_source.h"
+#include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
 
+constexpr std::size_t kAtOnce = HttpTransfers::kMostOfAHost / 2;
 constexpr std::size_t kMostWishes = 8, kMostSources = 8;
 constexpr std::size_t kMostFetched = 1 << 16;  // blocks that are remembered
 
@@ -33,11 +35,18 @@ SourceContext MakeContext() {
 
 struct Prefetcher::State : std::enable_shared_from_this<State> {
   using Place = std::pair<std::string, std::uint64_t>;  // a source, and its version
-  using Block = std::tuple<Place, int, Box>;            // at a level
-  struct Wish {
+  struct Level {
     Place place;
     std::shared_ptr<VolumeSource> source;
-    int level = 0;
+    int number = 0;
+  };
+  struct Block {
+    Level level;
+    Box box;
+    std::tuple<Place, int, Box> name() const { return {level.place, level.number, box}; }
+  };
+  struct Wish {
+    Level level;
     std::deque<Box> blocks;
     Time until;
   };
@@ -45,52 +54,52 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
   std::mutex mutex;  // guards what follows
   SourceContext context;
   std::map<Place, std::shared_ptr<VolumeSource>> sources;
-  std::deque<Wish> wishes;  // newest first
-  std::set<Block> fetched;  // or under way
+  std::deque<Wish> wishes;                        // newest first
+  std::set<std::tuple<Place, int, Box>> fetched;  // names; or under way
   std::size_t under_way = 0;
   std::stop_source stop;
 
   // The next block to fetch; none: nobody wants any, or enough are under way.
-  std::optional<Wish> TakeNext() {
+  std::optional<Block> TakeNext() {
     const std::lock_guard lock(mutex);
     std::erase_if(wishes, [now = MonotonicNow()](const Wish& wish) { return wish.blocks.empty() || wish.until < now; });
     if (stop.stop_requested() || under_way == kAtOnce) return std::nullopt;
     for (Wish& wish : wishes) {
       while (!wish.blocks.empty()) {
-        const Box block = wish.blocks.front();
+        Block next{wish.level, wish.blocks.front()};
         wish.blocks.pop_front();
         if (fetched.size() >= kMostFetched) fetched.clear();
-        if (!fetched.insert({wish.place, wish.level, block}).second) continue;
+        if (!fetched.insert(next.name()).second) continue;
         ++under_way;
-        return Wish{wish.place, wish.source, wish.level, {block}, wish.until};
+        return next;
       }
     }
     return std::nullopt;
   }
 
   void FetchNext() {
-    while (std::optional<Wish> next = TakeNext()) {
-      const Box block = next->blocks.front();
-      const ScalarType type = next->source->info().levels[std::size_t(next->level)].description.type;
+    while (const std::optional<Block> next = TakeNext()) {
+      const auto& [level, box] = *next;
+      const ScalarType type = level.source->info().levels[std::size_t(level.number)].description.type;
       // Nothing is decoded, so what comes is the value of chunks that are not there.
-      const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(block.voxel_count()) * BytesPerSample(type));
+      const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(box.voxel_count()) * BytesPerSample(type));
       const auto done = [self = shared_from_this(), unused, next = *next](const Status& status) { self->End(next, status); };
       const Status begun = Guarded("fetching ahead", [&] {
-        next->source->Read(next->level, block, *unused, stop.get_token(), done);
+        next->level.source->Read(next->level.number, next->box, *unused, stop.get_token(), done);
         return Status::Ok();
       });
       if (!begun.ok()) End(*next, begun);
     }
   }
 
-  void End(const Wish& ended, const Status& status) {
+  void End(const Block& ended, const Status& status) {
     {
       const std::lock_guard lock(mutex);
       --under_way;
       if (!status.ok()) {  // frames that need it say what is wrong
-        fetched.erase({ended.place, ended.level, ended.blocks.front()});
-        std::erase_if(wishes, [&](const Wish& wish) { return wish.place == ended.place; });
-        sources.erase(ended.place);
+        fetched.erase(ended.name());
+        std::erase_if(wishes, [&](const Wish& wish) { return wish.level.place == ended.level.place; });
+        sources.erase(ended.level.place);
       }
     }
     if (!status.ok()) LogDebug("fetches nothing ahead: " + status.message());
@@ -106,11 +115,8 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
       if (context == nullptr) context = MakeContext();
       of_sources = context;
     }
-    const Result<SourceText> text = ParseSourceText(stored.source);
-    if (!text.ok()) return text.status();
-    Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, of_sources);
+    Result<std::shared_ptr<VolumeSource>> source = OpenSameSource(stored, of_sources);
     if (!source.ok()) return source;
-    if ((*source)->info().version != stored.version) return Status::Unavailable(text->path + ": has changed since it was opened");
     const std::lock_guard lock(mutex);
     if (sources.size() >= kMostSources) sources.clear();
     sources.try_emplace(place, *source);
@@ -132,7 +138,7 @@ Status Prefetcher::Fetch(const StoredAt& stored, std::vector<Box> blocks) {
   {
     const std::lock_guard lock(state_->mutex);
     state_->wishes.push_front(
-        {{stored.source, stored.version}, *std::move(source), stored.level, {blocks.begin(), blocks.end()}, MonotonicNow() + kLasts});
+        {{{stored.source, stored.version}, *std::move(source), stored.level}, {blocks.begin(), blocks.end()}, MonotonicNow() + kLasts});
     if (state_->wishes.size() > kMostWishes) state_->wishes.pop_back();
   }
   state_->FetchNext();

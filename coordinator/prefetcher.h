@@ -1,6 +1,6 @@
 // Prefetcher: fetches blocks that pictures will probably show from web servers, so that this host keeps them on disk (ObjectCache). Frames
-// that show them later find them there. It asks for a few at a time, so what frames wait for hardly waits for it. The newest wish comes
-// first, and a wish lasts for kLasts: whoever turns a view sends new ones.
+// that show them later find them there. It asks for half as much at a time as a process may, so what frames wait for hardly waits for it.
+// The newest wish comes first, and a wish lasts for kLasts: whoever turns a view sends new ones.
 #pragma once
 
 #include <chrono>
@@ -18,7 +18,6 @@ namespace slabstream {
 
 class Prefetcher {
  public:
-  static constexpr std::size_t kAtOnce = 8;         // half of the requests that a process has under way (HttpTransfers::kMostOfAHost)
   static constexpr std::size_t kMostBlocks = 1024;  // of a wish: what lies behind so many is mostly hidden
   static constexpr Duration kLasts = std::chrono::seconds(1);
 
@@ -31,7 +30,7 @@ class Prefetcher {
   static bool Fetches(const StoredAt& stored);
 
   // Begins to fetch `blocks`, the first one first, but for those that it has fetched lately. Waits while the source is opened. Any thread.
-  // Unavailable and errors of OpenSource: it cannot be read, or has changed.
+  // Errors of OpenSameSource.
   Status Fetch(const StoredAt& stored, std::vector<Box> blocks);
 
  private:

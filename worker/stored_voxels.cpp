@@ -15,24 +15,12 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "data/open/any_volume.h"
-#include "data/open/open_source.h"
+#include "data/open/same_source.h"
 
 namespace slabstream {
 namespace {
 
 constexpr std::size_t kOpensAtOnce = 2;  // so one file system that does not answer leaves others alone
-
-// The source if it is what the coordinator has. InvalidArgument: it is another one.
-Result<std::shared_ptr<VolumeSource>> OpenSame(const StoredAt& stored) {
-  const Result<SourceText> text = ParseSourceText(stored.source);
-  if (!text.ok()) return text.status();
-  Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
-  if (!source.ok()) return source;
-  const SourceInfo& info = (*source)->info();
-  const bool same = info.version == stored.version && std::size_t(stored.level) < info.levels.size() &&
-                    info.levels[std::size_t(stored.level)].block == stored.block.end;
-  return same ? source : Status::InvalidArgument(text->path + ": another one than the coordinator's");
-}
 
 }  // namespace
 
@@ -71,7 +59,8 @@ struct StoredVoxels::Shared {
 
   void Find(const StoredAt& stored, const std::shared_ptr<Shared>& self) {
     opening.Post([self, stored] {
-      Result<std::shared_ptr<VolumeSource>> source = Guarded("a source of voxels", [&] { return OpenSame(stored); });
+      Result<std::shared_ptr<VolumeSource>> source =
+          Guarded("a source of voxels", [&] { return OpenSameSource(stored, ProcessReadContext()); });
       LogInfo(source.ok() ? "reads " + stored.source + " itself" : "asks the coordinator for voxels: " + source.status().message());
       const std::lock_guard lock(self->mutex);
       const auto place = self->places.find({stored.source, stored.version});

@@ -49,7 +49,7 @@ Progress ProgressOf(const FrameProgress& progress) {
           .workers = int(progress.workers)};
 }
 
-// Calls function(y, first) for each row of the bounds; `first` is its first pixel in a picture that is `width` pixels wide.
+// For each row y of the bounds, calls function(y, first). The picture is `width` pixels wide, and the row begins at its pixel `first`.
 template <class Function>
 void ForEachRow(const PixelBounds& bounds, int width, Function&& function) {
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) function(y, std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));
@@ -119,11 +119,7 @@ std::vector<float> Image::Depth() const {
   const PictureImage& image = impl_->picture.image;
   if (!image.has_depth()) return {};
   std::vector<float> depth(std::size_t(width()) * std::size_t(height()), std::numeric_limits<float>::infinity());
-  auto from = image.floats()->depth.begin();
-  ForEachRow(image.bounds(), width(), [&](int, std::size_t first) {
-    std::copy_n(from, image.bounds().width(), depth.begin() + std::ptrdiff_t(first));
-    from += image.bounds().width();
-  });
+  ForEachRow(image.bounds(), width(), [&](int y, std::size_t first) { image.ReadDepths(y, &depth[first]); });
   return depth;
 }
 

@@ -31,7 +31,7 @@ void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) 
     std::vector<float> colors(4 * width);
     image_->ReadColors(y, colors.data());
     OverRow(colors.data(), out, out, width);
-    if (!depth.empty()) std::copy_n(image_->floats()->depth.data() + std::size_t(y - b.y_begin) * width, width, depth.data() + left);
+    if (!depth.empty()) image_->ReadDepths(y, depth.data() + left);
   }
   annotations_.PutOver(y, rgba);
 }

@@ -25,6 +25,11 @@ void PictureImage::ReadColors(std::int32_t y, float* rgba) const {
   }
 }
 
+void PictureImage::ReadDepths(std::int32_t y, float* depth) const {
+  const auto width = std::size_t(bounds().width());
+  std::copy_n(floats()->depth.data() + width * std::size_t(y - bounds().y_begin), width, depth);
+}
+
 bool PictureImage::IsEmpty() const {
   return VisitColors(*this, [pixels = std::size_t(bounds().pixel_count())](const auto* rgba) {
     for (std::size_t i = 0; i < pixels; ++i) {

@@ -28,6 +28,8 @@ class PictureImage {
 
   // Premultiplied colours of row y of the bounds, counted in the picture: 4 * bounds().width() floats.
   void ReadColors(std::int32_t y, float* rgba) const;
+  // Depths of the row, if the picture has any: bounds().width() floats.
+  void ReadDepths(std::int32_t y, float* depth) const;
   bool IsEmpty() const;  // no pixel shows anything
   // The smallest rectangle that holds all pixels that are not empty; empty if there are none.
   PixelBounds ContentBounds() const;

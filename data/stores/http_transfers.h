@@ -49,7 +49,8 @@ struct HttpObject {
 class HttpTransfers {
  public:
   static constexpr std::size_t kMostOfAHost = 16;  // requests under way at a time; others wait for their turn
-  // Of a request for several parts: bytes in all, and bytes that nobody has asked for between two parts, which cost less than a request.
+  // Parts of an object that become one request have at most so many bytes together, and so many unwanted ones between each two: these cost
+  // less than another request.
   static constexpr std::uint64_t kMostTogether = std::uint64_t{4} << 20, kMostBetween = std::uint64_t{16} << 10;
   static constexpr int kTries = 6;
   static constexpr Duration kFirstPause = std::chrono::milliseconds(200), kLongestPause = std::chrono::seconds(30);

@@ -142,8 +142,8 @@ class Service(contextlib.AbstractContextManager["Service"]):
 
     @takes_options_of("render")
     def prefetch(self, dataset: str, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> bool:
-        """Says that the picture with these options may be asked for soon: the service fetches what it shows from the dataset's web server and
-        keeps it on disk (`--cache`), a few blocks at a time, for some seconds. False: the dataset lies behind no web server, or the service
+        """Says that the picture with these options may be asked for soon. For a second, the service fetches what it shows from the dataset's web
+        server, a few blocks at a time, and keeps it on disk (`--cache`). False: the dataset lies behind no web server, or the service
         keeps nothing on disk."""
         query = schema.PrefetchQuery(frame=draft_of(dataset, options).frame)
         return bool(self._connection.ask("prefetch_query", query, timeout).fetches)

@@ -46,12 +46,10 @@ PointZBuffer Draw(const PointsCase& of, const Volume& volume, double* seconds = 
 // Of the whole picture; +infinity where there is no face.
 std::vector<float> DepthsOfFaces(ExperimentContext& context, const PointsCase& of) {
   const Picture picture = RenderAlone(context, of.frame.volume, of.frame.view, of.side());
-  const LocalImage& image = *picture.image.floats();
-  const PixelBounds& bounds = image.bounds;
+  const PixelBounds& bounds = picture.image.bounds();
   std::vector<float> depths(std::size_t(of.side()) * std::size_t(of.side()), std::numeric_limits<float>::infinity());
-  for (int row = 0; row < bounds.height(); ++row) {
-    const auto first = image.depth.begin() + std::ptrdiff_t{row} * bounds.width();
-    std::copy_n(first, bounds.width(), depths.begin() + std::ptrdiff_t{bounds.y_begin + row} * of.side() + bounds.x_begin);
+  for (int y = bounds.y_begin; y < bounds.y_end; ++y) {
+    picture.image.ReadDepths(y, &depths[std::size_t(y) * std::size_t(of.side()) + std::size_t(bounds.x_begin)]);
   }
   return depths;
 }

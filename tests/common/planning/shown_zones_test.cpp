@@ -15,6 +15,11 @@ VolumeSummary UnreadLevel(const Index3& size, const Index3& block) {
   return summary;
 }
 
+bool IsInPicture(const Vec3& p, const Camera& camera) {
+  const Camera::ImagePoint at = camera.Project(p);
+  return at.depth > 0 && at.x >= 0 && at.y >= 0 && at.x <= camera.width && at.y <= camera.height;
+}
+
 TEST(ShownZones, EveryVoxelThatThePictureShowsLiesInOne) {
   Random random(83);
   SCOPED_TRACE(random.trace());
@@ -45,9 +50,7 @@ TEST(ShownZones, EveryVoxelThatThePictureShowsLiesInOne) {
       const Index3 voxel = {random.Integer(0, size.x - 1), random.Integer(0, size.y - 1), random.Integer(0, size.z - 1)};
       const Vec3 p = {double(voxel.x), double(voxel.y), double(voxel.z)};
       if (!std::ranges::all_of(setup.clip.sides, [&](const HalfSpace& side) { return side.Distance(p) >= 0; })) continue;
-      const Camera::ImagePoint at = setup.camera.Project(p);
-      const bool in_picture = at.depth > 0 && at.x >= 0 && at.y >= 0 && at.x <= setup.camera.width && at.y <= setup.camera.height;
-      if (!in_picture) continue;
+      if (!IsInPicture(p, setup.camera)) continue;
       EXPECT_EQ(map->Of({voxel.x / map->side.x, voxel.y / map->side.y, voxel.z / map->side.z}), 0)
           << "round " << round << ", voxel " << voxel.x << ", " << voxel.y << ", " << voxel.z;
     }
@@ -70,8 +73,7 @@ TEST(ShownBlocks, HoldEveryVoxelThatThePictureShows) {
     const std::vector<Box> blocks = ShownBlocks(setup, 1 << 20);
     for (int i = 0; i < 500; ++i) {
       const Index3 voxel = {random.Integer(0, size.x - 1), random.Integer(0, size.y - 1), random.Integer(0, size.z - 1)};
-      const Camera::ImagePoint at = setup.camera.Project({double(voxel.x), double(voxel.y), double(voxel.z)});
-      if (!(at.depth > 0 && at.x >= 0 && at.y >= 0 && at.x <= setup.camera.width && at.y <= setup.camera.height)) continue;
+      if (!IsInPicture({double(voxel.x), double(voxel.y), double(voxel.z)}, setup.camera)) continue;
       const Index3 begin = voxel / side * side;
       EXPECT_EQ(std::ranges::count(blocks, Intersection({begin, begin + side}, {{0, 0, 0}, size})), 1) << "round " << round;
       ++shown;
