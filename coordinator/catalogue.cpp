@@ -207,8 +207,9 @@ Status BeingWritten(const DataSource& source) {
 // on. Whoever writes them piece by piece is also likely to have come to an end.
 void AwaitRest(const FileStamp& stamp) {
   constexpr std::chrono::milliseconds kRest(50);
-  const auto age = std::chrono::system_clock::now() - stamp.newest;
-  if (age >= age.zero() && age < kRest) std::this_thread::sleep_for(kRest - age);  // a clock that is ahead of ours tells nothing
+  const auto now = std::chrono::system_clock::now();
+  const bool is_fresh = stamp.newest > now - kRest && stamp.newest <= now;  // a clock that is ahead of ours tells nothing
+  if (is_fresh) std::this_thread::sleep_for(kRest - (now - stamp.newest));
 }
 
 // How a source is read: what of it may change, and the reading.

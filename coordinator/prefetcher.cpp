@@ -57,13 +57,15 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
   std::deque<Wish> wishes;                        // newest first
   std::set<std::tuple<Place, int, Box>> fetched;  // names; or under way
   std::size_t under_way = 0;
+  bool fetching = false;  // a thread begins what is next
   std::stop_source stop;
 
-  // The next block to fetch; none: nobody wants any, or enough are under way.
+  // The next block to fetch; none: nobody wants any, or enough are under way, and `fetching` ends.
   std::optional<Block> TakeNext() {
     const std::lock_guard lock(mutex);
     std::erase_if(wishes, [now = MonotonicNow()](const Wish& wish) { return wish.blocks.empty() || wish.until < now; });
-    if (stop.stop_requested() || under_way == kAtOnce) return std::nullopt;
+    fetching = !stop.stop_requested() && under_way < kAtOnce;
+    if (!fetching) return std::nullopt;
     for (Wish& wish : wishes) {
       while (!wish.blocks.empty()) {
         Block next{wish.level, wish.blocks.front()};
@@ -74,18 +76,25 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
         return next;
       }
     }
+    fetching = false;
     return std::nullopt;
   }
 
   void FetchNext() {
+    {
+      // A block that ends at once calls this again. The loop that is under way then begins the next one, so calls do not nest deeper and
+      // deeper.
+      const std::lock_guard lock(mutex);
+      if (std::exchange(fetching, true)) return;
+    }
     while (const std::optional<Block> next = TakeNext()) {
       const auto& [level, box] = *next;
       const ScalarType type = level.source->info().levels[std::size_t(level.number)].description.type;
-      // Nothing is decoded, so what comes is the value of chunks that are not there.
-      const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(box.voxel_count()) * BytesPerSample(type));
-      const auto done = [self = shared_from_this(), unused, next = *next](const Status& status) { self->End(next, status); };
       const Status begun = Guarded("fetching ahead", [&] {
-        next->level.source->Read(next->level.number, next->box, *unused, stop.get_token(), done);
+        // Nothing is decoded, so what comes is the value of chunks that are not there.
+        const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(box.voxel_count()) * BytesPerSample(type));
+        const auto done = [self = shared_from_this(), unused, next = *next](const Status& status) { self->End(next, status); };
+        level.source->Read(level.number, box, *unused, stop.get_token(), done);
         return Status::Ok();
       });
       if (!begun.ok()) End(*next, begun);

@@ -4,10 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
-#include <deque>
-#include <map>
-#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -18,66 +14,33 @@
 #include "data/stores/object_cache.h"
 #include "data/stores/object_key.h"
 #include "data/stores/read_threads.h"
+#include "data/stores/seen_objects.h"
 #include "data/stores/store.h"
 
 namespace slabstream {
 namespace {
 
-// Which version of each object was seen first, and when the server said so last; of the last kMost.
-class SeenVersions {
- public:
-  // False: another version of the object was seen before.
-  bool Agrees(const std::string& key, const std::string& version) {
-    if (version.empty()) return true;
-    const std::lock_guard lock(mutex_);
-    const auto [found, is_new] = seen_.try_emplace(key, Seen{version});
-    if (!is_new) return found->second.version == version;
-    order_.push_back(key);
-    if (order_.size() > kMost) {
-      seen_.erase(order_.front());
-      order_.pop_front();
-    }
-    return true;
-  }
-  // The server says that this is its version of an object that Agrees has met.
-  void NoteSaid(const std::string& key, const std::string& version) {
-    const std::lock_guard lock(mutex_);
-    if (const auto found = seen_.find(key); found != seen_.end() && found->second.version == version) found->second.said = MonotonicNow();
-  }
-  // Whether the server said a short while ago that it has this version of the object.
-  bool IsFresh(const std::string& key, const std::string& version) const {
-    const std::lock_guard lock(mutex_);
-    const auto found = seen_.find(key);
-    return found != seen_.end() && found->second.version == version && found->second.said && MonotonicNow() - *found->second.said < kFresh;
-  }
-
- private:
-  struct Seen {
-    std::string version;
-    std::optional<Time> said;
-  };
-  static constexpr std::size_t kMost = 65536;
-  static constexpr Duration kFresh = std::chrono::minutes(1);
-  mutable std::mutex mutex_;  // guards what follows
-  std::map<std::string, Seen> seen_;
-  std::deque<std::string> order_;
-};
-
 class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStoreImpl> {
  public:
-  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, ObjectCache* cache, KeptObjects kept)
-      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), cache_(cache), kept_(kept) {}
+  HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, const ObjectCache* cache,
+                KeptObjects kept)
+      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), kept_(kept) {
+    if (cache != nullptr) cache_ = *cache;
+  }
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
     if (range.bytes == 0) return done(Bytes());
+    if (seen_.IsMissing(key, MonotonicNow())) {
+      return done(Printable(Status::NotFound(fmt::format("{}/{}: does not exist, as the server said less than a minute ago", url_, key))));
+    }
     const bool whole = range.begin == 0 && range.bytes == ByteRange::kAll;
     HttpGet get{.url = url_ + "/" + EncodedPath(key), .span = {}, .most = most, .access = access_};
     // Where an object ends must be known to read what lies there: servers differ in what they make of "the last n bytes".
     if (!whole && (range.from_end || range.bytes == ByteRange::kAll)) {
       get.only_size = true;
       const auto sized = [self = shared_from_this(), key, range, most, done = std::move(done)](const Result<HttpObject>& object) mutable {
-        if (!object.ok()) return done(object.status());
+        if (!object.ok()) return self->Fail(key, object.status(), done);
         const Result<ByteSpan> span = BytesOfRange(self->url_ + "/" + key, object->size, range, most);
         if (!span.ok()) return done(span.status());
         if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
@@ -93,7 +56,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
       }
     }
     Get(key, std::move(get), [self = shared_from_this(), key, range, most, done = std::move(done)](Result<HttpObject> object) {
-      if (!object.ok()) return done(object.status());
+      if (!object.ok()) return self->Fail(key, object.status(), done);
       if (!self->seen_.Agrees(key, object->version)) return done(self->Changed(key));
       const bool cut = range.bytes != ByteRange::kAll && range.bytes > most && object->size > range.begin + most;
       if (cut) return done(Printable(Status::ResourceExhausted(fmt::format("{}/{}: has more than {} bytes", self->url_, key, most))));
@@ -109,10 +72,10 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string& name() const override { return url_; }
 
  private:
-  // Bytes that the disk has come from there, if the server has said within kFresh that they are still right, or says so now. The disk is
-  // asked, and gets what the server sends, on threads that read files.
+  // Bytes that the disk has come from there, if the server has said a short while ago that they are still right, or says so now. The disk
+  // is asked, and gets what the server sends, on threads that read files.
   void Get(const std::string& key, HttpGet get, HttpTransfers::Done done) {
-    if (cache_ == nullptr) return transfers_.Get(std::move(get), std::move(done));
+    if (!cache_) return transfers_.Get(std::move(get), std::move(done));
     PostRead([self = shared_from_this(), key, get = std::move(get), done = std::move(done)]() mutable {
       self->GetOrFind(key, std::move(get), done);
     });
@@ -122,7 +85,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
     const std::string name = get.span ? fmt::format("{} {}+{}", get.url, get.span->begin, get.span->bytes) : get.url;
     std::optional<ObjectCache::Entry> kept = cache_->Find(name);
     if (kept && kept->bytes.size() > get.most) kept.reset();
-    if (kept && (kept_ == KeptObjects::kAreTaken || seen_.IsFresh(key, kept->version))) {
+    if (kept && (kept_ == KeptObjects::kAreTaken || seen_.IsFresh(key, kept->version, MonotonicNow()))) {
       return done(HttpObject{.bytes = std::move(kept->bytes), .size = kept->size, .version = std::move(kept->version)});
     }
     if (kept) get.known = kept->version;
@@ -134,9 +97,8 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
         // Strong ETags alone: two versions may have the same time, or the same weak ETag.
         self->Keep(name, {object->version, object->size, object->bytes});
       }
-      const std::string version = object.ok() ? object->version : "";
+      if (object.ok()) self->seen_.NoteVersion(key, object->version, MonotonicNow());
       done(std::move(object));
-      if (!version.empty()) self->seen_.NoteSaid(key, version);
     });
   }
 
@@ -154,6 +116,11 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
     });
   }
 
+  void Fail(const std::string& key, const Status& status, const Done& done) {
+    if (status.code() == StatusCode::kNotFound) seen_.NoteMissing(key, MonotonicNow());
+    done(status);
+  }
+
   Status Changed(const std::string& key) const {
     return Printable(Status::Unavailable(fmt::format("{}/{}: has changed since it was opened", url_, key)));
   }
@@ -161,15 +128,15 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string url_;
   const std::shared_ptr<const S3Access> access_;
   HttpTransfers& transfers_;
-  ObjectCache* const cache_;
+  std::optional<ObjectCache> cache_;
   const KeptObjects kept_;
   std::atomic<std::uint64_t> unwritten_ = 0;  // bytes on their way to it
-  SeenVersions seen_;
+  SeenObjects seen_;
 };
 
 }  // namespace
 
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache, KeptObjects kept) {
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, const ObjectCache* cache, KeptObjects kept) {
   std::string url = address;
   std::shared_ptr<const S3Access> access;
   if (address.starts_with(kBucketScheme)) {

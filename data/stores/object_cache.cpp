@@ -122,16 +122,14 @@ Result<ObjectCache> ObjectCache::Open(std::string folder, std::uint64_t budget) 
   fs::create_directories(folder, error);
   if (error) return Status::Unavailable(fmt::format("--cache: cannot make the folder '{}': {}", folder, error.message()));
   if (const Status status = CheckCanWrite("--cache", folder + "/entry"); !status.ok()) return Status::Unavailable(status.message());
-  auto state = std::make_unique<State>(std::move(folder), budget);
+  auto state = std::make_shared<State>(std::move(folder), budget);
   state->MakeRoom();
   return ObjectCache(std::move(state));
 }
 
-ObjectCache::ObjectCache(std::unique_ptr<State> state) : state_(std::move(state)) {}
-ObjectCache::ObjectCache(ObjectCache&&) noexcept = default;
-ObjectCache::~ObjectCache() = default;
+ObjectCache::ObjectCache(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
-std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) {
+std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) const {
   const std::string path = state_->PathOf(name);
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.number() < 0) return std::nullopt;
@@ -144,7 +142,7 @@ std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) {
   return entry;
 }
 
-void ObjectCache::Keep(const std::string& name, const Entry& entry) {
+void ObjectCache::Keep(const std::string& name, const Entry& entry) const {
   const std::uint64_t bytes = sizeof(Head) + name.size() + entry.version.size() + entry.bytes.size();
   if (bytes > state_->budget / kParts) return;
   if (state_->unlooked.fetch_add(bytes) + bytes > state_->budget / kParts) {

@@ -6,6 +6,8 @@
 //
 // Entries that were used longest ago go first, until seven eighths of the budget are left. A process looks after that each time that it has
 // written a sixteenth of the budget, so that two processes that write at a time stay within it.
+//
+// Copies are the same cache.
 #pragma once
 
 #include <cstdint>
@@ -28,19 +30,17 @@ class ObjectCache {
 
   // The folder need not exist. Unavailable: it cannot be made or written. Waits for the disk, as the other functions do.
   static Result<ObjectCache> Open(std::string folder, std::uint64_t budget);
-  ObjectCache(ObjectCache&&) noexcept;
-  ~ObjectCache();
 
   // `name`: of a part of an object, unique among all servers. Any thread.
-  std::optional<Entry> Find(const std::string& name);
+  std::optional<Entry> Find(const std::string& name) const;
   // Entries of more than a sixteenth of the budget are not kept. What cannot be written is not kept either, and one line of the log says
   // so.
-  void Keep(const std::string& name, const Entry& entry);
+  void Keep(const std::string& name, const Entry& entry) const;
 
  private:
   struct State;
-  explicit ObjectCache(std::unique_ptr<State> state);
-  std::unique_ptr<State> state_;
+  explicit ObjectCache(std::shared_ptr<State> state);
+  std::shared_ptr<State> state_;
 };
 
 // That of this process; null: it has none.

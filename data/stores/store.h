@@ -63,9 +63,9 @@ class HttpTransfers;
 class ObjectCache;
 enum class KeptObjects : std::uint8_t { kAreChecked, kAreTaken };  // in the cache: the server is asked whether they are still right, or not
 // The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
-// by `transfers`, and kept in `cache`, if any; both must outlive it. Asks for nothing yet. It does not list. InvalidArgument: another
+// by `transfers`, which must outlive it, and kept in `cache`, if any. Asks for nothing yet. It does not list. InvalidArgument: another
 // address, or one with a name, a password, a query or a fragment; as FindS3Place.
-Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, ObjectCache* cache = nullptr,
+Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, const ObjectCache* cache = nullptr,
                                          KeptObjects kept = KeptObjects::kAreChecked);
 // One file: its only object has the key "file". Does not check that it exists.
 std::shared_ptr<Store> FileStore(const std::string& path);

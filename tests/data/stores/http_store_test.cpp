@@ -223,6 +223,16 @@ TEST_F(HttpStoreTest, PartsThatWaitSideBySideAreOneRequest) {
   EXPECT_EQ(traffic.requests - traffic.retries, kWaiting + 2) << "one for each object";
 }
 
+TEST_F(HttpStoreTest, AMissingObjectIsAskedForOnce) {
+  server_ = std::make_unique<ScriptedServer>([](const ServerRequest&) { return AnswerText("404 Not Found", ""); });
+  const std::shared_ptr<Store> store = StoreAt(server_->url());
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(Read(*store, "chunk").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(Read(*store, "chunk", {0, 4, true}).status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(asked(), 1U);
+  EXPECT_EQ(Read(*store, "other").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(asked(), 2U);
+}
+
 TEST_F(HttpStoreTest, AServerThatFailsAThirdGivesRightBytesAndIsNotFlooded) {
   Random random(71);
   SCOPED_TRACE(random.trace());
