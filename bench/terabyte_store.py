@@ -2,10 +2,11 @@
 
     python3 bench/terabyte_store.py --port 8000                    # http://127.0.0.1:8000/volume.ome.zarr
     python3 bench/terabyte_store.py --port 8000 --delay 0.02       # each answer begins 20 ms after its request
+    python3 bench/terabyte_store.py --port 8000 --blosc            # for readers that know no other codec and want every chunk
 
 An OME-Zarr 0.4 of 8192 x 8192 x 8192 values of 16 bits: 1.1 TB, in chunks of 64 voxels a side, with levels of half the size down to 64. A
 value is a sum of waves, from one along a side to one of eight voxels, and some noise; where the sum is low, it is 0: some 40 % of the volume.
-Each level has the waves that it can show. Chunks of zeros alone are not there. A chunk that was made once is kept; levels 3 and coarser are
+Each level has the waves that it can show. Chunks are packed with zstd, and chunks of zeros alone are not there. A chunk that was made once is kept; levels 3 and coarser are
 made before the first request.
 
 The driver of a measurement asks for more: GET /counts tells what was sent since GET /reset, and POST /sizes, with one chunk a line, how many
@@ -17,7 +18,7 @@ import concurrent.futures
 import json
 
 import numpy
-from numcodecs import Zstd
+from numcodecs import Blosc, Zstd
 
 SIDE, CHUNK, LEVELS = 8192, 64, 8
 FIRST_MADE = 3  # this level and coarser ones
@@ -27,14 +28,15 @@ PAGES = b"Access-Control-Allow-Origin: *\r\n"  # of other servers may show it
 
 
 class Formula:
-    def __init__(self):
+    def __init__(self, blosc: bool):
         random = numpy.random.default_rng(1)
         waves = numpy.arange(1, 11)
         self._frequency = 2.0 ** (waves - 1) * (1 + 0.2 * random.random((3, len(waves))))  # along a side, by axis
         self._phase = 2 * numpy.pi * random.random((3, len(waves)))
         self._amplitude = 0.4**waves
         self._noise = random.integers(0, 16, (CHUNK,) * 3, dtype=numpy.uint16)
-        self._codec = Zstd(level=1)
+        self._codec = Blosc(cname="zstd", clevel=1, shuffle=Blosc.NOSHUFFLE) if blosc else Zstd(level=1)
+        self._has_every_chunk = blosc
         self._least = -numpy.inf
         coarse = [self._sum(5, at) for at in numpy.ndindex((SIDE >> 5) // CHUNK, (SIDE >> 5) // CHUNK, (SIDE >> 5) // CHUNK)]
         self._least = numpy.quantile(coarse, EMPTY)
@@ -49,16 +51,21 @@ class Formula:
         planes = (z[:, :, None] * y[:, None, :]).reshape(len(z), -1)
         return (planes.T.astype(numpy.float32) @ x.astype(numpy.float32)).reshape((CHUNK,) * 3)
 
+    @property
+    def codec(self) -> dict:
+        """As .zarray names it."""
+        return self._codec.get_config()
+
     def chunk(self, level: int, chunk: tuple[int, int, int]) -> bytes | None:
         above = self._sum(level, chunk) - self._least
-        if not (above > 0).any():
+        if not self._has_every_chunk and not (above > 0).any():
             return None
         values = numpy.where(above > 0, 4000 + 30000 * above, 0).astype(numpy.uint16)
         values[above > 0] += self._noise[above > 0]
         return self._codec.encode(values)
 
 
-def metadata(path: str) -> bytes | None:
+def metadata(path: str, codec: dict) -> bytes | None:
     if path == ".zgroup":
         return json.dumps({"zarr_format": 2}).encode()
     if path == ".zattrs":
@@ -70,14 +77,14 @@ def metadata(path: str) -> bytes | None:
     level, _, file = path.partition("/")
     if file == ".zarray" and level.isdigit() and int(level) < LEVELS:
         array = {"zarr_format": 2, "shape": [SIDE >> int(level)] * 3, "chunks": [CHUNK] * 3, "dtype": "<u2", "order": "C", "fill_value": 0}
-        array |= {"compressor": {"id": "zstd", "level": 1}, "filters": None, "dimension_separator": "/"}
+        array |= {"compressor": codec, "filters": None, "dimension_separator": "/"}
         return json.dumps(array).encode()
     return None
 
 
 class Store:
-    def __init__(self, delay: float):
-        self._delay, self._formula, self._made = delay, Formula(), {}
+    def __init__(self, delay: float, blosc: bool):
+        self._delay, self._formula, self._made = delay, Formula(blosc), {}
         self._threads = concurrent.futures.ThreadPoolExecutor(2)
         self.reset()
 
@@ -110,7 +117,7 @@ class Store:
             return None
         key = path.removeprefix(NAME)
         if not self._is_chunk(key):
-            return metadata(key)
+            return metadata(key, self._formula.codec)
         if key in self._made:
             return self._made[key]
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._make, key)
@@ -167,8 +174,9 @@ async def main() -> None:
     p.add_argument("--address", default="127.0.0.1", help="where it listens (default: 127.0.0.1)")
     p.add_argument("--port", type=int, default=0, help="of TCP; 0: a free one (default)")
     p.add_argument("--delay", type=float, default=0, metavar="SECONDS", help="between a request and its answer (default: 0)")
+    p.add_argument("--blosc", action="store_true", help="pack chunks with Blosc, and have chunks of zeros, too")
     options = p.parse_args()
-    store = Store(options.delay)
+    store = Store(options.delay, options.blosc)
     store.make_coarse()
     server = await asyncio.start_server(store.serve, options.address, options.port, limit=1 << 20)
     print(f"http://{options.address}:{server.sockets[0].getsockname()[1]}{NAME.rstrip('/')}", flush=True)

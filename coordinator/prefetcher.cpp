@@ -88,13 +88,13 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
       if (std::exchange(fetching, true)) return;
     }
     while (const std::optional<Block> next = TakeNext()) {
-      const auto& [level, box] = *next;
+      const Level& level = next->level;
       const ScalarType type = level.source->info().levels[std::size_t(level.number)].description.type;
       const Status begun = Guarded("fetching ahead", [&] {
         // Nothing is decoded, so what comes is the value of chunks that are not there.
-        const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(box.voxel_count()) * BytesPerSample(type));
+        const auto unused = std::make_shared<std::vector<std::byte>>(std::size_t(next->box.voxel_count()) * BytesPerSample(type));
         const auto done = [self = shared_from_this(), unused, next = *next](const Status& status) { self->End(next, status); };
-        level.source->Read(level.number, box, *unused, stop.get_token(), done);
+        level.source->Read(level.number, next->box, *unused, stop.get_token(), done);
         return Status::Ok();
       });
       if (!begun.ok()) End(*next, begun);

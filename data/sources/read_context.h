@@ -15,7 +15,7 @@ class ReadContext {
   // Tasks at a time beside two for each thread that decodes: enough for a web server that is asked for many chunks at a time
   // (HttpTransfers::kMostOfAHost). More would gain nothing: what waits here is dropped when nobody wants it any more, what is asked for
   // comes.
-  static constexpr std::size_t kMostAsked = 32;
+  static constexpr std::size_t kMostAsked = 48;
 
   struct Limits {
     std::size_t decode_threads = 0;                            // 0: as many as there are cores

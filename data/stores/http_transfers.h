@@ -48,7 +48,7 @@ struct HttpObject {
 
 class HttpTransfers {
  public:
-  static constexpr std::size_t kMostOfAHost = 16;  // requests under way at a time; others wait for their turn
+  static constexpr std::size_t kMostOfAHost = 32;  // requests under way at a time; others wait for their turn
   // Parts of an object that become one request have at most so many bytes together, and so many unwanted ones between each two: these cost
   // less than another request.
   static constexpr std::uint64_t kMostTogether = std::uint64_t{4} << 20, kMostBetween = std::uint64_t{16} << 10;
