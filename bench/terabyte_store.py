@@ -6,8 +6,8 @@
 
 An OME-Zarr 0.4 of 8192 x 8192 x 8192 values of 16 bits: 1.1 TB, in chunks of 64 voxels a side, with levels of half the size down to 64. A
 value is a sum of waves, from one along a side to one of eight voxels, and some noise; where the sum is low, it is 0: some 40 % of the volume.
-Each level has the waves that it can show. Chunks are packed with zstd, and chunks of zeros alone are not there. A chunk that was made once is kept; levels 3 and coarser are
-made before the first request.
+Each level has the waves that it can show. Chunks are packed with zstd, and chunks of zeros alone are not there. A chunk that was made once is
+kept; levels 3 and coarser are made before the first request.
 
 The driver of a measurement asks for more: GET /counts tells what was sent since GET /reset, and POST /sizes, with one chunk a line, how many
 bytes these chunks have. These answers are neither delayed nor counted.
