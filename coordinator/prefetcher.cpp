@@ -64,8 +64,8 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
   std::optional<Block> TakeNext() {
     const std::lock_guard lock(mutex);
     std::erase_if(wishes, [now = MonotonicNow()](const Wish& wish) { return wish.blocks.empty() || wish.until < now; });
-    fetching = !stop.stop_requested() && under_way < kAtOnce;
-    if (!fetching) return std::nullopt;
+    fetching = false;  // unless a block is found
+    if (stop.stop_requested() || under_way == kAtOnce) return std::nullopt;
     for (Wish& wish : wishes) {
       while (!wish.blocks.empty()) {
         Block next{wish.level, wish.blocks.front()};
@@ -73,10 +73,10 @@ struct Prefetcher::State : std::enable_shared_from_this<State> {
         if (fetched.size() >= kMostFetched) fetched.clear();
         if (!fetched.insert(next.name()).second) continue;
         ++under_way;
+        fetching = true;
         return next;
       }
     }
-    fetching = false;
     return std::nullopt;
   }
 

@@ -49,7 +49,7 @@ Progress ProgressOf(const FrameProgress& progress) {
           .workers = int(progress.workers)};
 }
 
-// For each row y of the bounds, calls function(y, first). The picture is `width` pixels wide, and the row begins at its pixel `first`.
+// Calls function(y, first) for each row y of the bounds. In an array of the picture, `width` pixels a row, the row begins at `first`.
 template <class Function>
 void ForEachRow(const PixelBounds& bounds, int width, Function&& function) {
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) function(y, std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));

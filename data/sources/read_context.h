@@ -13,8 +13,8 @@ namespace slabstream {
 class ReadContext {
  public:
   // Tasks at a time beside two for each thread that decodes: enough for a web server that is asked for many chunks at a time
-  // (HttpTransfers::kMostOfAHost). More would gain nothing: what waits here is dropped when nobody wants it any more, what is asked for
-  // comes.
+  // (HttpTransfers::kMostOfAHost), and some that wait there, so that neighbours in a shard become one request. More would gain nothing:
+  // what waits here is dropped when nobody wants it any more, what is asked for comes.
   static constexpr std::size_t kMostAsked = 48;
 
   struct Limits {

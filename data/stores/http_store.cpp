@@ -24,9 +24,11 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
  public:
   HttpStoreImpl(std::string url, std::shared_ptr<const S3Access> access, HttpTransfers& transfers, const ObjectCache* cache,
                 KeptObjects kept)
-      : url_(std::move(url)), access_(std::move(access)), transfers_(transfers), kept_(kept) {
-    if (cache != nullptr) cache_ = *cache;
-  }
+      : url_(std::move(url)),
+        access_(std::move(access)),
+        transfers_(transfers),
+        cache_(cache == nullptr ? std::nullopt : std::optional(*cache)),
+        kept_(kept) {}
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(url_, key); !status.ok()) return done(std::move(status));
@@ -128,7 +130,7 @@ class HttpStoreImpl : public Store, public std::enable_shared_from_this<HttpStor
   const std::string url_;
   const std::shared_ptr<const S3Access> access_;
   HttpTransfers& transfers_;
-  std::optional<ObjectCache> cache_;
+  const std::optional<ObjectCache> cache_;
   const KeptObjects kept_;
   std::atomic<std::uint64_t> unwritten_ = 0;  // bytes on their way to it
   SeenObjects seen_;

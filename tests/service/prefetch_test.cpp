@@ -134,7 +134,7 @@ TEST_F(PrefetchTest, FetchesWhatAPictureWillShowOnce) {
                             [&](const std::string& chunk) { return sent.contains(chunk) || !fs::exists(directory_.path() + chunk); }))
       break;
     ASSERT_LT(MonotonicNow(), until);
-    ASSERT_TRUE(Prefetch(request)) << "what is wished for is fetched for a second, which slow machines may need for a part of it";
+    ASSERT_TRUE(Prefetch(request)) << "a wish lasts for a second, so a slow machine needs several";
   }
   AwaitKept(std::size_t(std::ranges::count_if(shown, [&](const std::string& chunk) { return fs::exists(directory_.path() + chunk); })));
   const auto of_level = std::ranges::count_if(Sent(), [](const auto& sent) { return sent.first.starts_with("/ball.zarr/0/"); });
