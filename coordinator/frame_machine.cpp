@@ -136,9 +136,9 @@ void FrameMachine::State::PlanAhead() {
 }
 
 PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std::shared_ptr<const OccupancyGrid> occupied) {
-  // Shares shorten a frame that is waited for. Where frames follow one another, their messages cost more than they save.
-  const bool alone = queue.size() + frames.size() == 1;
-  const bool in_shares = alone && request.pictures && !request.submit.frame.previews;
+  const auto [width, height] = request.submit.frame.size;
+  const bool pays = SharesPay(std::uint64_t(width) * std::uint64_t(height), queue.size() + frames.size() == 1);
+  const bool in_shares = pays && request.pictures && !request.submit.frame.previews;
   Team team = TeamOf(roster.slots(), std::uint32_t(request.submit.frame.policy.teams), last_plan);
   PlanRequest ask{.plan = last_plan,
                   .client = request.client,

@@ -71,7 +71,7 @@ struct CoordinatorConfig {
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
   std::size_t max_queued = 1024;                                   // frames of all clients
-  std::uint64_t share_pixels = kSharePixels;                       // of a picture that its client puts together (FramePlan)
+  std::uint64_t share_pixels = kSharePixels;                       // of a picture that its client puts together (ClientTakes)
   LogLevel log_level = LogLevel::kOff;                             // Notes of lower levels are not made
   std::function<std::vector<WebTraffic>()> web_traffic = nullptr;  // of this process; null: it asks no web server
 };

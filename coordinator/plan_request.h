@@ -29,7 +29,7 @@ struct PlanRequest {
   std::shared_ptr<const OccupancyGrid> occupied;
   Roster roster;  // of the frame's team, with a worker in it
   Turn turn;
-  std::uint64_t share_pixels = 0;          // as in FramePlan
+  std::uint64_t share_pixels = 0;          // as in ClientTakes
   std::vector<HostedWorker> workers = {};  // all of the service: an open policy is chosen for them
   std::vector<WorkerLimit> limits = {};    // of all of them, and of those that are leaving
   // Of a dataset with several levels: what the client asked for, and the level that `resolved` is of. Null: it has one.

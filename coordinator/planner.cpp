@@ -141,7 +141,8 @@ LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const Res
 
 Result<PlannedFrame> Planner::WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout) {
   const PlanRequest& asked = planned.asked;
-  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn, asked.share_pixels);
+  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn,
+                                     {.share_pixels = asked.share_pixels, .straight8 = asked.resolved->frame.straight8});
   if (!plan.ok()) return plan.status();
   planned.plan = *std::move(plan);
   planned.fit = FramesThatFit(planned.plan, *asked.resolved->summary, asked.limits);

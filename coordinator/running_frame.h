@@ -20,8 +20,9 @@
 // display worker's lifetime, not for an attempt, and a picture is right whoever makes it, so messages of older attempts count if their
 // sender proves them.
 //
-// A picture in shares (FramePlan::share_pixels) has a display worker for each share. It has one group, which is done when all of them have
-// said so, and is finished when all shares are there. Those of one attempt count: the next one divides the picture among other workers.
+// A picture in shares (ClientTakes::share_pixels) has a display worker for each share. It has one group, which is done when all of them
+// have said so, and is finished when all shares are there. Those of one attempt count: the next one divides the picture among other
+// workers.
 //
 // What is hidden (common/planning/frame_occlusion.h): each GroupDone of the present display worker may bring the mask of what it has
 // accumulated; the mask of most groups is kept. The assignment of group g, in any attempt, carries it only if it was made from groups in

@@ -59,10 +59,25 @@ bool Covers(PixelRange pixels, const PixelBounds& bounds, std::int32_t frame_wid
   return pixels.begin <= index(bounds.x_begin, bounds.y_begin) && index(bounds.x_end - 1, bounds.y_end - 1) < pixels.end;
 }
 
-// The bounds to which an image grows: the whole frame, unless it is very large. Only written parts take memory.
-PixelBounds RoomFor(const PixelBounds& a, const PixelBounds& b, const PixelBounds& frame) {
+// The bounds to which an image grows that gets `pixels` of another one. To grow each time would cost more than to combine, and only written
+// parts take memory. So that is the whole frame or, of a very large one, all rows of these pixels: of a share no more will come. An image
+// that outgrows such rows will hold the frame.
+PixelBounds RoomFor(const PixelBounds& image, const PixelBounds& other, PixelRange pixels, const PixelBounds& frame) {
   constexpr std::int64_t kMostPixels = std::int64_t{1} << 22;
-  return frame.pixel_count() <= kMostPixels ? frame : Union(a, b);
+  const PixelBounds both = Union(image, other);
+  if (both.empty()) return both;
+  const bool outgrown = image.width() == frame.width() && image != both;
+  if (outgrown || frame.pixel_count() <= kMostPixels) return frame;
+  const auto width = std::uint64_t(frame.width());
+  const PixelBounds rows = {0, std::int32_t(pixels.begin / width), frame.width(), std::int32_t((pixels.end + width - 1) / width)};
+  return rows.pixel_count() <= kMostPixels ? Union(both, rows) : both;
+}
+
+// An image without a pixel that has room for some.
+LocalImage MakeRoom(PixelFormat format, const PixelBounds& room) {
+  LocalImage image = MakeUnwrittenImage(format, room);
+  image.rows.resize(std::size_t(room.height()));
+  return image;
 }
 
 // With another image of this worker. `fresh`: `image` does not exist yet.
@@ -73,12 +88,9 @@ void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalIma
     return;
   }
   const ImageView view = whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width());
-  if (fresh) {
-    image = CopyOf(view);
-    return;
-  }
+  if (fresh) image = MakeRoom(view.format, RoomFor(view.bounds, view.bounds, pixels, action.frame));
   if (action.replace) Erase(image, pixels, action.frame.width());
-  Combine(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
+  Combine(image, view, action.side, RoomFor(image.bounds, view.bounds, pixels, action.frame));
 }
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
@@ -90,8 +102,11 @@ Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action
     if (!unpacked.ok()) return unpacked.status();
     payload = *std::move(unpacked);
   }
-  if (!fresh && !action.replace && Covers(pixels, header.bounds, action.frame.width())) {
-    return CombineRuns(image, header, payload.span(), action.frame, action.side, RoomFor(image.bounds, header.bounds, action.frame));
+  if (!action.replace && Covers(pixels, header.bounds, action.frame.width())) {
+    if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;
+    const PixelBounds room = RoomFor(image.bounds, header.bounds, pixels, action.frame);
+    if (fresh) image = MakeRoom(header.format, room);
+    return CombineRuns(image, header, payload.span(), action.frame, action.side, room);
   }
   Result<LocalImage> read = ReadRuns(header, payload.span(), action.frame);
   if (!read.ok()) return read.status();
@@ -105,12 +120,10 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
       memory.Borrow(*incoming.shared, incoming.header.format, incoming.payload, pixels, action.frame, MonotonicNow());
   if (!borrowed.ok()) return borrowed.status();
   const ImageView& view = borrowed->view;
-  if (fresh) {  // room for the borrowed pixels
-    image = MakeUnwrittenImage(view.format, view.bounds);
-    image.rows.resize(std::size_t(view.bounds.height()));
-  }
+  const PixelBounds room = RoomFor(image.bounds, view.bounds, pixels, action.frame);
+  if (fresh) image = MakeRoom(view.format, room);
   if (action.replace) Erase(image, pixels, action.frame.width());
-  const bool valid = CombineUnchecked(image, view, action.side, RoomFor(image.bounds, view.bounds, action.frame));
+  const bool valid = CombineUnchecked(image, view, action.side, room);
   // The owner reused the frame while it was read here: `image` may hold anything, and the group fails.
   if (!borrowed->Intact()) return Status::DataLoss("a lent image was taken back while it was read");
   return valid ? Status::Ok() : Status::InvalidArgument("shared image: a pixel's colour or depth is not finite");

@@ -4,7 +4,8 @@
 // kFixed16: round(65535 value). Absolute error at most 2^-17 (half of 1 / 65535, a little more than 2^-17: 7.63e-6).
 // 0 and 1 are exact in both, and order is kept. Values slightly above 1, from rounded sums, become 1.
 //
-// Finished pictures may also travel as kStraight8, in 8 bits a channel: what a PNG of them holds (sample_codes.h).
+// Finished pictures may also travel as kStraight8, in 8 bits a channel: what a PNG of them holds (sample_codes.h). So may images of which
+// combining takes the nearer pixel as it is (PixelFormat::kDepth): the picture has the same codes.
 #pragma once
 
 #include <cstddef>

@@ -230,7 +230,7 @@ RunImage EncodeRuns(const ImageView& view, ColorCoding color) {
     result.header.pixel_count += band.pixel_count;
   }
   result.header.run_count = std::uint32_t(run_count);
-  if (view.format == PixelFormat::kRgba) result.header.color = color;
+  if (MayCode(view.format, color)) result.header.color = color;
 
   result.payload.resize(PayloadBytes(result.header));
   const PayloadWriter writer(result.header, result.payload.data());
@@ -263,9 +263,10 @@ Status ValidateRunHeader(const RunImageHeader& header, const PixelBounds& frame)
   if (header.format < PixelFormat::kRgba || header.format > PixelFormat::kSum) {
     return Invalid("format is {}, but must be 1 (rgba), 2 (depth), 3 (rgba and depth), 4 (maximum) or 5 (sum)", int(header.format));
   }
-  const bool coded = header.color >= ColorCoding::kHalf && header.color <= ColorCoding::kStraight8;
-  if (header.color != ColorCoding::kFloat32 && (!coded || header.format != PixelFormat::kRgba)) {
-    return Invalid("color is {}, but must be 1 (float32), or for colours alone 2 (half), 3 (fixed16) or 4 (straight8)", int(header.color));
+  const bool known = header.color >= ColorCoding::kFloat32 && header.color <= ColorCoding::kStraight8;
+  if (!known || !MayCode(header.format, header.color)) {
+    return Invalid("color is {}, but must be 1 (float32), for colours alone 2 (half), 3 (fixed16) or 4 (straight8), with voxels 4",
+                   int(header.color));
   }
   const PixelBounds& bounds = header.bounds;
   // Nothing is computed from the bounds before this: differences of hostile numbers may overflow.

@@ -100,9 +100,9 @@ std::vector<Placement> PlacementsOf(const FramePlan& plan) {
 }
 
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
-                            const Turn& turn, std::uint64_t share_pixels) {
+                            const Turn& turn, const ClientTakes& client) {
   FramePlan plan;
-  plan.share_pixels = share_pixels;
+  plan.client = client;
   plan.turn = turn;
   plan.setup = std::move(setup);
   plan.layout = std::move(layout);
@@ -133,7 +133,7 @@ Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, cons
                                                            .policy = &*resolved->policy,
                                                            .slots = std::max<std::uint32_t>(std::uint32_t(roster.slots.size()), 1),
                                                            .box_bytes_target = box_bytes_target}));
-  return PlanFrame(*std::move(setup), *resolved->policy, roster, std::move(layout));
+  return PlanFrame(*std::move(setup), *resolved->policy, roster, std::move(layout), {}, {.straight8 = request.straight8});
 }
 
 }  // namespace slabstream

@@ -56,6 +56,15 @@ struct Turn {
   friend bool operator==(const Turn&, const Turn&) = default;
 };
 
+// What the client takes.
+struct ClientTakes {
+  // Not 0: it puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do if there
+  // is one group (SharesOf).
+  std::uint64_t share_pixels = 0;
+  bool straight8 = false;  // as in FrameRequest
+  friend bool operator==(const ClientTakes&, const ClientTakes&) = default;
+};
+
 struct FramePlan {
   FrameSetup setup;
   std::shared_ptr<const Layout> layout;  // never null; equal plans share it
@@ -66,9 +75,7 @@ struct FramePlan {
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
   Turn turn;
-  // Not 0: the client puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do
-  // if there is one group (SharesOf).
-  std::uint64_t share_pixels = 0;
+  ClientTakes client;
   WorkerId display = 0;  // accumulates the groups and hands the frame over; holds a rank wherever possible. In shares: the first one's
   friend bool operator==(const FramePlan&, const FramePlan&) = default;
 };
@@ -90,7 +97,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 // Pure. Unavailable: no worker in the roster. `layout` was made for the setup's volume and look and this policy, and for as many slots as
 // the roster has.
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
-                            const Turn& turn = {}, std::uint64_t share_pixels = 0);
+                            const Turn& turn = {}, const ClientTakes& client = {});
 // Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
 // for a policy that leaves a choice.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,

@@ -60,6 +60,9 @@ void Separate(const SetApart& apart, const std::vector<WorkerId>& others, FrameP
 
 // The fewest bits with which combining changes no channel by more than the plan allows. Of two codings with as many bits, the finer one.
 ColorCoding ChooseColor(const FramePlan& plan, const GroupPlan& group) {
+  // A pixel of the picture is that of one worker, so it has the same codes whether these are made before it travels or after that.
+  const bool is_of_one = plan.setup.format == PixelFormat::kDepth && plan.setup.renderer->FrameIsPicture(plan.setup);
+  if (is_of_one && plan.client.straight8) return ColorCoding::kStraight8;
   if (plan.pixel_error <= 0 || plan.setup.format != PixelFormat::kRgba || group.placements.empty()) return ColorCoding::kFloat32;
   const PixelRange frame = WholeFrame(plan.setup);
   Travel travel = TravelOf(DeriveSchedule(group.schedule, frame).value(), frame);
@@ -87,7 +90,7 @@ std::vector<Rank> SharesOf(const FramePlan& plan) {
   const GroupPlan& group = plan.groups.front();
   const RendererKind& renderer = *plan.setup.renderer;
   const std::vector<Rank> one = {RootOf(group, plan.display)};
-  if (plan.share_pixels == 0 || group.placements.empty() || !renderer.FinishesInShares(plan.setup)) return one;
+  if (plan.client.share_pixels == 0 || group.placements.empty() || !renderer.FinishesInShares(plan.setup)) return one;
   const bool pays = !renderer.FrameIsPicture(plan.setup) || ParseCombining(plan.combine).value().scheme->divides() ||
                     WholeFrame(plan.setup).end >= kLargePicture;
   if (!pays) return one;
@@ -97,7 +100,7 @@ std::vector<Rank> SharesOf(const FramePlan& plan) {
     if (workers.insert(group.placements[rank].worker).second) candidates.push_back(rank);
   }
   const std::uint64_t shares = std::min<std::uint64_t>(
-      {candidates.size(), kMaxShares, kMaxSteps / group.placements.size(), WholeFrame(plan.setup).end / plan.share_pixels});
+      {candidates.size(), kMaxShares, kMaxSteps / group.placements.size(), WholeFrame(plan.setup).end / plan.client.share_pixels});
   if (shares < 2) return one;
   std::vector<Rank> roots;
   for (std::uint64_t share = 0; share < shares; ++share) {

@@ -38,11 +38,15 @@ std::vector<WorkerId> OwnersOf(const Layout& layout, const Roster& roster, bool 
 // The rank where the group's image should end: the display worker's, so that it need not travel; 0 if it has none.
 Rank RootOf(const GroupPlan& group, WorkerId display);
 
-// FramePlan::share_pixels of a service: smaller shares cost more in messages than they save (docs/time-dilated-cluster.md).
+// ClientTakes::share_pixels of a service: smaller shares cost more in messages than they save (docs/time-dilated-cluster.md).
 inline constexpr std::uint64_t kSharePixels = 65536;
 
 // A picture of so many pixels is divided whatever the scheme, since combining it on one path takes longer than rendering it.
 inline constexpr std::uint64_t kLargePicture = std::uint64_t{1} << 20;
+
+// Whether a client that puts pictures together should get one of so many pixels in shares. They shorten a frame that is waited for;
+// `alone`: no other one is under way. Where small frames follow one another, their messages cost more than they save.
+constexpr bool SharesPay(std::uint64_t pixels, bool alone) { return alone || pixels >= kLargePicture; }
 
 // Where the shares of a frame of one group should end: at most one rank of each worker, and if there are fewer shares than workers, other
 // ones from turn to turn. One root: it is not divided, since that would not pay: it pays if the workers divide the picture anyway

@@ -24,7 +24,7 @@
 
 namespace slabstream {
 
-inline constexpr std::uint32_t kWireVersion = 2;
+inline constexpr std::uint32_t kWireVersion = 3;
 inline constexpr std::size_t kMaxHeaderBytes = std::size_t{64} << 20;
 
 using AnyMessage = Merged<WorkerToCoordinator, CoordinatorToWorker, WorkerToVoxels, VoxelsToWorker, WorkerToWorker, WorkerToClient,

@@ -116,6 +116,7 @@ inline void CheckGroup(const GroupPlan& group, const FrameSetup& setup, Checker&
     check.Fail("schedule.ranks",
                std::to_string(group.schedule.ranks) + ", but there are " + std::to_string(group.placements.size()) + " placements");
   }
+  check.That(MayCode(setup.format, group.color), "color", "that of another format");
   if (check.ok()) check.Adopt(CheckScheduleName(group.schedule));
 }
 

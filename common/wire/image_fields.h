@@ -42,7 +42,7 @@ void Fields(auto& io, Is<PackedRuns> auto& m) {
 
 inline void CheckPayload(const PartialImage& m, Checker& check) {
   check.That(m.image.format != PixelFormat::kRgbaDepth, "image.format", "that of a finished picture, which is not combined any more");
-  check.That(m.image.color != ColorCoding::kStraight8, "image.color", "that of a finished picture, too");
+  check.That(m.image.color != ColorCoding::kStraight8 || HasVoxel(m.image.format), "image.color", "8 bits, of colours that blend");
   if (m.shared) {
     check.That(m.image.bounds.empty() && m.image.pixel_count == 0, "image", "runs beside a shared image");
     const std::size_t planes = HasDepth(m.image.format) ? 3 : 1;

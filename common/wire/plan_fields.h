@@ -303,7 +303,7 @@ void Fields(auto& io, Is<GroupPlan> auto& m) {
   using P = v1::GroupPlan;
   io.Messages("placements", m.placements, &P::placements, &P::mutable_placements, kMaxRanks);
   io.Message("schedule", m.schedule, &P::schedule, &P::mutable_schedule);
-  io.OneOf("color", m.color, &P::color, &P::set_color, ColorCoding::kFloat32, ColorCoding::kFixed16);
+  io.OneOf("color", m.color, &P::color, &P::set_color, ColorCoding::kFloat32, ColorCoding::kStraight8);
 }
 
 }  // namespace slabstream

@@ -189,7 +189,7 @@ void Fields(auto& io, Is<RunImageHeader> auto& m) {
   const bool may_have_no_runs = m.pixel_count == 0 || m.pixel_count == pixels;
   io.Range("run_count", m.run_count, &P::run_count, &P::set_run_count, may_have_no_runs ? 0 : 1, m.pixel_count);
   io.Check([&](Checker& check) {
-    check.That(m.format == PixelFormat::kRgba || m.color == ColorCoding::kFloat32, "color", "not floats, in a format that is not rgba");
+    check.That(MayCode(m.format, m.color), "color", "that of another format");
     if (const std::uint64_t bytes = PayloadBytes(m); bytes > kMaxRunsBytes) {
       check.Fail("pixel_count", "a payload of " + std::to_string(bytes) + " bytes, at most " + std::to_string(kMaxRunsBytes));
     }
@@ -204,8 +204,8 @@ void Fields(auto& io, Is<EncodedRuns> auto& m) {
   io.Range("encoded_bytes", m.encoded_bytes, &P::encoded_bytes, &P::set_encoded_bytes, m.codec == Codec::kRaw ? raw_bytes : 1, raw_bytes);
   io.Any(m.digest, &P::digest, &P::set_digest);
   io.Check([&](Checker& check) {
-    check.That(m.image.color == ColorCoding::kFloat32 || m.image.color == ColorCoding::kStraight8, "image.color",
-               "of 16 bits, to a client");
+    const bool codes = m.image.format == PixelFormat::kRgba && m.image.color == ColorCoding::kStraight8;
+    check.That(m.image.color == ColorCoding::kFloat32 || codes, "image.color", "of images between workers");
     check.That(!IsDense(m.image), "image.run_count", "0, of a picture with pixels");
   });
 }

@@ -36,6 +36,7 @@ BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary
                            std::int32_t pixel_side)
     : setup_(setup),
       cost_(*setup.renderer, {&occupied, &summary, &setup.transfer, setup.parameters}, measured),
+      measured_(measured != nullptr),
       view_(CostViewOf(setup)),
       frame_(FrameBounds(setup)),
       pixel_side_(pixel_side),
@@ -56,6 +57,17 @@ BoxEstimator::BoxEstimator(const FrameSetup& setup, const VolumeSummary& summary
       for (std::int32_t x = 0; x < fine.x; ++x) row[x / factor] += (next++)->voxels;
     }
   }
+}
+
+bool BoxEstimator::IsHidden(const Box& box, const FrameArea& seen) const {
+  const OpaqueFront& front = setup_.front;
+  if (front.empty()) return false;
+  const auto tile = [&front](double begin, double end) { return std::size_t((begin + end) / 2) / std::size_t(front.tile); };
+  const std::uint8_t depth =
+      front.tiles[tile(seen.y_begin, seen.y_end) * std::size_t(front.tiles_x) + tile(seen.x_begin, seen.x_end)].back();
+  const Axis along = AxesOf(setup_.camera.traversal_axis).c;
+  const std::int32_t before = setup_.camera.ascending ? box.begin[along] : size_[along] - box.end[along];  // slices
+  return depth != OpaqueFront::kNever && depth * front.unit <= before;
 }
 
 BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
@@ -86,8 +98,10 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
         const FrameArea r = ProjectBox(part, setup_, 1, 0);
         const FrameArea seen = Intersection(r, frame);
         if (seen.empty()) continue;
-        const double seen_share = share * seen.area() / r.area();
-        inside += seen_share * voxels;
+        // Costs that were measured do not have what was hidden.
+        const bool hidden = IsHidden(part, seen);
+        if (!hidden || measured_) inside += share * voxels * seen.area() / r.area();
+        if (hidden) continue;
         const double hits_a_pixel = share * voxels * voxel_pixels_ / r.area();
         const auto tile_of = [&](double pixel, std::int32_t count) { return std::min(std::int32_t(pixel / tile_side), count - 1); };
         for (std::int32_t ty = tile_of(seen.y_begin, coverage.tiles_y); ty <= tile_of(seen.y_end, coverage.tiles_y); ++ty) {
@@ -112,7 +126,7 @@ BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {
       coverage.share[number] = float(std::clamp(filled / pixels, 0.0, 1.0));
     }
   }
-  // Voxels outside the frame are not drawn.
+  // Voxels outside the frame and hidden ones are not drawn.
   if (occupied > 0) estimate.seconds = cost_.Seconds(box, view_) * inside / occupied;
   return estimate;
 }

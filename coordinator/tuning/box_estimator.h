@@ -1,8 +1,9 @@
 // BoxEstimator: estimates the time and the coverage of boxes in one view, before anybody has rendered them.
 //
 // It projects cells of occupied voxels: each becomes a rectangle of the frame that its voxels hit at random. In the part of a tile that
-// rectangles reach, a pixel that expects n hits is filled with probability 1 - exp(-n). Neighbouring cells are merged until there are at
-// most kMostCells, so that estimating all boxes of a layout takes about a millisecond.
+// rectangles reach, a pixel that expects n hits is filled with probability 1 - exp(-n). Cells behind the frame's front (FrameSetup::front)
+// are not drawn. Neighbouring cells are merged until there are at most kMostCells, so that estimating all boxes of a layout takes about a
+// millisecond.
 #pragma once
 
 #include <vector>
@@ -30,8 +31,12 @@ class BoxEstimator {
   Estimate Of(const Box& box) const;  // inside the volume, not empty
 
  private:
+  // Whether the front hides a box that is seen on `seen`, as far as the rays of its middle tell.
+  bool IsHidden(const Box& box, const FrameArea& seen) const;
+
   const FrameSetup& setup_;
   const CostEstimator cost_;
+  const bool measured_;
   const CostView view_;
   const PixelBounds frame_;
   const std::int32_t pixel_side_;

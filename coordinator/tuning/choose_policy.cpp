@@ -13,7 +13,9 @@
 #include "common/planning/assignment.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/clipped_cells.h"
+#include "common/planning/frame_occlusion.h"
 #include "common/planning/layer_bricks.h"
+#include "common/planning/least_extinction.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/renderer_kind.h"
 #include "coordinator/tuning/frame_predictor.h"
@@ -217,8 +219,10 @@ PolicyChoice ChoosePolicy(const PolicyQuestion& question) {
     drawn = *question.known.occupied;
   }
   if (drawn) EmptyClippedCells(volume.clip(), *drawn);
-  const FramePredictor predictor(*question.setup, summary, drawn ? *drawn : *question.known.occupied, question.known.cost,
-                                 *question.machine, question.slots, question.render_scale);
+  FrameSetup setup = *question.setup;
+  if (UsesOcclusion(setup)) setup.front = FindOpaqueFront(FindLeastExtinction(summary, volume), setup);
+  const FramePredictor predictor(setup, summary, drawn ? *drawn : *question.known.occupied, question.known.cost, *question.machine,
+                                 question.slots, question.render_scale);
   return Search(question, predictor).Run();
 }
 

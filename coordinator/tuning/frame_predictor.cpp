@@ -40,6 +40,7 @@ std::int32_t ChoosePixelSide(const FrameSetup& setup, std::uint32_t slots) {
 
 // The simulation uses only the size of the frame and the eye.
 FrameSetup Coarse(FrameSetup setup, std::int32_t side) {
+  setup.front = {};
   if (!setup.sheets.empty()) {
     setup.sheets.width = CoarsePixels(setup.sheets.width, side);
     setup.sheets.height = CoarsePixels(setup.sheets.height, side);

@@ -355,8 +355,9 @@ void FillImages(MeasuredFrame& frame) {
 Timeline Simulate(const MeasuredFrame& frame, const MachineModel& machine, int frames, int in_flight, bool keep_spans, int teams) {
   const Roster everybody = RosterOf(frame.plan.slots * std::uint32_t(teams));
   FramePlan plan = frame.plan;
-  if (machine.picture.direct && in_flight == 1) plan.share_pixels = kSharePixels;  // as a coordinator: frames that come one by one
-  std::vector<FramePlan> plans;                                                    // the distinct plans
+  const bool in_shares = machine.picture.direct && SharesPay(WholeFrame(plan.setup).end, in_flight == 1);
+  if (in_shares) plan.client.share_pixels = kSharePixels;
+  std::vector<FramePlan> plans;  // the distinct plans
   for (std::size_t turn = 0; turn < std::min(std::size_t(frames), everybody.slots.size()); ++turn) {
     const Team team = TeamOf(everybody, std::uint32_t(teams), turn);
     plans.push_back(TakeTurn(plan, team.roster, team.turn));

@@ -1,4 +1,4 @@
-"""The messages of proto/slabstream/v1, as classes: schema.Envelope(version=2), schema.FRAME_PHASE_QUEUED.
+"""The messages of proto/slabstream/v1, as classes: schema.Envelope(version=3), schema.FRAME_PHASE_QUEUED.
 
 They are made from schema.bin, a FileDescriptorSet that protoc wrote and a test compares with proto/. So the package needs no protoc to be
 installed, and takes any version of protobuf from 3.20 on.
@@ -11,7 +11,7 @@ from typing import Any
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 
 PACKAGE = "slabstream.v1"
-WIRE_VERSION = 2
+WIRE_VERSION = 3
 
 
 def _load() -> dict[str, Any]:

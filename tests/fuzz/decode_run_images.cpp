@@ -85,8 +85,9 @@ std::vector<FuzzBytes> RunImageSeeds() {
     for (const PixelBounds& bounds : {PixelBounds{}, PixelBounds{3, 5, 4, 6}, PixelBounds{0, 0, 12, 7}, PixelBounds{40, 20, 48, 32}}) {
       const LocalImage image = RandomImage(random, format, bounds);
       seeds.push_back(Seed(Encoded(image)));
-      if (format != PixelFormat::kRgba) continue;
-      for (const ColorCoding color : {ColorCoding::kHalf, ColorCoding::kFixed16}) seeds.push_back(Seed(EncodeRuns(ViewOf(image), color)));
+      for (const ColorCoding color : {ColorCoding::kHalf, ColorCoding::kFixed16, ColorCoding::kStraight8}) {
+        if (MayCode(format, color)) seeds.push_back(Seed(EncodeRuns(ViewOf(image), color)));
+      }
     }
   }
   // All pixels, without runs.

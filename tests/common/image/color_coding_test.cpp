@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "common/image/image_view.h"
 #include "common/image/run_image.h"
+#include "common/image/sample_codes.h"
 #include "tests/support/random_image.h"
 #include "tests/support/simd_targets.h"
 
@@ -117,6 +119,28 @@ TEST(ColorCoding, RunsAreHalfAsLongAndComeBackWithinTheBound) {
   RunImage wrong = EncodeRuns(ViewOf(depth));
   wrong.header.color = ColorCoding::kHalf;
   EXPECT_FALSE(ReadRuns(wrong.header, wrong.payload, kFrame).ok());
+}
+
+TEST(ColorCoding, ImagesWithVoxelsTravelWithColoursOf8Bits) {
+  Random random(75);
+  SCOPED_TRACE(random.trace());
+  constexpr PixelBounds kFrame = {0, 0, 40, 30};
+  for (int i = 0; i < 100; ++i) {
+    const LocalImage image = RandomImage(random, PixelFormat::kDepth, RandomBounds(random, kFrame));
+    const RunImage coded = EncodeRuns(ViewOf(image), ColorCoding::kStraight8);
+    EXPECT_EQ(coded.payload.size(), 12 * (coded.header.run_count + coded.header.pixel_count));
+    const LocalImage read = ReadRuns(coded.header, coded.payload, kFrame).value();
+    EXPECT_EQ(read.bounds, image.bounds);
+    EXPECT_TRUE(std::ranges::equal(read.depth, image.depth));
+    std::vector<std::uint8_t> expected(image.rgba.size()), codes(image.rgba.size());
+    StraightCodes(image.rgba.data(), expected.size() / 4, expected.data());
+    StraightCodes(read.rgba.data(), codes.size() / 4, codes.data());
+    for (std::size_t k = 0; k < image.depth.size(); ++k) {
+      if (std::isinf(image.depth[k])) continue;
+      ASSERT_EQ(read.voxel[k], image.voxel[k]);
+      ASSERT_TRUE(std::equal(&codes[4 * k], &codes[4 * k + 4], &expected[4 * k]));
+    }
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Whole schedules with images that travel in 16 bits a channel: the picture stays within the bound that the coding states.
+// Whole schedules with images that travel in fewer bits a channel: the picture stays within the bound that the coding states.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/combining/travel.h"
+#include "common/image/sample_codes.h"
 #include "common/kernels/combine.h"
 #include "tests/support/random_combining.h"
 #include "tests/support/random_image.h"
@@ -70,6 +71,26 @@ TEST(CodedCombining, StaysWithinItsBound) {
         ASSERT_LE(std::abs(coded.rgba[i] - exact.rgba[i]), bound + 2e-6) << combining << ", " << ranks << " ranks, coding " << int(coding);
       }
     }
+  }
+}
+
+TEST(CodedCombining, TheNearestPixelHasTheSameCodesHoweverItTravels) {
+  Random random(76);
+  SCOPED_TRACE(random.trace());
+  const auto codes_of = [](const LocalImage& image) {
+    std::vector<std::uint8_t> codes(image.rgba.size());
+    StraightCodes(image.rgba.data(), codes.size() / 4, codes.data());
+    return codes;
+  };
+  for (int trial = 0; trial < 50; ++trial) {
+    const auto ranks = random.Integer<Rank>(2, 20);
+    std::vector<LocalImage> images;
+    for (Rank rank = 0; rank < ranks; ++rank) images.push_back(RandomImage(random, PixelFormat::kDepth, kFrame));
+    const std::string combining = RandomCombining(random);
+    const Schedule schedule = MakeSchedule(combining, {ranks, random.Integer<Rank>(0, ranks - 1), kWhole});
+    EXPECT_EQ(codes_of(RunSchedule(schedule, images, ColorCoding::kStraight8)),
+              codes_of(RunSchedule(schedule, images, ColorCoding::kFloat32)))
+        << combining << ", " << ranks << " ranks";
   }
 }
 

@@ -173,5 +173,20 @@ TEST(PlanFrame, ColoursTravelInAsManyBitsAsTheirErrorAllows) {
   EXPECT_EQ(Validate(request).code(), StatusCode::kInvalidArgument);
 }
 
+TEST(PlanFrame, ColoursOfTheNearestPixelsTravelIn8BitsIfTheClientTakesThese) {
+  const VolumeSummary summary = FullSummary({40, 40, 40});
+  const auto color = [&](const RendererKind* renderer, bool straight8, double zoom) {
+    FrameRequest request = SomeRequest();
+    request.renderer = renderer->name();
+    request.straight8 = straight8;
+    request.view.zoom = zoom;
+    return Plan(request, summary, FullRoster(4)).groups[0].color;
+  };
+  EXPECT_EQ(color(ZBuffer(), true, 1), ColorCoding::kStraight8);
+  EXPECT_EQ(color(ZBuffer(), false, 1), ColorCoding::kFloat32);
+  EXPECT_EQ(color(ZBuffer(), true, 0.02), ColorCoding::kFloat32) << "pixels of the picture are means";
+  EXPECT_EQ(color(FindRenderer("raycast"), true, 1), ColorCoding::kFloat32) << "colours blend";
+}
+
 }  // namespace
 }  // namespace slabstream

@@ -41,7 +41,7 @@ TEST(PlanFrame, SharesAreOfDifferentWorkersAndTakeTurns) {
     if (workers > 2) roster.slots.back() = 0;  // another worker has its box
     const std::size_t present = std::size_t(workers) - (workers > 2 ? 1 : 0);
     for (std::size_t shares = 1; shares <= present + 1; ++shares) {
-      first.share_pixels = WholeFrame(first.setup).end / shares;
+      first.client.share_pixels = WholeFrame(first.setup).end / shares;
       std::set<WorkerId> all;
       for (std::uint64_t turn = 0; turn < present; ++turn) {
         const FramePlan plan = TakeTurn(first, roster, {turn, 1});
@@ -56,7 +56,7 @@ TEST(PlanFrame, SharesAreOfDifferentWorkersAndTakeTurns) {
       EXPECT_EQ(all.size(), present) << shares << " shares";
     }
     // A box that is tried alone is in nobody's way.
-    first.share_pixels = 1;
+    first.client.share_pixels = 1;
     const FramePlan trial = *Replan(first, roster, {{first.groups.front().placements.front().id}, 1});
     EXPECT_EQ(trial.groups.front().schedule.roots.size(), 1U);
   }

@@ -37,7 +37,7 @@ TEST(AnyMessage, EverySampleSurvivesTheWire) {
 }
 
 TEST(AnyMessage, HeaderBytesAreThoseOfTheDocumentation) {
-  const std::string documented("\x08\x02\x9a\x04\x09\x09\x05\x00\x00\x00\x00\x00\x00\x00", 14);  // docs/wire.md, section 2
+  const std::string documented("\x08\x03\x9a\x04\x09\x09\x05\x00\x00\x00\x00\x00\x00\x00", 14);  // docs/wire.md, section 2
   const Result<AnyMessage> decoded = Decode(BytesOf(documented));
   ASSERT_TRUE(decoded.ok()) << decoded.status().message();
   EXPECT_TRUE(*decoded == AnyMessage(StatusQuery{.nonce = 5}));
@@ -116,18 +116,18 @@ TEST(AnyMessage, EachMessageHasOnePlaceToGo) {
 }
 
 TEST(AnyMessage, EnvelopeFaultsAreNamed) {
-  EXPECT_EQ(Decode({}).status().message(), "Envelope.version: 0 is not the one spoken here, 2");
+  EXPECT_EQ(Decode({}).status().message(), "Envelope.version: 0 is not the one spoken here, 3");
   v1::Envelope envelope;
   envelope.mutable_stop()->set_epoch(5);
-  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 0 is not the one spoken here, 2");
+  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 0 is not the one spoken here, 3");
   envelope.set_version(1);
-  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 1 is not the one spoken here, 2");
-  envelope.set_version(2);
+  EXPECT_EQ(ErrorOf(envelope), "Envelope.version: 1 is not the one spoken here, 3");
+  envelope.set_version(3);
   EXPECT_EQ(ErrorOf(envelope), "");
   envelope.clear_message();
   EXPECT_EQ(ErrorOf(envelope), "Envelope.message: none that this version knows");
   // A message with a number that is not in the schema yet: field 99, of zero bytes.
-  EXPECT_EQ(Decode(BytesOf(std::string("\x08\x02\x9A\x06\x00", 5))).status().message(), "Envelope.message: none that this version knows");
+  EXPECT_EQ(Decode(BytesOf(std::string("\x08\x03\x9A\x06\x00", 5))).status().message(), "Envelope.message: none that this version knows");
   EXPECT_THAT(Decode(BytesOf("garbage")).status().message(), HasSubstr("Envelope: 7 bytes that are not a Protobuf message"));
   const std::vector<std::byte> huge(kMaxHeaderBytes + 1);
   EXPECT_EQ(Decode(huge).status().message(), "Envelope: 67108865 bytes, at most 67108864");

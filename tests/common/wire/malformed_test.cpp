@@ -307,8 +307,8 @@ TEST(Malformed, RandomBytesAreAnErrorOrAMessage) {
   SCOPED_TRACE(random.trace());
   std::cout << random.trace() << '\n';
   for (int round = 0; round < 5000; ++round) {
-    // After a true beginning, so that the body is reached: version 1, some member, some length.
-    std::vector<std::byte> input = {std::byte{0x08}, std::byte{0x01}};
+    // After a true beginning, so that the body is reached: the version, some member, some length.
+    std::vector<std::byte> input = {std::byte{0x08}, std::byte{kWireVersion}};
     for (int bytes = random.Integer(0, 200); bytes > 0; --bytes) input.push_back(std::byte(random.Integer(0, 255)));
     DecodeAnyInput(input);
   }

@@ -93,7 +93,9 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
     message.group.placements[1].filled = {{{{0, 0, 0}, {64, 32, 1}}, 5}, {{{64, 0, 1}, {kMaxVolumeSide, 32, 2}}, -1e30F}};
   }
   message.group.schedule = {ranks == 0 ? "" : "radix-k:2x3", ranks, {ranks / 2}};
-  message.group.color = renderer->format() == PixelFormat::kRgba ? ColorCoding::kFixed16 : ColorCoding::kFloat32;
+  message.group.color = renderer->format() == PixelFormat::kRgba    ? ColorCoding::kFixed16
+                        : renderer->format() == PixelFormat::kDepth ? ColorCoding::kStraight8
+                                                                    : ColorCoding::kFloat32;
   message.peers.push_back({kMax32, kOddEndpoint});
   return message;
 }
@@ -299,6 +301,7 @@ std::vector<PartialImage> SamplesOf() {
            PackedRuns{Codec::kZstd, 7 * 12 + 900 * 24 - 1, kMax64},
            kMax64,
            {RankReport{}, FullReport()}},
+          {1, 2, {3, 4, 5}, 0, {0, 1}, {0, 9}, {PixelFormat::kDepth, {1, 2, 30, 40}, 7, 900, ColorCoding::kStraight8}, {}, {}, 0, {}},
           {1,
            2,
            {3, 4, 5},

@@ -71,6 +71,33 @@ TEST(BoxEstimator, BoxesWithoutAnythingCostAndShowNothing) {
   EXPECT_EQ(nothing.coverage.pixels(), 0);
 }
 
+TEST(BoxEstimator, WhatTheFrontHidesCostsAndShowsNothing) {
+  const Index3 size = {64, 64, 64};
+  const VolumeSummary summary = FullGridSummary(size);
+  const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
+  const std::vector<double> seconds(grid.cells.size(), 0.5);
+  const WorkField learnt(size, seconds);
+  const Box near = {{0, 0, 0}, {64, 32, 64}}, far = {{0, 32, 0}, {64, 64, 64}};
+  for (const RendererKind* renderer : {Splatting(), FindRenderer("raycast")}) {
+    FrameSetup setup = SetupOf(size, renderer);  // along +y
+    const BoxEstimator::Estimate seen = BoxEstimator(setup, summary, grid, nullptr, 1).Of(far);
+    EXPECT_GT(seen.seconds, 0);
+    setup.front.tile = FrontTile(setup);
+    setup.front.tiles_x = setup.front.tiles_y = (FrameBounds(setup).width() - 1) / setup.front.tile + 1;
+    OpaqueFront::Depths depths;
+    depths.fill(24);  // slices
+    setup.front.tiles.assign(std::size_t(setup.front.tiles_x) * std::size_t(setup.front.tiles_y), depths);
+    ASSERT_TRUE(CheckFits(setup.front, setup).ok());
+    const BoxEstimator estimator(setup, summary, grid, nullptr, 1), by_measured(setup, summary, grid, &learnt, 1);
+    EXPECT_EQ(estimator.Of(far).seconds, 0) << renderer->name();
+    EXPECT_EQ(estimator.Of(far).coverage.pixels(), 0) << renderer->name();
+    const BoxEstimator::Estimate in_front = BoxEstimator(SetupOf(size, renderer), summary, grid, nullptr, 1).Of(near);
+    EXPECT_NEAR(estimator.Of(near).seconds, 0.75 * in_front.seconds, 1e-6 * in_front.seconds) << renderer->name();
+    EXPECT_EQ(by_measured.Of(far).coverage.pixels(), 0) << renderer->name();
+    EXPECT_NEAR(by_measured.Of(far).seconds, 0.5 * 8 * 8 * 4, 1e-6) << "measured times do not have what was hidden";
+  }
+}
+
 TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
   Random random(4711);
   SCOPED_TRACE(random.trace());
