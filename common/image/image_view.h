@@ -40,8 +40,8 @@ LocalImage CopyOf(const ImageView& view);  // with the view's rows
 // in memory, if the format has depths, or if a sample of the pixels suggests that so many are empty that runs are shorter.
 std::optional<RunImageHeader> DenseHeader(const ImageView& view);
 
-// Encodes the pixels of `view`; the header has its bounds. Only kRgba images are coded as `color`, and only if all their colours can be
-// (ToCodes); all others as floats.
+// Encodes the pixels of `view`; the header has its bounds. They are coded as `color` if that MayCode the format and all colours (ToCodes),
+// else as floats.
 RunImage EncodeRuns(const ImageView& view, ColorCoding color = ColorCoding::kFloat32);
 
 }  // namespace slabstream

@@ -112,12 +112,17 @@ TEST(CoordinatorPictures, AreNotDividedForOthers) {
   EXPECT_EQ(roots(KeysScript::WithDoor(3, 2)), 1U) << "two groups";
 }
 
-TEST(CoordinatorPictures, AreNotDividedIfFramesFollowOneAnother) {
+TEST(CoordinatorPictures, AreNotDividedIfSmallFramesFollowOneAnother) {
   SharesScript script;
   const auto first = HandedOut(script.Submit(kClient, KeysScript::WithDoor(1)));
   const auto second = HandedOut(script.Submit(kClient, KeysScript::WithDoor(2)));
   EXPECT_THAT(first.at(0).group.schedule.roots, SizeIs(2));
   EXPECT_THAT(second.at(0).group.schedule.roots, SizeIs(1));
+  SubmitFrame large = KeysScript::WithDoor(3);
+  large.frame.size = {2048, 512};
+  SharesScript other;
+  other.Submit(kClient, KeysScript::WithDoor(1));
+  EXPECT_THAT(HandedOut(other.Submit(kClient, large)).at(0).group.schedule.roots, SizeIs(2));
 }
 
 TEST(CoordinatorPictures, AreMadeAnewIfAWorkerWithAShareIsLost) {

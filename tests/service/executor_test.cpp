@@ -6,10 +6,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cstring>
 #include <semaphore>
 
+#include "common/kernels/combine.h"
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
 #include "common/wire/payload.h"
@@ -81,6 +83,35 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
 }
 
 // In strips, say: the report goes with the last one.
+TEST_F(ExecutorTest, SharesOfALargeFrameBecomeOneImage) {
+  constexpr PixelBounds kLarge = {0, 0, 4099, 1100};  // so large that images do not get room for all of it at once
+  constexpr auto kPixels = std::uint64_t(kLarge.pixel_count());
+  constexpr std::uint64_t kShares = 7;  // which begin within rows
+  const LocalImage front = Filled({100, 50, 300, 900}, 0.5F), back = Filled({250, 0, 320, 1100}, 0.25F);
+  const auto share = [](std::uint64_t i) { return PixelRange{i * kPixels / kShares, (i + 1) * kPixels / kShares}; };
+  for (std::uint64_t i = 0; i < kShares; ++i) {
+    for (const LocalImage* image : {&front, &back}) {
+      RunImage runs = EncodeRuns(*image, share(i), kLarge.width());
+      executor_.Perform(StartCombine{.key = kKey,
+                                     .image = 1 + i,
+                                     .incoming = IncomingImage{.header = runs.header, .payload = Bytes(std::move(runs.payload))},
+                                     .side = Side::kBack,
+                                     .pixels = share(i),
+                                     .frame = kLarge});
+      EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
+    }
+  }
+  for (std::uint64_t i = 1; i < kShares; ++i) {
+    executor_.Perform(StartCombine{.key = kKey, .image = 1, .other = 1 + i, .side = Side::kBack, .pixels = share(i), .frame = kLarge});
+    EXPECT_TRUE(outputs_.NextEvent<CombineDone>().status.ok());
+  }
+  LocalImage expected = front;
+  Combine(expected, back, Side::kBack);
+  const LocalImage whole = PixelsOf(1, {0, kPixels}, kLarge);
+  EXPECT_EQ(whole.bounds, expected.bounds);
+  EXPECT_TRUE(std::ranges::equal(whole.rgba, expected.rgba));
+}
+
 TEST_F(ExecutorTest, ReportsTellOfAllMessagesOfTheirRank) {
   ASSERT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   const auto send = [&](Rank rank, PixelRange pixels, std::vector<RankReport> reports) {

@@ -186,6 +186,11 @@ TEST(PlanFrame, ColoursOfTheNearestPixelsTravelIn8BitsIfTheClientTakesThese) {
   EXPECT_EQ(color(ZBuffer(), false, 1), ColorCoding::kFloat32);
   EXPECT_EQ(color(ZBuffer(), true, 0.02), ColorCoding::kFloat32) << "pixels of the picture are means";
   EXPECT_EQ(color(FindRenderer("raycast"), true, 1), ColorCoding::kFloat32) << "colours blend";
+  FrameRequest request = SomeRequest();
+  request.renderer = ZBuffer()->name();
+  request.straight8 = true;
+  request.shading.model = ShadingModel::kDepthGradient;
+  EXPECT_EQ(Plan(request, summary, FullRoster(4)).groups[0].color, ColorCoding::kFloat32) << "colours are shaded after combining";
 }
 
 }  // namespace
