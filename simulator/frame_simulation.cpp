@@ -239,7 +239,8 @@ auto FrameSimulation::CostOf(const Job&, const FindHidden& action) const -> Cost
 double FrameSimulation::MessageBytes(const GroupKey& key, const UnionCoverage::Amount& amount) const {
   const CombiningCosts& costs = machine_.combining;
   const FramePlan& of = plan(FrameOf(key));
-  const double color_share = double(BytesPerChannel(of.groups[key.group].color)) / double(BytesPerChannel(ColorCoding::kFloat32));
+  const ColorCoding color = MayCode(of.setup.format, of.groups[key.group].color) ? of.groups[key.group].color : ColorCoding::kFloat32;
+  const double color_share = double(BytesPerChannel(color)) / double(BytesPerChannel(ColorCoding::kFloat32));
   const double pixel_bytes = costs.rgba_bytes * color_share + (HasDepth(of.setup.format) ? costs.depth_bytes - costs.rgba_bytes : 0);
   return amount.filled * pixel_bytes + amount.runs * costs.run_bytes;
 }

@@ -4,12 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <iterator>
 #include <random>
 
+#include "common/image/run_image.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/service/multi_process_fixture.h"
@@ -157,6 +159,18 @@ TEST_F(MultiProcessTest, WorkersThatShareNoMemoryGiveTheSamePicture) {
       ASSERT_TRUE(coded.ok()) << coded.status().message();
       const double allowed = renderer->format() == PixelFormat::kRgba ? request.policy.pixel_error : 0;
       EXPECT_LE(LargestDifference(coded->image, expected, request.size), AllowedDifference(request) + allowed) << scheme.name;
+
+      if (renderer != ZBuffer()) continue;
+      request.straight8 = true;  // images have colours of 8 bits, and the picture has the same codes
+      const Result<Picture> straight = client.Render(request, seconds(60));
+      ASSERT_TRUE(straight.ok()) << straight.status().message();
+      ASSERT_NE(straight->image.codes(), nullptr);
+      const StraightImage& codes = *straight->image.codes();
+      const RunImage runs = EncodePicture(expected, ColorCoding::kStraight8);
+      StraightImage direct = MakeStraightImage(Union(codes.bounds, runs.header.bounds));
+      ASSERT_EQ(codes.bounds, direct.bounds);
+      ASSERT_EQ(ReadCodesInto(runs.header, runs.payload, {0, 0, request.size.width, request.size.height}, direct), Status::Ok());
+      EXPECT_TRUE(std::ranges::equal(codes.codes, direct.codes)) << scheme.name;
     }
   }
 }

@@ -91,15 +91,19 @@ TEST(SimulateFrames, ARenderingIsOrderedWhenTheLastOneIsKnown) {
 TEST(SimulateFrames, ColoursInFewerBitsAreFewerBytes) {
   for (const RendererKind* renderer : Renderers()) {
     std::map<ColorCoding, double> bytes;
-    for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16}) {
+    for (const ColorCoding color : {ColorCoding::kFloat32, ColorCoding::kHalf, ColorCoding::kFixed16, ColorCoding::kStraight8}) {
       MadeFrame frame(5, 2, kSide, 0.5, 1, "fan-in", renderer);
       for (GroupPlan& group : frame.plan().groups) group.color = color;
       bytes[color] = Simulate({frame.input()}, WithoutDelays()).frames[0].image_bytes;
     }
-    const double share = renderer->format() == PixelFormat::kRgba ? 0.5 : 1;  // others are never coded
+    const double share = renderer->format() == PixelFormat::kRgba ? 0.5 : 1;  // others are not coded in 16 bits
     EXPECT_GT(bytes[ColorCoding::kFloat32], 0);
     EXPECT_DOUBLE_EQ(bytes[ColorCoding::kHalf], share * bytes[ColorCoding::kFloat32]);
     EXPECT_DOUBLE_EQ(bytes[ColorCoding::kFixed16], share * bytes[ColorCoding::kFloat32]);
+    const double of_floats = renderer->format() == PixelFormat::kRgba    ? 4.0 / 16
+                             : renderer->format() == PixelFormat::kDepth ? 12.0 / 24
+                                                                         : 1;
+    EXPECT_DOUBLE_EQ(bytes[ColorCoding::kStraight8], of_floats * bytes[ColorCoding::kFloat32]);
   }
 }
 
