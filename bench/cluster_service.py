@@ -52,8 +52,8 @@ def run_program(name: str, main, interrupted: str = "interrupted; the same comma
 
 
 class Service:
-    """A coordinator on the first host, a client on the second, a worker on each of the others. `link` between them, as the coordinator takes
-    it when it predicts frames, not dilated."""
+    """A coordinator on the first host, a client on the second, a worker on each of the others. `link`: the links between them as real time
+    sees them, which the coordinator predicts frames with; none: its default."""
 
     def __init__(self, hosts: list[Host], data: dict[str, pathlib.Path], programs: pathlib.Path, folder: pathlib.Path, link: str | None = None):
         self._programs, self._folder = programs, folder

@@ -95,15 +95,14 @@ void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalIma
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
   const RunImageHeader& header = action.incoming->header;
+  if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;  // its size says how much memory is taken
   Bytes payload = action.incoming->payload;
   if (const Rare<PackedRuns>& packed = action.incoming->packed) {
-    if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;
     Result<Bytes> unpacked = UnpackRuns(*packed, payload, PayloadBytes(header));
     if (!unpacked.ok()) return unpacked.status();
     payload = *std::move(unpacked);
   }
   if (!action.replace && Covers(pixels, header.bounds, action.frame.width())) {
-    if (Status fits = ValidateRunHeader(header, action.frame); !fits.ok()) return fits;
     const PixelBounds room = RoomFor(image.bounds, header.bounds, pixels, action.frame);
     if (fresh) image = MakeRoom(header.format, room);
     return CombineRuns(image, header, payload.span(), action.frame, action.side, room);
