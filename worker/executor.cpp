@@ -73,13 +73,6 @@ PixelBounds RoomFor(const PixelBounds& image, const PixelBounds& other, PixelRan
   return rows.pixel_count() <= kMostPixels ? Union(both, rows) : both;
 }
 
-// An image without a pixel that has room for some.
-LocalImage MakeRoom(PixelFormat format, const PixelBounds& room) {
-  LocalImage image = MakeUnwrittenImage(format, room);
-  image.rows.resize(std::size_t(room.height()));
-  return image;
-}
-
 // With another image of this worker. `fresh`: `image` does not exist yet.
 void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalImage>& other, const StartCombine& action, PixelRange pixels) {
   const bool whole = Covers(pixels, other->bounds, action.frame.width());
@@ -88,9 +81,10 @@ void CombineImages(LocalImage& image, bool fresh, const std::shared_ptr<LocalIma
     return;
   }
   const ImageView view = whole ? ViewOf(*other) : ViewOf(*other, pixels, action.frame.width());
-  if (fresh) image = MakeRoom(view.format, RoomFor(view.bounds, view.bounds, pixels, action.frame));
+  const PixelBounds room = RoomFor(image.bounds, view.bounds, pixels, action.frame);
+  if (fresh) image = MakeEmptyRows(view.format, room);
   if (action.replace) Erase(image, pixels, action.frame.width());
-  Combine(image, view, action.side, RoomFor(image.bounds, view.bounds, pixels, action.frame));
+  Combine(image, view, action.side, room);
 }
 
 Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action, PixelRange pixels) {
@@ -104,7 +98,7 @@ Status CombineIncoming(LocalImage& image, bool fresh, const StartCombine& action
   }
   if (!action.replace && Covers(pixels, header.bounds, action.frame.width())) {
     const PixelBounds room = RoomFor(image.bounds, header.bounds, pixels, action.frame);
-    if (fresh) image = MakeRoom(header.format, room);
+    if (fresh) image = MakeEmptyRows(header.format, room);
     return CombineRuns(image, header, payload.span(), action.frame, action.side, room);
   }
   Result<LocalImage> read = ReadRuns(header, payload.span(), action.frame);
@@ -120,7 +114,7 @@ Status CombineBorrowed(LocalImage& image, bool fresh, const StartCombine& action
   if (!borrowed.ok()) return borrowed.status();
   const ImageView& view = borrowed->view;
   const PixelBounds room = RoomFor(image.bounds, view.bounds, pixels, action.frame);
-  if (fresh) image = MakeRoom(view.format, room);
+  if (fresh) image = MakeEmptyRows(view.format, room);
   if (action.replace) Erase(image, pixels, action.frame.width());
   const bool valid = CombineUnchecked(image, view, action.side, room);
   // The owner reused the frame while it was read here: `image` may hold anything, and the group fails.

@@ -49,7 +49,7 @@ Progress ProgressOf(const FrameProgress& progress) {
           .workers = int(progress.workers)};
 }
 
-// Calls function(y, first) for each row y of the bounds. In an array of the picture, `width` pixels a row, the row begins at `first`.
+// Calls function(y, first) for each row y of the bounds. Its first pixel has the index `first` in a picture of `width` pixels a row.
 template <class Function>
 void ForEachRow(const PixelBounds& bounds, int width, Function&& function) {
   for (int y = bounds.y_begin; y < bounds.y_end; ++y) function(y, std::size_t(y) * std::size_t(width) + std::size_t(bounds.x_begin));

@@ -150,8 +150,7 @@ OcclusionMask MaskBefore(const Box& box, const FrameSetup& setup) {
     const std::optional<double> first = beam->FirstIn(area, nearest, ascending);
     if (!first || std::abs(*first - nearest) > deepest) return kOcclusionSteps;
     const double before = std::floor(ascending ? *first : slices - 1 - *first);  // slices
-    return std::uint8_t(std::ranges::count_if(
-        depths, [&](std::uint8_t depth) { return depth != OpaqueFront::kNever && double(depth) * front.unit <= before; }));
+    return front.StepsAt(depths, before);
   };
   std::size_t number = 0;
   for (std::int32_t y = tiles.y_begin; y < tiles.y_end; ++y) {

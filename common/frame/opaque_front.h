@@ -5,6 +5,7 @@
 // Distances count slices along the camera's traversal axis: every ray meets them in the same order.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -30,6 +31,11 @@ struct OpaqueFront {
   std::vector<Depths> tiles;  // [y][x]: [n]: units from the volume's nearest slice on until n + 1 steps (OcclusionMask) are done
 
   bool empty() const { return tile == 0; }
+  // The steps that are done so many slices behind the volume's nearest one, in a tile of these depths.
+  std::uint8_t StepsAt(const Depths& depths, double slices) const {
+    return std::uint8_t(
+        std::ranges::count_if(depths, [&](std::uint8_t depth) { return depth != kNever && double(depth) * unit <= slices; }));
+  }
   friend bool operator==(const OpaqueFront&, const OpaqueFront&) = default;
 };
 

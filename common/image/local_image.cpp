@@ -21,6 +21,12 @@ LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds) {
   return image;
 }
 
+LocalImage MakeEmptyRows(PixelFormat format, const PixelBounds& bounds) {
+  LocalImage image = MakeUnwrittenImage(format, bounds);
+  image.rows.resize(std::size_t(bounds.height()));
+  return image;
+}
+
 void FillRows(LocalImage& image) {
   const auto width = std::size_t(image.bounds.width());
   for (std::size_t y = 0; y < image.rows.size(); ++y) {

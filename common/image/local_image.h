@@ -34,6 +34,8 @@ struct LocalImage {
 
 // All pixels empty.
 LocalImage MakeLocalImage(PixelFormat format, const PixelBounds& bounds);
+// The same, by spans: it has room for pixels, and nothing is written.
+LocalImage MakeEmptyRows(PixelFormat format, const PixelBounds& bounds);
 // Makes pixels [begin, end), by index, empty.
 void MakeEmpty(LocalImage& image, std::size_t begin, std::size_t end);
 // Stores the empty pixels outside `rows`, and drops the spans.

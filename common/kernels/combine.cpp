@@ -155,8 +155,7 @@ bool CombineRows(LocalImage& image, const ImageView& other, Side side, const Pix
   const LocalImage old = std::move(image);
   const ImageView ours = ViewOf(old);
   CHECK(room.Contains(ours.bounds) && room.Contains(other.bounds));
-  image = MakeUnwrittenImage(old.format, room);
-  image.rows.resize(std::size_t(room.height()));
+  image = MakeEmptyRows(old.format, room);
   for (std::int32_t y = room.y_begin; y < room.y_end; ++y) {
     const RowPixels a = RowOf(ours, y, room.x_begin), b = RowOf(other, y, room.x_begin);
     if (!MergeRow<kOther>(a, b, side, image, RowBegin(room, y), false)) return false;
@@ -209,11 +208,8 @@ Status CombineRuns(LocalImage& image, const RunImageHeader& header, std::span<co
   CHECK_EQ(int(image.format), int(header.format));
   if (Status table = ValidateRunTable(header, payload, frame); !table.ok()) return table;
   if (header.pixel_count == 0) return Status::Ok();
-  if (!image.bounds.Contains(header.bounds)) {  // first make room for all
-    LocalImage nothing = MakeUnwrittenImage(header.format, header.bounds);
-    nothing.rows.resize(std::size_t(header.bounds.height()));
-    Combine(image, ViewOf(nothing), side, room);
-  }
+  // First make room for all.
+  if (!image.bounds.Contains(header.bounds)) Combine(image, ViewOf(MakeEmptyRows(header.format, header.bounds)), side, room);
 
   // A run that kernels cannot read in place is copied; it fits the cache.
   const RunPayload runs(header, payload);

@@ -63,11 +63,10 @@ bool BoxEstimator::IsHidden(const Box& box, const FrameArea& seen) const {
   const OpaqueFront& front = setup_.front;
   if (front.empty()) return false;
   const auto tile = [&front](double begin, double end) { return std::size_t((begin + end) / 2) / std::size_t(front.tile); };
-  const std::uint8_t depth =
-      front.tiles[tile(seen.y_begin, seen.y_end) * std::size_t(front.tiles_x) + tile(seen.x_begin, seen.x_end)].back();
+  const std::size_t number = tile(seen.y_begin, seen.y_end) * std::size_t(front.tiles_x) + tile(seen.x_begin, seen.x_end);
   const Axis along = AxesOf(setup_.camera.traversal_axis).c;
   const std::int32_t before = setup_.camera.ascending ? box.begin[along] : size_[along] - box.end[along];  // slices
-  return depth != OpaqueFront::kNever && depth * front.unit <= before;
+  return front.StepsAt(front.tiles[number], before) == kOcclusionSteps;
 }
 
 BoxEstimator::Estimate BoxEstimator::Of(const Box& box) const {

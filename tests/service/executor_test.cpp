@@ -82,7 +82,6 @@ TEST_F(ExecutorTest, ImagesCombineInOrderAndSourcesStayAsTheyAre) {
   EXPECT_FLOAT_EQ(PixelAt(PixelsOf(2), 1, 1).rgba[3], 0.25F);
 }
 
-// In strips, say: the report goes with the last one.
 TEST_F(ExecutorTest, SharesOfALargeFrameBecomeOneImage) {
   constexpr PixelBounds kLarge = {0, 0, 4099, 1100};  // so large that images do not get room for all of it at once
   constexpr auto kPixels = std::uint64_t(kLarge.pixel_count());
@@ -112,6 +111,7 @@ TEST_F(ExecutorTest, SharesOfALargeFrameBecomeOneImage) {
   EXPECT_TRUE(std::ranges::equal(whole.rgba, expected.rgba));
 }
 
+// In strips, say: the report goes with the last one.
 TEST_F(ExecutorTest, ReportsTellOfAllMessagesOfTheirRank) {
   ASSERT_TRUE(CombineIncoming(1, Filled({0, 0, 8, 4}, 0.5F), Side::kBack).status.ok());
   const auto send = [&](Rank rank, PixelRange pixels, std::vector<RankReport> reports) {

@@ -26,6 +26,14 @@ OccupancyGrid FilledGrid(const Index3& size, const Box& filled) {
   return grid;
 }
 
+// A volume that is drawn everywhere.
+struct FullVolume {
+  Index3 size = {64, 64, 64};
+  VolumeSummary summary = FullGridSummary(size);
+  OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
+  WorkField learnt = {size, std::vector<double>(grid.cells.size(), 0.5)};  // seconds of each cell
+};
+
 FrameSetup SetupOf(const Index3& size, const RendererKind* renderer, const ViewParameters& view = {}, int side = 256) {
   FrameRequest request = SomeRequest();
   request.renderer = renderer->name();
@@ -72,11 +80,8 @@ TEST(BoxEstimator, BoxesWithoutAnythingCostAndShowNothing) {
 }
 
 TEST(BoxEstimator, WhatTheFrontHidesCostsAndShowsNothing) {
-  const Index3 size = {64, 64, 64};
-  const VolumeSummary summary = FullGridSummary(size);
-  const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
-  const std::vector<double> seconds(grid.cells.size(), 0.5);
-  const WorkField learnt(size, seconds);
+  const FullVolume volume;
+  const auto& [size, summary, grid, learnt] = volume;
   const Box near = {{0, 0, 0}, {64, 32, 64}}, far = {{0, 32, 0}, {64, 64, 64}};
   for (const RendererKind* renderer : {Splatting(), FindRenderer("raycast")}) {
     FrameSetup setup = SetupOf(size, renderer);  // along +y
@@ -134,11 +139,8 @@ TEST(BoxEstimator, SharesAreSharesAndBoxesCoverWhatTheWholeCovers) {
 }
 
 TEST(BoxEstimator, WhatWasLearntCounts) {
-  const Index3 size = {64, 64, 64};
-  const VolumeSummary summary = FullSummary(size);
-  const OccupancyGrid grid = FilledGrid(size, {{0, 0, 0}, size});
-  const std::vector<double> seconds(grid.cells.size(), 0.5);
-  const WorkField learnt(size, seconds);
+  const FullVolume volume;
+  const auto& [size, summary, grid, learnt] = volume;
   const FrameSetup setup = SetupOf(size, ZBuffer());
   const BoxEstimator estimator(setup, summary, grid, &learnt, 1);
   EXPECT_NEAR(estimator.Of({{0, 0, 0}, {64, 64, 32}}).seconds, 0.5 * 8 * 8 * 4, 1e-6);
