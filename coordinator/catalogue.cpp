@@ -278,6 +278,7 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   Result<SourceText> text = ParseSourceText(data.path);
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
+  text->options.describe = data.describe && !IsReadWhole(text->path, text->options);
   if (!data.layers.any()) {
     const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
     const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };

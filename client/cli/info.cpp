@@ -105,7 +105,9 @@ nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
 Result<VolumeFacts> FactsOf(const std::string& source) {
   ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
   const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
-  Result<ReadableSource> read = ReadSource({source, ""}, std::uint64_t(kExactBytes), tell);
+  DataSource data(source, "");
+  data.describe = true;
+  Result<ReadableSource> read = ReadSource(data, std::uint64_t(kExactBytes), tell);
   if (!read.ok()) return AsInput(read.status());
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};
@@ -217,7 +219,6 @@ std::string PartsText(const SourceInfo& info) {
     text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
                         spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
   }
-  if (info.times > 1) text += fmt::format("times        {}\n", info.times);
   if (info.window) text += fmt::format("window       {:g} ... {:g}, which the file asks for\n", info.window->min, info.window->max);
   return text;
 }
@@ -227,6 +228,16 @@ std::string ChannelsText(const VolumeFileInfo& info) {
   std::string text = fmt::format("channels     {}:", info.channels.size());
   for (const std::string& name : info.channels) text += fmt::format(" \"{}\"", Printable(name));
   return text + (info.channels.size() > 1 ? fmt::format("; this is number {}\n", info.channel) : "\n");
+}
+
+std::string TimesText(const VolumeFileInfo& info) {
+  return info.times > 1 ? fmt::format("times        {}; this is number {}\n", info.times, info.time) : "";
+}
+
+std::string NotesText(const VolumeFileInfo& info) {
+  std::string text;
+  for (const std::string& note : info.notes) text += fmt::format("note         {}\n", Printable(note));
+  return text;
 }
 
 std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& index, const std::string& transfer, double occupancy) {
@@ -242,7 +253,7 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
   text += OrientationText(facts);
   if (facts.parts) text += PartsText(facts.parts->source->info());
-  text += ChannelsText(info);
+  text += TimesText(info) + ChannelsText(info) + NotesText(info);
   text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
@@ -320,7 +331,6 @@ void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
                               {"voxel_bytes", level.description.voxel_bytes()},
                               {"block", SizeJson(level.block)}});
   }
-  json["times"] = info.times;
   if (info.window) json["window"] = RangeJson(*info.window);
   json["statistics"] = {{"level", facts.parts->survey.level}, {"sample", facts.parts->survey.sample}};
 }
@@ -347,6 +357,9 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
                                  {"labels", info.labels},
                                  {"channels", info.channels},
                                  {"channel", info.channel},
+                                 {"times", info.times},
+                                 {"time", info.time},
+                                 {"notes", info.notes},
                                  {"voxel_bytes", d.voxel_bytes()},
                                  {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
                                  {"spacing", VectorJson(d.geometry.spacing)},

@@ -49,6 +49,7 @@ hid_t NativeType(SampleType type) {
     case SampleType::kInt64: return H5T_NATIVE_INT64;
     case SampleType::kUint64: return H5T_NATIVE_UINT64;
     case SampleType::kFloat32: return H5T_NATIVE_FLOAT;
+    case SampleType::kFloat16:  // libhdf5 has no such type of its own
     case SampleType::kFloat64: break;
   }
   return H5T_NATIVE_DOUBLE;

@@ -47,7 +47,10 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .steps = StepsOf(finest.geometry.spacing),
           .labels = source.labels,
           .channels = source.channels,
-          .channel = source.channel};
+          .channel = source.channel,
+          .times = source.times,
+          .time = source.time,
+          .notes = source.notes};
 }
 
 void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info) {

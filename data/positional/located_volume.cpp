@@ -29,7 +29,6 @@ Result<LocatedSamples> Locate(const VolumeFormat& format, const std::string& pat
   const bool compressed = located->payload.compressed;
   if (compressed != (packing == Packing::kCompressed))
     return NotInParts(path, compressed ? "its samples are compressed" : "its samples are not compressed");
-  if (located->halves) return NotInParts(path, "its samples are half floats");
   return located;
 }
 
@@ -64,6 +63,8 @@ Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& o
                      .file_type = std::string(ToString(header.type)),
                      .labels = header.labels,
                      .times = int(header.volumes),
+                     .time = int(header.number),
+                     .notes = header.notes,
                      .files = {path}};
   if (header.components > 1) info.channels.resize(std::size_t(header.components));
   if (payload->file != path) info.files.push_back(payload->file.string());

@@ -20,7 +20,7 @@ struct LocatedVolume {
   SourceInfo info;  // one level; samples as KeptTypeOf says
 };
 
-// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise, are half floats or lie in several pieces; axes
+// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise or lie in several pieces; axes
 // that are not at right angles; the luminance of several components.
 Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& options, Packing packing);
 

@@ -4,7 +4,7 @@
 // The volume is that of ReadVolume (volume_reader.h): the same voxels in the same axes, turned to those nearest to the world's. Its
 // description differs in one thing: integers of more than 16 bits and float64 always become float32, since nobody has seen all values.
 //
-// Not read by position, so that `open` ends in InvalidArgument: compressed samples, half floats, axes that are not at right angles, and
+// Not read by position, so that `open` ends in InvalidArgument: compressed samples, axes that are not at right angles, and
 // the luminance of several components.
 #pragma once
 

@@ -9,7 +9,8 @@ namespace slabstream {
 namespace {
 
 template <class From>
-using Kept = std::conditional_t<sizeof(From) == 1, std::uint8_t, std::conditional_t<sizeof(From) == 2, std::uint16_t, float>>;
+using Kept = std::conditional_t<sizeof(From) == 1, std::uint8_t,
+                                std::conditional_t<sizeof(From) == 2 && std::is_integral_v<From>, std::uint16_t, float>>;
 
 template <class From>
 Kept<From> Converted(From value) {

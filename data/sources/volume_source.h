@@ -39,8 +39,9 @@ struct SourceInfo {
   bool labels = false;                     // samples are numbers of structures, not measurements
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it shows
-  int times = 1;                           // that the source holds, of which it shows one
+  int times = 1, time = 0;                 // how many the source holds, and which of them it shows
   std::optional<ValueRange> window = {};   // data values that its author shows
+  std::vector<std::string> notes = {};     // as of VolumeFileInfo
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
   std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
   std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them

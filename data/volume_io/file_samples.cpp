@@ -14,7 +14,7 @@ namespace {
 // Whether a sample of type T holds the value; a float holds it rounded.
 template <class T>
 bool Holds(double value) {
-  if constexpr (std::is_floating_point_v<T>) {
+  if constexpr (!std::is_integral_v<T>) {
     return !std::isfinite(value) || std::abs(value) <= double(std::numeric_limits<T>::max());
   } else {
     // The limits of 64 bits are not exact as double: the upper one is a power of two, which is the first value that does not fit.
@@ -76,6 +76,7 @@ double DataValue(const Volume& volume, std::size_t number) {
 }  // namespace
 
 Result<FileSamples> FileSamples::Of(const Volume& volume, std::optional<SampleType> type, WriteProgress progress) {
+  if (type == SampleType::kFloat16) return Status::InvalidArgument("float16 samples are read, but not written; float32 holds them");
   if (type) {
     if (const std::optional<std::size_t> misfit = FirstMisfit(volume, *type)) {
       const Index3 voxel = PlaceIn(volume.description.geometry.size, *misfit);

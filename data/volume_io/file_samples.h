@@ -22,7 +22,7 @@ class FileSamples {
  public:
   // The volume must outlive what is made. Without `type`: the type that the samples were read from if that is known to hold the data
   // values, else the smallest integer type that holds them, else float32. With it InvalidArgument, naming the value and the voxel: the type
-  // does not hold a data value (floats hold rounded ones).
+  // does not hold a data value (floats hold rounded ones), or is float16.
   static Result<FileSamples> Of(const Volume& volume, std::optional<SampleType> type, WriteProgress progress = {});
 
   const VolumeGeometry& geometry() const { return volume_->description.geometry; }

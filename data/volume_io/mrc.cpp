@@ -22,21 +22,16 @@ constexpr std::size_t Word(int number) { return 4 * std::size_t(number - 1); }
 // Little endian unless the machine stamp says otherwise.
 bool IsBigEndian(std::span<const std::byte> bytes) { return bytes[Word(54)] == std::byte{0x11} && bytes[Word(54) + 1] == std::byte{0x11}; }
 
-struct Mode {
-  SampleType type = SampleType::kInt8;
-  bool halves = false;
-};
-
-std::optional<Mode> ModeOf(const BinaryHeader& fields) {
+std::optional<SampleType> TypeOf(const BinaryHeader& fields) {
   constexpr std::int32_t kImodStamp = 1146047817, kSignedBytes = 1;
   // IMOD wrote unsigned bytes, and marks files whose bytes are signed.
   const bool imod = fields.At<std::int32_t>(Word(39)) == kImodStamp, is_signed = (fields.At<std::int32_t>(Word(40)) & kSignedBytes) != 0;
   switch (fields.At<std::int32_t>(Word(4))) {
-    case 0: return Mode{imod && !is_signed ? SampleType::kUint8 : SampleType::kInt8};
-    case 1: return Mode{SampleType::kInt16};
-    case 2: return Mode{SampleType::kFloat32};
-    case 6: return Mode{SampleType::kUint16};
-    case 12: return Mode{SampleType::kUint16, true};
+    case 0: return imod && !is_signed ? SampleType::kUint8 : SampleType::kInt8;
+    case 1: return SampleType::kInt16;
+    case 2: return SampleType::kFloat32;
+    case 6: return SampleType::kUint16;
+    case 12: return SampleType::kFloat16;
     default: return std::nullopt;
   }
 }
@@ -107,20 +102,20 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   if (!std::ranges::equal(std::span(bytes).subspan(Word(53), 4), kMap)) {
     return Status::InvalidArgument(path + ": not an MRC volume: the letters 'MAP ' are missing in its header");
   }
-  const std::optional<Mode> mode = ModeOf(fields);
-  if (!mode) {
+  const std::optional<SampleType> type = TypeOf(fields);
+  if (!type) {
     return Status::InvalidArgument(
         fmt::format("{}: MRC mode {} is not supported; supported: 0, 1, 2, 6 and 12 (integers of 8 and 16 bits, floats)", path,
                     fields.At<std::int32_t>(Word(4))));
   }
-  Result<RawHeader> header = HeaderOf(fields, mode->type, path, options);
+  Result<RawHeader> header = HeaderOf(fields, *type, path, options);
   if (!header.ok()) return header.status();
   const std::int32_t extension = fields.At<std::int32_t>(Word(24));
   if (extension < 0)
     return Status::InvalidArgument(fmt::format("{}: the extended header has {} bytes, must be at least 0", path, extension));
   (payload.compressed ? payload.skip : payload.offset) = std::int64_t{kHeaderBytes} + extension;
   payload.big_endian = big_endian;
-  return LocatedSamples{*std::move(header), std::move(payload), mode->halves};
+  return LocatedSamples{*std::move(header), std::move(payload)};
 }
 
 }  // namespace

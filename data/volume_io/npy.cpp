@@ -21,10 +21,10 @@ constexpr std::string_view kMagic = "\x93NUMPY";
 
 struct Dtype {
   SampleType type = SampleType::kUint8;
-  bool big_endian = false, halves = false;
+  bool big_endian = false;
 };
 
-constexpr std::array<std::pair<std::string_view, SampleType>, 11> kTypes = {{
+constexpr std::array<std::pair<std::string_view, SampleType>, 12> kTypes = {{
     {"i1", SampleType::kInt8},
     {"u1", SampleType::kUint8},
     {"b1", SampleType::kUint8},  // truth values
@@ -34,6 +34,7 @@ constexpr std::array<std::pair<std::string_view, SampleType>, 11> kTypes = {{
     {"u4", SampleType::kUint32},
     {"i8", SampleType::kInt64},
     {"u8", SampleType::kUint64},
+    {"f2", SampleType::kFloat16},
     {"f4", SampleType::kFloat32},
     {"f8", SampleType::kFloat64},
 }};
@@ -43,10 +44,9 @@ std::optional<Dtype> ParseDtype(std::string_view text) {
   if (text.size() != 3 || std::string_view("<>|=").find(text.front()) == std::string_view::npos) return std::nullopt;
   const bool big_endian = text.front() == '>';
   text.remove_prefix(1);
-  if (text == "f2") return Dtype{SampleType::kUint16, big_endian, true};
   const auto* const found = std::ranges::find(kTypes, text, [](const auto& entry) { return entry.first; });
   if (found == kTypes.end()) return std::nullopt;
-  return Dtype{found->second, big_endian, false};
+  return Dtype{found->second, big_endian};
 }
 
 // What stands behind 'key': in the header's dictionary, up to the end of `closing`, or up to the next comma if that is empty.
@@ -131,7 +131,7 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
     std::ranges::reverse(*shape);
   }
   if (Status status = SetSize(header, path, *std::move(shape), options); !status.ok()) return status;
-  return LocatedSamples{header, {.file = path, .offset = text->end, .big_endian = dtype->big_endian}, dtype->halves};
+  return LocatedSamples{header, {.file = path, .offset = text->end, .big_endian = dtype->big_endian}};
 }
 
 Status Write(const FileSamples& samples, const std::string& path) {

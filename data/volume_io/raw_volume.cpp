@@ -16,25 +16,6 @@
 namespace slabstream {
 namespace {
 
-float FromHalf(std::uint16_t half) {
-  const int exponent = (half >> 10) & 0x1f, fraction = half & 0x3ff;
-  const float sign = (half & 0x8000) != 0 ? -1.0F : 1.0F;
-  if (exponent == 0x1f) return fraction != 0 ? std::numeric_limits<float>::quiet_NaN() : sign * std::numeric_limits<float>::infinity();
-  // Without the leading 1, subnormal numbers have the exponent of the least normal ones.
-  return sign * (exponent == 0 ? std::ldexp(float(fraction), -24) : std::ldexp(float(fraction + 0x400), exponent - 25));
-}
-
-// Half floats, read as uint16, become float32. ResourceExhausted: they do not fit the memory.
-Result<RawVolume> HalvesAsFloats(const std::string& path, RawVolume halves) {
-  RawVolume floats{.header = halves.header, .samples_file = std::move(halves.samples_file)};
-  floats.header.type = SampleType::kFloat32;
-  if (Status status = CheckFitsMemory(floats.header.sample_bytes(), path); !status.ok()) return status;
-  floats.bytes.resize(2 * halves.bytes.size());
-  const std::span in(reinterpret_cast<const std::uint16_t*>(halves.bytes.data()), halves.bytes.size() / sizeof(std::uint16_t));
-  std::ranges::transform(in, reinterpret_cast<float*>(floats.bytes.data()), FromHalf);
-  return floats;
-}
-
 template <class T>
 T Luminance(const T* rgb) {  // of ITU-R BT.709
   const double value = 0.2126 * double(rgb[0]) + 0.7152 * double(rgb[1]) + 0.0722 * double(rgb[2]);
@@ -75,7 +56,7 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
   if (options.time && options.time->first >= count) {
     return Status::InvalidArgument(fmt::format("{}: time is {}, must be in [0, {}]", path, options.time->first, count - 1));
   }
-  if (!options.time && count > 1) {
+  if (!options.time && count > 1 && !options.describe) {
     return Status::InvalidArgument(fmt::format("{}: holds {} volumes, of which --time takes one: 0 to {}", path, count, count - 1));
   }
   return std::int64_t{options.time.value_or(TimeRange{}).first};
@@ -130,7 +111,7 @@ Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& loc
     static_assert(std::endian::native == std::endian::little, "this machine's samples are little endian");
     if (payload->big_endian) SwapByteOrder(located.header.type, raw->bytes);
   }
-  return located.halves ? HalvesAsFloats(path, *std::move(raw)) : std::move(raw);
+  return raw;
 }
 
 void TakeChannel(RawVolume& raw, const ReadOptions& options) {

@@ -41,6 +41,7 @@ struct RawHeader {
   // Of an image: names of its channels, and which of them this is; empty: there is one channel.
   std::vector<std::string> channels = {};
   int channel = 0;
+  std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: VolumeFileInfo
 
   // Of all components.
   std::int64_t sample_bytes() const {
@@ -51,8 +52,7 @@ struct RawHeader {
 // What a header says: the volume, and where its samples lie in one piece.
 struct LocatedSamples {
   RawHeader header;
-  Payload payload;      // of all volumes
-  bool halves = false;  // samples are half floats, which are read as uint16 and then become float32
+  Payload payload;  // of all volumes
 };
 
 struct RawVolume {
@@ -72,7 +72,8 @@ inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 // InvalidArgument naming `path`: there are fewer than three or more than four, one of three is no whole number in [1, kMaxVolumeSide], or
 // there are several volumes and options.time does not take one.
 Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options);
-// Which of `count` volumes options.time takes. InvalidArgument: none, although there are several, or one that there is not.
+// Which of `count` volumes options.time takes; the first one if options.describe. InvalidArgument: none, although there are several, or one
+// that there is not.
 Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
 
 // InvalidArgument, naming `path`: of several components a voxel options.channel takes none, or one that there is not.

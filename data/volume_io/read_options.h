@@ -51,6 +51,7 @@ struct ReadOptions {
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
   // What users cannot say.
+  bool describe = false;             // without `time`, a source of several volumes opens the first one
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
   ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };

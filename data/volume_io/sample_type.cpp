@@ -14,9 +14,9 @@ namespace slabstream {
 namespace {
 
 // In the order of SampleType.
-constexpr std::array<std::string_view, 10> kNames = {"int8",   "uint8", "int16",  "uint16",  "int32",
-                                                     "uint32", "int64", "uint64", "float32", "float64"};
-constexpr std::array<std::size_t, 10> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+constexpr std::array<std::string_view, 11> kNames = {"int8",  "uint8",  "int16",   "uint16",  "int32",  "uint32",
+                                                     "int64", "uint64", "float32", "float64", "float16"};
+constexpr std::array<std::size_t, 11> kBytes = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8, 2};
 
 template <class T>
 std::span<T> SamplesOf(AlignedVector<std::byte>& bytes) {
@@ -84,6 +84,14 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
   return kept;
 }
 
+KeptSamples Widen(AlignedVector<std::byte> bytes) {
+  const std::span<Half> halves = SamplesOf<Half>(bytes);
+  KeptSamples kept{.type = ScalarType::kFloat32};
+  kept.bytes.resize(halves.size() * sizeof(float));
+  std::ranges::copy(halves, SamplesOf<float>(kept.bytes).begin());
+  return kept;
+}
+
 }  // namespace
 
 std::string_view ToString(SampleType type) { return kNames[std::size_t(type)]; }
@@ -98,7 +106,7 @@ std::optional<SampleType> SampleTypeNamed(std::string_view name) {
 std::string ValuesOf(SampleType type) {
   return VisitSampleType(type, []<class T>(const T*) {
     using Limits = std::numeric_limits<T>;
-    if constexpr (std::is_floating_point_v<T>) {
+    if constexpr (!std::is_integral_v<T>) {
       return fmt::format("numbers up to {:.6g}", double(Limits::max()));
     } else {
       return fmt::format("whole numbers from {} to {}", Limits::min(), Limits::max());
@@ -123,6 +131,7 @@ KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) {
     case SampleType::kUint32: return Narrow<std::uint32_t>(std::move(bytes));
     case SampleType::kInt64: return Narrow<std::int64_t>(std::move(bytes));
     case SampleType::kUint64: return Narrow<std::uint64_t>(std::move(bytes));
+    case SampleType::kFloat16: return Widen(std::move(bytes));
     case SampleType::kFloat64: break;
   }
   return Narrow<double>(std::move(bytes));

@@ -10,10 +10,11 @@
 
 #include "common/base/aligned_buffer.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/half.h"
 
 namespace slabstream {
 
-enum class SampleType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64 };
+enum class SampleType : std::uint8_t { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kInt64, kUint64, kFloat32, kFloat64, kFloat16 };
 
 std::string_view ToString(SampleType type);                        // "int16"
 std::optional<SampleType> SampleTypeNamed(std::string_view name);  // the inverse
@@ -33,6 +34,7 @@ decltype(auto) VisitSampleType(SampleType type, Function&& function) {
     case SampleType::kUint32: return function(static_cast<const std::uint32_t*>(nullptr));
     case SampleType::kInt64: return function(static_cast<const std::int64_t*>(nullptr));
     case SampleType::kUint64: return function(static_cast<const std::uint64_t*>(nullptr));
+    case SampleType::kFloat16: return function(static_cast<const Half*>(nullptr));
     case SampleType::kFloat32: return function(static_cast<const float*>(nullptr));
     case SampleType::kFloat64: break;
   }
@@ -49,8 +51,8 @@ struct KeptSamples {
   AlignedVector<std::byte> bytes;
 };
 
-// Takes over `bytes`: aligned samples of `type` in this machine's byte order. Types of the same size are converted in place; wider ones
-// need the memory of the kept samples on top.
+// Takes over `bytes`: aligned samples of `type` in this machine's byte order. Types of the same size are converted in place; others need
+// the memory of the kept samples on top.
 KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes);
 
 }  // namespace slabstream

@@ -24,6 +24,9 @@ std::optional<T> ParseSample(std::string_view text) {
     const std::optional<double> number = ParseNumber<double>(text);
     if (!number || (std::isfinite(*number) && std::abs(*number) > double{std::numeric_limits<float>::max()})) return std::nullopt;
     return float(*number);
+  } else if constexpr (std::is_same_v<T, Half>) {
+    const std::optional<double> number = ParseNumber<double>(text);
+    return number ? std::optional(Half(*number)) : std::nullopt;
   } else {
     return ParseNumber<T>(text);
   }

@@ -32,6 +32,9 @@ double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
 }
 
 Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path) {
+  if (raw.header.type == SampleType::kFloat16) {  // the type that grows
+    if (Status status = CheckFitsMemory(2 * std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
+  }
   KeptSamples kept = Keep(raw.header.type, std::move(raw.bytes));
   if (!kept.exact) LogWarning(path + ": values of type " + std::string(ToString(raw.header.type)) + " are rounded to " + "float32");
 
@@ -47,6 +50,9 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   info.labels = raw.header.labels;
   info.channels = std::move(raw.header.channels);
   info.channel = raw.header.channel;
+  info.times = int(raw.header.volumes);
+  info.time = int(raw.header.number);
+  info.notes = std::move(raw.header.notes);
   info.samples_file = std::move(raw.samples_file);
   VolumeDescription& description = info.description;
   description.geometry = placed->geometry;

@@ -41,7 +41,10 @@ struct VolumeFileInfo {
   bool labels = false;                     // samples are numbers of structures, not measurements
   std::vector<std::string> channels = {};  // of an image: names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it is
-  std::filesystem::path samples_file;      // if the samples are in a file of their own
+  int times = 1, time = 0;                 // how many volumes the file holds, and which of them it is
+  // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
+  std::vector<std::string> notes = {};
+  std::filesystem::path samples_file;  // if the samples are in a file of their own
 };
 
 struct LoadedVolume {

@@ -17,10 +17,10 @@ using metadata::Json;
 template <class T>
 std::optional<T> FloatOf(const std::string& text) {
   using Limits = std::numeric_limits<T>;
-  using Bits = std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>;
+  using Bits = std::conditional_t<sizeof(T) == 2, std::uint16_t, std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>>;
   if (text == "NaN") return Limits::quiet_NaN();
   if (text == "Infinity") return Limits::infinity();
-  if (text == "-Infinity") return -Limits::infinity();
+  if (text == "-Infinity") return T(-Limits::infinity());
   Bits bits = 0;
   const char* const end = text.data() + text.size();
   if (text.size() != 2 + 2 * sizeof(T) || !text.starts_with("0x")) return std::nullopt;
@@ -52,7 +52,7 @@ std::optional<T> WholeOf(const Json& value) {
 template <class T>
 std::optional<T> ElementOf(const Json& value) {
   if (value.is_boolean()) return T(value.get<bool>() ? 1 : 0);
-  if constexpr (std::is_floating_point_v<T>) {
+  if constexpr (!std::is_integral_v<T>) {
     if (value.is_string()) return FloatOf<T>(value.get_ref<const std::string&>());
     if (!value.is_number()) return std::nullopt;
     return T(value.get<double>());
@@ -64,7 +64,7 @@ std::optional<T> ElementOf(const Json& value) {
 }  // namespace
 
 Result<ElementType> ReadDtype(const Field& dtype) {
-  const auto wrong = [&] { return dtype.Wrong("an integer of 1, 2, 4 or 8 bytes or a float of 4 or 8, such as \"<u2\" or \">f4\""); };
+  const auto wrong = [&] { return dtype.Wrong("an integer of 1, 2, 4 or 8 bytes or a float of 2, 4 or 8, such as \"<u2\" or \">f4\""); };
   if (!dtype.is_text()) return wrong();
   const std::string& text = dtype.value().get_ref<const std::string&>();
   constexpr std::size_t kLength = 3;

@@ -17,7 +17,7 @@ constexpr std::size_t kMost = 8;  // voxels in one
 
 template <class T>
 T Mean(const std::array<T, kMost>& values, std::size_t count) {
-  if constexpr (std::is_floating_point_v<T>) {
+  if constexpr (!std::is_integral_v<T>) {
     double sum = 0;
     int known = 0;
     for (std::size_t i = 0; i < count; ++i) {

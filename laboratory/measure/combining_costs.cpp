@@ -6,6 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/image/coverage_map.h"
+#include "common/image/occlusion_mask.h"
 #include "common/kernels/combine.h"
 #include "laboratory/measure/statistics.h"
 #include "laboratory/measure/thread_time.h"

@@ -18,6 +18,7 @@ void Must(herr_t status) { CHECK(status >= 0); }
 hid_t NativeHdf5Type(SampleType type) {
   return VisitSampleType(type, [](const auto* none) -> hid_t {
     using T = std::remove_cvref_t<decltype(*none)>;
+    CHECK(!(std::is_same_v<T, Half>)) << "libhdf5 has no such type of its own";
     if constexpr (std::is_same_v<T, float>) return H5T_NATIVE_FLOAT;
     if constexpr (std::is_same_v<T, double>) return H5T_NATIVE_DOUBLE;
     switch (sizeof(T)) {

@@ -33,7 +33,8 @@ std::shared_ptr<VolumeSource> Opened(const std::string& path, const ReadOptions&
 
 // Kept as their type alone says.
 bool IsExact(const std::string& file_type) {
-  return file_type == "uint8" || file_type == "int8" || file_type == "uint16" || file_type == "int16" || file_type == "float32";
+  return file_type == "uint8" || file_type == "int8" || file_type == "uint16" || file_type == "int16" || file_type == "float32" ||
+         file_type == "float16";
 }
 
 void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random& random, int boxes = 12) {
@@ -235,6 +236,15 @@ TEST(Positional, KnowsWhatItReads) {
   EXPECT_FALSE(UncompressedFile().recognises(directory / "v.nii.gz", {}));
 }
 
+TEST(Positional, HalfFloatsAreReadInParts) {
+  Random random(37);
+  SCOPED_TRACE(random.trace());
+  const TemporaryDirectory directory;
+  const FileBytes halves = EncodeSamples(SampleType::kFloat16, {0, -2, 0.5, 65504, 0x1p-24, 1, 3, 4}, false);
+  WriteFile(directory / "v.npy", NpyHeader("<f2", "(2, 2, 2)") + halves);
+  ExpectLikeWhole(directory / "v.npy", {}, random);
+}
+
 TEST(Positional, SaysWhyAFileIsNotReadByPosition) {
   const TemporaryDirectory directory;
   const auto refusal = [&](const std::string& name, const FileBytes& bytes) {
@@ -246,7 +256,6 @@ TEST(Positional, SaysWhyAFileIsNotReadByPosition) {
   };
   const FileSpec spec;
   EXPECT_THAT(refusal("v.nii.gz", Gzip(NiftiHeader(spec) + std::string(24, 'x'))), AllOf(HasSubstr("v.nii.gz"), HasSubstr("compressed")));
-  EXPECT_THAT(refusal("v.mrc", MrcHeader({.mode = 12}) + std::string(48, 'x')), HasSubstr("half floats"));
   EXPECT_THAT(refusal("v.nrrd",
                       "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\nspace: RAS\n"
                       "space directions: (1,0,0) (0,1,0) (0,0.3,1)\n\n12345678"),

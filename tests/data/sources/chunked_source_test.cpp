@@ -57,9 +57,9 @@ Box RandomBox(const Index3& size, Random& random) {
 
 struct RandomPyramid {
   explicit RandomPyramid(Random& random, SourceContext arrive_on = nullptr) {
-    constexpr SampleType kTypes[] = {SampleType::kInt8,    SampleType::kUint8,  SampleType::kInt16, SampleType::kUint16,
-                                     SampleType::kInt32,   SampleType::kUint32, SampleType::kInt64, SampleType::kUint64,
-                                     SampleType::kFloat32, SampleType::kFloat64};
+    constexpr SampleType kTypes[] = {SampleType::kInt8,    SampleType::kUint8,   SampleType::kInt16,  SampleType::kUint16,
+                                     SampleType::kInt32,   SampleType::kUint32,  SampleType::kInt64,  SampleType::kUint64,
+                                     SampleType::kFloat32, SampleType::kFloat64, SampleType::kFloat16};
     ArrayShape shape;
     shape.type = kTypes[random.Integer(0, 9)];
     shape.cut_at_end = random.Chance(0.5);

@@ -39,6 +39,7 @@ std::vector<double> ValuesFor(SampleType type) {
     case SampleType::kInt64: return ends(-0x1p63, 0x1p62);
     case SampleType::kUint64: return ends(0, 0x1p63);
     case SampleType::kFloat32: return ends(-1.5, 3.402823466e+38);
+    case SampleType::kFloat16: return ends(-1.5, 65504);
     case SampleType::kFloat64: break;
   }
   return ends(-0.25, 0x1p100);

@@ -81,6 +81,7 @@ FileBytes EncodeSamples(SampleType type, const std::vector<double>& values, bool
       case SampleType::kUint64: Put(bytes, std::uint64_t(value), big_endian); break;
       case SampleType::kFloat32: Put(bytes, float(value), big_endian); break;
       case SampleType::kFloat64: Put(bytes, value, big_endian); break;
+      case SampleType::kFloat16: Put(bytes, Half(value).bits, big_endian); break;
     }
   }
   return bytes;
