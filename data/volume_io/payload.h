@@ -14,12 +14,15 @@
 
 namespace slabstream {
 
+class InflateReader;
+
 inline constexpr std::int64_t kMaxDeflateRatio = 1032;  // zlib's technical notes: 1032:1 at most
 
 struct Payload {
   std::filesystem::path file;
   std::int64_t offset = 0;  // bytes of the file before the samples (or before the compressed stream)
   bool compressed = false;  // gzip or zlib, whichever its first bytes say
+  bool wrapped = true;      // a compressed stream has such a header; else it is deflated bytes alone
   std::int64_t skip = 0;    // bytes of the decompressed stream before the samples
   bool big_endian = false;
 };
@@ -48,7 +51,6 @@ class PayloadStream {
   Status Finish();
 
  private:
-  class InflateReader;
   Status Truncated() const;
 
   const Payload payload_;
