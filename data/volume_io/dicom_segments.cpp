@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -65,6 +66,11 @@ Result<RawVolume> ReadSegments(const std::string& path, const DicomSeries& serie
     header.channel = *channel;
   } else {
     header.notes.push_back(fmt::format("labels are the numbers of segments: {}", fmt::join(names, ", ")));
+  }
+  const double apart = Length(header.steps[2]);
+  if (std::abs(image.frames.front().slice_spacing.value_or(0) - apart) > 1e-3 * apart) {
+    header.notes.push_back(
+        fmt::format("slices lie {:g} mm apart, as the nearest two frames do; SpacingBetweenSlices does not say so", apart));
   }
   header.labels = !fractional;
   const bool wide = binary && segments.back().number > std::numeric_limits<std::uint8_t>::max();

@@ -72,9 +72,10 @@ bool SameBytes(const DicomImage& a, const DicomImage& b) {
   return true;
 }
 
-// Whether the frames have the same pixels, however they are encoded. Images that cannot be read are refused for that, later.
+// Whether the frames have the same pixels, however they are encoded. Images that cannot be read both are refused for that, later.
 Result<bool> SamePixels(const DicomImage& a, const DicomImage& b) {
-  if (SameBytes(a, b) || !CheckFrames(a).ok() || !CheckFrames(b).ok()) return true;
+  if (SameBytes(a, b)) return true;
+  if (!CheckFrames(a).ok() || !CheckFrames(b).ok()) return CheckFrames(a).ok() == CheckFrames(b).ok();
   std::vector<std::vector<std::byte>> slices;
   std::vector<DicomFrameReader> readers;
   for (const DicomImage* image : {&a, &b}) {
