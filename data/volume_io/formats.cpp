@@ -24,11 +24,14 @@ VolumeFormat UnstructuredGrid();
 VolumeFormat Npy();
 VolumeFormat Png();
 VolumeFormat Jpeg();
+VolumeFormat Jpeg2000();
+VolumeFormat Bmp();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& VolumeFormats() {
-  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
-                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
+  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(),      UnstructuredGrid(),
+                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Jpeg2000(), Bmp(),
+                                                    Raw()};
   return formats;
 }
 

@@ -1,6 +1,7 @@
 #include "tests/data/volume_io/more_files.h"
 
 #include <fmt/format.h>
+#include <openjpeg.h>
 #include <png.h>
 
 #include <jpeglib.h>
@@ -166,6 +167,43 @@ void WritePng(const std::string& path, const Index3& size, int bits, int kind, c
   png_write_end(png, info);
   png_destroy_write_struct(&png, &info);
   CHECK_EQ(std::fclose(file), 0);
+}
+
+FileBytes Bmp(const Index3& size, const BmpKind& kind, const FileBytes& rows) {
+  const auto number = [](std::int64_t value, int bytes) {
+    FileBytes text;
+    for (int i = 0; i < bytes; ++i) text += char(value >> (8 * i));
+    return text;
+  };
+  const auto begin = std::int64_t(54 + kind.palette.size());
+  return "BM" + number(begin + std::int64_t(rows.size()), 4) + number(0, 4) + number(begin, 4) + number(40, 4) + number(size.x, 4) +
+         number(kind.from_top ? -size.y : size.y, 4) + number(1, 2) + number(kind.bits, 2) + number(kind.compression, 4) +
+         number(std::int64_t(rows.size()), 4) + number(0, 8) + number(std::int64_t(kind.palette.size() / 4), 4) + number(0, 4) +
+         kind.palette + rows;
+}
+
+void WriteJpeg2000(const std::string& path, const Index3& size, int components, int bits, bool is_signed, const std::vector<int>& samples) {
+  std::vector<opj_image_cmptparm_t> parts(
+      std::size_t(components),
+      opj_image_cmptparm_t{
+          .dx = 1, .dy = 1, .w = OPJ_UINT32(size.x), .h = OPJ_UINT32(size.y), .prec = OPJ_UINT32(bits), .sgnd = is_signed ? 1U : 0U});
+  opj_image_t* image = opj_image_create(OPJ_UINT32(components), parts.data(), components == 1 ? OPJ_CLRSPC_GRAY : OPJ_CLRSPC_SRGB);
+  image->x1 = OPJ_UINT32(size.x);
+  image->y1 = OPJ_UINT32(size.y);
+  for (std::size_t i = 0; i < samples.size(); ++i) image->comps[i % std::size_t(components)].data[i / std::size_t(components)] = samples[i];
+  opj_cparameters_t parameters;
+  opj_set_default_encoder_parameters(&parameters);
+  parameters.tcp_numlayers = 1;
+  parameters.cp_disto_alloc = 1;
+  parameters.numresolution = 3;
+  opj_codec_t* codec = opj_create_compress(path.ends_with(".jp2") ? OPJ_CODEC_JP2 : OPJ_CODEC_J2K);
+  opj_stream_t* stream = opj_stream_create_default_file_stream(path.c_str(), OPJ_FALSE);
+  CHECK(opj_setup_encoder(codec, &parameters, image) != 0 && opj_start_compress(codec, image, stream) != 0 &&
+        opj_encode(codec, stream) != 0 && opj_end_compress(codec, stream) != 0)
+      << path;
+  opj_stream_destroy(stream);
+  opj_destroy_codec(codec);
+  opj_image_destroy(image);
 }
 
 void WriteJpeg(const std::string& path, const Index3& size, int components, const FileBytes& samples, bool progressive) {

@@ -50,6 +50,15 @@ FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptio
 
 // Samples in this machine's byte order; 8 or 16 bits. `kind`: the PNG colour type, 0 grey, 2 RGB, 3 palette, 4 grey with alpha, 6 RGBA.
 void WritePng(const std::string& path, const Index3& size, int bits, int kind, const FileBytes& samples, bool interlaced = false);
+struct BmpKind {
+  int bits = 8, compression = 0;
+  FileBytes palette = {};  // blue, green, red and 0 of each colour
+  bool from_top = false;   // rows, else from the bottom
+};
+// `rows`: as they are in the file, each filled up to four bytes.
+FileBytes Bmp(const Index3& size, const BmpKind& kind, const FileBytes& rows);
+// Lossless; in a JP2 file if the path ends so, else the bare code stream. `samples`: the components of each pixel together.
+void WriteJpeg2000(const std::string& path, const Index3& size, int components, int bits, bool is_signed, const std::vector<int>& samples);
 void WriteJpeg(const std::string& path, const Index3& size, int components, const FileBytes& samples, bool progressive = false);
 
 // A file of every format that is one file, with the same samples: int16 where the format has it.

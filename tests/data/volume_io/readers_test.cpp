@@ -1,5 +1,5 @@
-// What each further format means: axes, units, types and encodings of MRC, VTK, NumPy, raw samples, pictures and OME-TIFF; several volumes
-// in one file, and several components of a voxel.
+// What each further format means: axes, units, types and encodings of MRC, VTK, NumPy, raw samples, pictures; several volumes in one file,
+// and several components of a voxel.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -495,34 +495,85 @@ TEST_F(ReadersTest, FoldersOfJpegAreVolumes) {
   }
 }
 
+TEST_F(ReadersTest, FoldersOfBmpAreVolumes) {
+  using Values = std::vector<double>;
+  const auto values = [&](const BmpKind& kind, const FileBytes& rows, const ReadOptions& options = {}) {
+    for (const int z : {1, 2}) WriteFile(directory_ / fmt::format("{}.bmp", z), Bmp({2, 2, 1}, kind, rows));
+    const LoadedVolume loaded = ReadPath(directory_.path(), options);
+    EXPECT_EQ(loaded.info.format, "BMP");
+    const Values all = ValuesOf(loaded);
+    return Values(all.begin(), all.begin() + 4);
+  };
+  // Rows are filled up to four bytes, the lowest one first.
+  const FileBytes greys = {0, 0, 0, 0, 9, 9, 9, 0, 5, 5, 5, 0, char(200), char(200), char(200), 0}, colours = {1, 2, 3, 0, 4, 5, 6, 0};
+  EXPECT_EQ(values({.bits = 8, .palette = greys}, {0, 1, 0, 0, 2, 3, 0, 0}), (Values{5, 200, 0, 9}));
+  EXPECT_EQ(values({.bits = 8, .palette = greys, .from_top = true}, {0, 1, 0, 0, 2, 3, 0, 0}), (Values{0, 9, 5, 200}));
+  EXPECT_EQ(values({.bits = 4, .palette = greys}, {0x01, 0, 0, 0, 0x23, 0, 0, 0}), (Values{5, 200, 0, 9}));
+  EXPECT_EQ(values({.bits = 1, .palette = greys.substr(0, 8)}, {0x40, 0, 0, 0, char(0x80), 0, 0, 0}), (Values{9, 0, 0, 9}));
+  EXPECT_EQ(values({.bits = 8, .palette = colours}, {0, 1, 0, 0, 1, 1, 0, 0}, {.channel = 0}), (Values{6, 6, 3, 6}));
+  EXPECT_EQ(values({.bits = 24}, {1, 2, 3, 4, 5, 6, 0, 0, 7, 8, 9, 10, 11, 12, 0, 0}, {.channel = 2}), (Values{7, 10, 1, 4}));
+  EXPECT_EQ(values({.bits = 32}, {1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 0, 10, 11, 12, 0}, {.channel = 1}), (Values{8, 11, 2, 5}));
+  for (const int z : {1, 2})
+    WriteFile(directory_ / fmt::format("{}.bmp", z), Bmp({2, 2, 1}, {.bits = 8, .compression = 1, .palette = greys}, "x"));
+  EXPECT_THAT(ReadVolume(directory_.path()).status().message(), HasSubstr("8 bits a pixel with compression 1 are not supported"));
+}
+
+TEST_F(ReadersTest, FoldersOfJpeg2000AreVolumes) {
+  for (const int bits : {1, 8, 10, 12, 16}) {
+    for (const bool is_signed : {false, true}) {
+      for (const int components : {1, 3}) {
+        for (const char* ending : {"jp2", "j2k"}) {
+          SCOPED_TRACE(fmt::format("{} bits, signed {}, {} components, {}", bits, is_signed, components, ending));
+          const std::int64_t least = is_signed ? -(std::int64_t{1} << (bits - 1)) : 0;
+          std::vector<int> samples;
+          for (int i = 0; i < 32 * 32 * components; ++i) samples.push_back(int(least + (i * 37) % (1 << bits)));
+          const TemporaryDirectory directory;
+          for (const int z : {1, 2}) {
+            WriteJpeg2000(directory / fmt::format("{}.{}", z, ending), {32, 32, 1}, components, bits, is_signed, samples);
+          }
+          const LoadedVolume loaded = ReadPath(directory.path(), {.channel = components - 1});
+          EXPECT_EQ(loaded.info.format, "JPEG 2000");
+          const std::vector<double> values = ValuesOf(loaded);
+          for (std::size_t i = 0; i < 32 * 32; ++i)
+            ASSERT_EQ(values[i], samples[i * std::size_t(components) + std::size_t(components) - 1]) << i;
+        }
+      }
+    }
+  }
+}
+
 TEST_F(ReadersTest, PicturesThatAreCutOffOrDamagedFail) {
   Random random(31);
   SCOPED_TRACE(random.trace());
+  constexpr Index3 kSize = {32, 32, 1};
   FileBytes samples;
   for (int i = 0; i < 32 * 32; ++i) samples += char(random.Integer(0, 255));
-  WritePng(directory_ / "1.png", {32, 32, 1}, 8, 0, samples);
-  std::filesystem::create_directory(directory_ / "jpeg");
-  for (const bool progressive : {false, true}) {
-    WriteJpeg(directory_ / "jpeg/1.jpg", {32, 32, 1}, 1, samples, progressive);
-    for (const auto& [folder, first, second] : {std::tuple{directory_.path(), directory_ / "1.png", directory_ / "2.png"},
-                                                {directory_ / "jpeg", directory_ / "jpeg/1.jpg", directory_ / "jpeg/2.jpg"}}) {
-      const FileBytes good = ReadFile(first);
-      WriteFile(second, good);
-      ASSERT_TRUE(ReadVolume(folder).ok());
-      for (std::size_t length = 0; length + 2 < good.size(); length += 1 + length / 16) {
-        WriteFile(second, good.substr(0, length));
-        const Result<LoadedVolume> loaded = ReadVolume(folder);
-        ASSERT_FALSE(loaded.ok()) << second << " cut to " << length << " of " << good.size();
-        EXPECT_THAT(loaded.status().message(), testing::AllOf(HasSubstr(second), testing::Not(HasSubstr("\n"))));
-      }
-      for (int i = 0; i < 200; ++i) {
-        FileBytes bytes = good;
-        bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] ^= char(1 << random.Integer(0, 7));
-        WriteFile(second, bytes);
-        const Result<LoadedVolume> loaded = ReadVolume(folder);
-        if (!loaded.ok()) {
-          EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
-        }
+  WritePng(directory_ / "1.png", kSize, 8, 0, samples);
+  for (const bool progressive : {false, true}) WriteJpeg(directory_ / (progressive ? "2.jpg" : "1.jpg"), kSize, 1, samples, progressive);
+  std::vector<int> whole_numbers;
+  for (const char sample : samples) whole_numbers.push_back(static_cast<unsigned char>(sample));
+  WriteJpeg2000(directory_ / "1.jp2", kSize, 1, 8, false, whole_numbers);
+  WriteFile(directory_ / "1.bmp", Bmp(kSize, {.bits = 8, .palette = FileBytes(1024, 'x')}, samples));
+  for (const char* picture : {"1.png", "1.jpg", "2.jpg", "1.jp2", "1.bmp"}) {
+    const FileBytes good = ReadFile(directory_ / picture);
+    const TemporaryDirectory folder;
+    const std::string ending = std::filesystem::path(picture).extension(), second = folder / ("2" + ending);
+    WriteFile(folder / ("1" + ending), good);
+    WriteFile(second, good);
+    ASSERT_TRUE(ReadVolume(folder.path()).ok()) << picture;
+    for (std::size_t length = 0; length + 2 < good.size(); length += 1 + length / 16) {
+      WriteFile(second, good.substr(0, length));
+      const Result<LoadedVolume> loaded = ReadVolume(folder.path());
+      ASSERT_FALSE(loaded.ok()) << second << " cut to " << length << " of " << good.size();
+      EXPECT_THAT(loaded.status().message(), testing::AllOf(HasSubstr(second), testing::Not(HasSubstr("\n"))));
+    }
+    for (int i = 0; i < 200; ++i) {
+      FileBytes bytes = good;
+      bytes[random.Integer<std::size_t>(0, bytes.size() - 1)] ^= char(1 << random.Integer(0, 7));
+      WriteFile(second, bytes);
+      const Result<LoadedVolume> loaded = ReadVolume(folder.path());
+      if (!loaded.ok()) {
+        EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
       }
     }
   }
@@ -565,85 +616,6 @@ TEST_F(ReadersTest, UnitsOfTextHeadersAreTold) {
   EXPECT_EQ(meta(""), std::nullopt);
   EXPECT_EQ(meta("DistanceUnits = ?\n"), std::nullopt);
   EXPECT_EQ(meta("DistanceUnits = um\n"), LengthUnit::kMicrometre);
-}
-
-// --- OME-TIFF
-
-std::string Ome(const std::string& pixels, const std::string& channels = "") {
-  return "<?xml version=\"1.0\" encoding=\"UTF-8\"?><OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><Image ID=\"Image:0\">"
-         "<Pixels ID=\"Pixels:0\" Type=\"uint8\" SizeX=\"4\" SizeY=\"3\" " +
-         pixels + ">" + channels + "<TiffData/></Pixels></Image></OME>";
-}
-
-class OmeTest : public ReadersTest {
- protected:
-  // A page for each of `pages`, filled with its number.
-  std::string Write(const std::string& description, int pages) {
-    FileBytes samples;
-    for (int page = 0; page < pages; ++page) samples += FileBytes(12, char(page));
-    WriteTiff(directory_ / "v.ome.tif", {.size = {4, 3, pages}}, samples, {.description = description});
-    return directory_ / "v.ome.tif";
-  }
-  // The first voxel of each slice.
-  std::vector<double> Slices(const std::string& path, const ReadOptions& options) {
-    const std::vector<double> values = ValuesOf(ReadPath(path, options));
-    std::vector<double> slices;
-    for (std::size_t i = 0; i < values.size(); i += 12) slices.push_back(values[i]);
-    return slices;
-  }
-};
-
-TEST_F(OmeTest, PhysicalSizesAreMicrometres) {
-  const auto spacing = [&](const std::string& sizes) {
-    return ReadPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" " + sizes), 2))
-        .info.description.geometry.spacing;
-  };
-  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\""), (Vec3{0.25, 0.5, 2}));
-  ExpectNear(
-      spacing(
-          "PhysicalSizeX=\"250\" PhysicalSizeXUnit=\"nm\" PhysicalSizeY=\"0.5\" PhysicalSizeYUnit=\"\xc2\xb5m\" PhysicalSizeZ=\"0.002\" "
-          "PhysicalSizeZUnit=\"mm\""),
-      {0.25, 0.5, 2}, 1e-12);
-  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\""), (Vec3{1, 1, 1})) << "not all are known";
-  EXPECT_EQ(spacing("PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\" PhysicalSizeZUnit=\"pixel\""), (Vec3{1, 1, 1}));
-}
-
-TEST_F(OmeTest, PhysicalSizesHaveAUnit) {
-  const auto unit = [&](const std::string& sizes, const ReadOptions& options = {}) {
-    return ReadPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" " + sizes), 2), options)
-        .info.description.geometry.orientation.unit;
-  };
-  const std::string sizes = "PhysicalSizeX=\"0.25\" PhysicalSizeY=\"0.5\" PhysicalSizeZ=\"2\"";
-  EXPECT_EQ(unit(sizes), LengthUnit::kMicrometre);
-  EXPECT_EQ(unit(sizes + " PhysicalSizeXUnit=\"nm\""), LengthUnit::kMicrometre);
-  EXPECT_EQ(unit(""), std::nullopt);
-  EXPECT_EQ(unit(sizes, {.spacing = Vec3{1, 1, 2}}), std::nullopt) << "whoever gives the distances says no unit";
-}
-
-TEST_F(OmeTest, OneChannelAndTimeIsTaken) {
-  const std::string sizes = "SizeZ=\"2\" SizeC=\"3\" SizeT=\"2\" DimensionOrder=",
-                    channels = "<Channel Name=\"DAPI\"/><Channel Name=\"GFP\"/>";
-  using Values = std::vector<double>;
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZCT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{10, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYCZT\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{8, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYTCZ\""), 12), {.time = TimeRange{1, 1}, .channel = 2}), (Values{5, 11}));
-  EXPECT_EQ(Slices(Write(Ome(sizes + "\"XYZTC\""), 12), {.time = TimeRange{0, 0}, .channel = 0}), (Values{0, 1}));
-  const std::string path = Write(Ome(sizes + "\"XYZCT\"", channels), 12);
-  EXPECT_THAT(WhyNotPath(path), HasSubstr("holds 2 volumes, of which --time takes one"));
-  EXPECT_EQ(Slices(path, {.time = TimeRange{0, 0}}), (Values{0, 1})) << "the first channel";
-  EXPECT_THAT(WhyNotPath(path, {.time = TimeRange{0, 0}, .channel = 3}),
-              HasSubstr("has 3 channels, so channel must be 0 to 2 (0: DAPI, 1: GFP, 2)"));
-}
-
-TEST_F(OmeTest, DescriptionsThatDoNotFitAreRefused) {
-  const std::string order = " DimensionOrder=\"XYZCT\"";
-  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"3\" SizeC=\"1\" SizeT=\"1\"" + order), 2)),
-              HasSubstr("speaks of 3 slices, 1 channels and 1 times, the file has 2 pages"));
-  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\"" + order), 2)), HasSubstr("SizeT is ''"));
-  EXPECT_THAT(WhyNotPath(Write(Ome("SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZZZ\""), 2)),
-              HasSubstr("DimensionOrder is 'XYZZZ'"));
-  EXPECT_THAT(WhyNotPath(Write("<OME><Image>", 2)), HasSubstr("its OME description"));
-  EXPECT_THAT(WhyNotPath(Write("by a scanner", 2), {.time = TimeRange{0, 0}}), HasSubstr("time is for OME-TIFF files that state several"));
 }
 
 }  // namespace
