@@ -36,7 +36,7 @@ struct TimeRange {
 Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
 
 struct ReadOptions {
-  std::string series;             // which of the series of a DICOM folder: its number or UID; "": the only one
+  std::string series;             // of a DICOM folder: number or UID; "": the only one. Of an OME-TIFF: an image; "": the first
   std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
   std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
   std::optional<Vec3> spacing;    // each > 0, finite

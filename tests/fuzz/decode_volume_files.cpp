@@ -152,8 +152,11 @@ std::vector<FuzzBytes> VolumeFileSeeds() {
   }
   const std::string ome =
       "<OME><Image><Pixels SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"2\"/></Image></OME>";
-  WriteTiff(path, {}, FileBytes(24, 'x'), {.description = ome});
-  seeds.push_back(Seed(".tif", ReadFile(path)));
+  const std::string imagej = "ImageJ=1.54f\nimages=2\nslices=2\nspacing=2\nunit=um\ncf=0\nc0=1\nc1=2\nmin=3\nmax=4\n";
+  for (const std::string& description : {ome, imagej, std::string("{\"shape\": [2, 3, 4], \"axes\": \"ZYX\"}")}) {
+    WriteTiff(path, {}, FileBytes(24, 'x'), {.description = description});
+    seeds.push_back(Seed(".tif", ReadFile(path)));
+  }
   for (const int picture : {0, 2, 3}) {
     WritePng(path, {4, 4, 1}, picture == 0 ? 16 : 8, picture, FileBytes(picture == 0 ? 32 : picture == 2 ? 48 : 16, 1), picture == 2);
     seeds.push_back(Seed(".png", ReadFile(path), picture == 0 ? 0 : 3));
