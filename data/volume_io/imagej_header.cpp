@@ -101,6 +101,7 @@ void SetWindow(const Lines& lines, PageLayout& layout) {
   constexpr ValueMapping kSigned = {1, -32768};
   const ValueMapping mapping = layout.rescale == kSigned ? ValueMapping{} : layout.rescale;
   const auto [low, high] = std::minmax({float(mapping.FromStored(*least)), float(mapping.FromStored(*greatest))});
+  if (!std::isfinite(low) || !std::isfinite(high)) return;
   layout.window = ValueRange{low, high};
   layout.notes.push_back(fmt::format("ImageJ shows values from {:g} to {:g}", low, high));
 }
