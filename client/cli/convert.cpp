@@ -86,7 +86,7 @@ Status RunConvert(const ConvertOptions& options) {
   const Result<LoadedVolume> loaded = Read(options, *source, bar);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
-  if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;
+  if (Status status = CheckKeepsInput(options, *to, info.other_files); !status.ok()) return status;
   if (const std::string lost = WhatIsLost(*to, info.description.geometry); !lost.empty()) {
     LogWarning(fmt::format("{}: {} files do not keep {}", options.output, to->name, lost));
   }

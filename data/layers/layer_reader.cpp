@@ -181,15 +181,13 @@ Result<Layers> LabelLayer(const Volume& labels, const ColorTable& colors, const 
 }
 
 Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& layers) {
-  const Result<SourceText> source = ParseSourceText(files.labels);
+  Result<SourceText> source = ParseSourceText(files.labels);
   if (!source.ok()) return source.status();
+  source->options.labels = true;
   const Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
   const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
-  if (read->info.straightened) {
-    return Status::InvalidArgument(source->path + ": its axes are not at right angles, and labels cannot be interpolated");
-  }
   Result<Layers> made = LabelLayer(*read->volume, *colors, grid, source->path);
   if (!made.ok()) return made.status();
   layers.labels = made->labels;

@@ -20,8 +20,8 @@ namespace slabstream {
 
 class StoredSamples {
  public:
-  // `payload`: of this volume alone. `channel`: which of the header's components, in [0, components). Unavailable: it cannot be opened.
-  static Result<std::shared_ptr<StoredSamples>> Open(const RawHeader& header, const Payload& payload, int channel);
+  // `payload`: of this volume alone. `component`: which of the header's components, in [0, components). Unavailable: it cannot be opened.
+  static Result<std::shared_ptr<StoredSamples>> Open(const RawHeader& header, const Payload& payload, int component);
 
   // A box, by the stored axes, cut into parts that are read on their own, each with little memory.
   std::vector<Box> Parts(const Box& box) const;

@@ -69,7 +69,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
   Result<TiffStack> stack = OpenTiffStack(path, options);
   if (!stack.ok()) return stack.status();
   const RawHeader& header = stack->header;
-  if (Status status = CheckChannel(path, header.components, stack->of_pages); !status.ok()) return status;
+  if (Status status = CheckChannel(path, header, stack->of_pages); !status.ok()) return status;
   if (stack->of_pages.channel == kLuminance) {
     return Status::InvalidArgument(path + ": cannot be read tile by tile: luminance needs several components of a voxel");
   }

@@ -50,7 +50,7 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   if (!raw.ok()) return raw;
   std::error_code error;
   const bool elsewhere = frames.front().image->path != path && !std::filesystem::is_directory(path, error);
-  if (elsewhere) raw->samples_file = std::filesystem::absolute(path, error).parent_path();  // a DICOMDIR stands for its folder
+  if (elsewhere) raw->other_files = {std::filesystem::absolute(path, error).parent_path()};  // a DICOMDIR stands for its folder
   if (options.headers_only) return raw;
   if (Status status = ReadFrames(frames, samples, raw->bytes, options.progress); !status.ok()) return status;
   return raw;

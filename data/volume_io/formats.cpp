@@ -13,6 +13,7 @@ namespace slabstream {
 
 // Each in the file of its format.
 VolumeFormat Nifti();
+VolumeFormat Mgh();
 VolumeFormat Nrrd();
 VolumeFormat MetaImage();
 VolumeFormat Tiff();
@@ -27,8 +28,9 @@ VolumeFormat Jpeg();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& VolumeFormats() {
-  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
-                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
+  static const std::vector<VolumeFormat> formats = {
+      Nifti(),     Mgh(),      Nrrd(), MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
+      VtkLegacy(), VtkImage(), Npy(),  Png(),       Jpeg(), Raw()};
   return formats;
 }
 

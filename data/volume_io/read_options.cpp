@@ -65,6 +65,11 @@ Status SetSpacing(ReadOptions& options, std::string_view option, std::string_vie
   return Wrong(option, text, "three numbers above 0, such as 0.5,0.5,1.25");
 }
 
+Status SetMatrix(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.matrix = text;
+  return text == "sform" || text == "qform" ? Status::Ok() : Wrong(option, text, "sform or qform");
+}
+
 Status SetType(ReadOptions& options, std::string_view option, std::string_view text) {
   options.type = SampleTypeNamed(text);
   return options.type ? Status::Ok() : Wrong(option, text, "one of " + SampleTypeNames());
@@ -151,6 +156,8 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime, IsGiven<&ReadOptions::time>},
       {"channel", "N|luminance", "Which channel of an image (default: 0) or component of a voxel; or the luminance of red, green and blue",
        SetChannel, IsGiven<&ReadOptions::channel>},
+      {"matrix", "sform|qform", "Which matrix places a NIfTI volume that states both (default: the sform)", SetMatrix,
+       IsGiven<&ReadOptions::matrix>},
       {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing, IsGiven<&ReadOptions::spacing>},
       {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims, IsGiven<&ReadOptions::dims>},
       {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32, float64 or float16",

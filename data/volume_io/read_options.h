@@ -40,6 +40,7 @@ struct ReadOptions {
   std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
   std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
   std::optional<Vec3> spacing;    // each > 0, finite
+  std::string matrix;             // which of the matrices of a NIfTI file that states both: "sform" or "qform"; "": by its codes
   // Of unstructured grids. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
   std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
@@ -52,6 +53,7 @@ struct ReadOptions {
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
   // What users cannot say.
   bool describe = false;             // without `time`, a source of several volumes opens the first one
+  bool labels = false;               // samples are numbers of structures, even if the file does not say so
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
   ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <new>
 #include <span>
 
@@ -31,7 +32,14 @@ double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
   });
 }
 
-Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path) {
+// The stored sample of label 0, or the nearest one that there is: what lies outside a label volume.
+double SampleOfNoLabel(ScalarType type, const ValueMapping& mapping) {
+  return VisitScalarType(type, [&]<class T>(const T*) {
+    return std::clamp(-mapping.offset / mapping.scale, double(std::numeric_limits<T>::lowest()), double(std::numeric_limits<T>::max()));
+  });
+}
+
+Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
   if (raw.header.type == SampleType::kFloat16) {  // the type that grows
     if (Status status = CheckFitsMemory(2 * std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
   }
@@ -47,13 +55,13 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   info.stored_size = raw.header.size;
   info.steps = raw.header.steps;
   info.straightened = placed->slant.has_value();
-  info.labels = raw.header.labels;
+  info.labels = raw.header.labels || options.labels;
   info.channels = std::move(raw.header.channels);
   info.channel = raw.header.channel;
   info.times = int(raw.header.volumes);
   info.time = int(raw.header.number);
   info.notes = std::move(raw.header.notes);
-  info.samples_file = std::move(raw.samples_file);
+  info.other_files = std::move(raw.other_files);
   VolumeDescription& description = info.description;
   description.geometry = placed->geometry;
   description.type = kept.type;
@@ -71,8 +79,10 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   }
   if (placed->slant) {
     if (Status status = CheckFitsMemory(description.voxel_bytes(), path); !status.ok()) return status;
-    volume->block =
-        StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
+    const double outside =
+        info.labels ? SampleOfNoLabel(description.type, description.mapping) : LowestSample(volume->block, description.mapping);
+    volume->block = StraightenVoxels(volume->block, *placed->slant, description.geometry.size, outside,
+                                     info.labels ? Sampling::kNearest : Sampling::kLinear);
   }
   loaded.volume = std::move(volume);
   return loaded;
@@ -114,7 +124,7 @@ Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& opti
     Result<ReadFile> file = ReadRaw(path, options);
     if (!file.ok()) return file.status();
     TakeChannel(file->raw, options);
-    return Finish(std::move(file->raw), *file->format, path);
+    return Finish(std::move(file->raw), *file->format, path, options);
   });
 }
 
@@ -126,7 +136,7 @@ Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, con
     if (!file.ok()) return file.status();
     if (const auto placed = PlaceInWorld(file->raw.header, path); !placed.ok()) return placed.status();
     std::vector<std::string> files = {path};
-    if (!file->raw.samples_file.empty()) files.push_back(file->raw.samples_file.string());
+    for (const std::filesystem::path& other : file->raw.other_files) files.push_back(other.string());
     return files;
   });
 }

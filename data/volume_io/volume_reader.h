@@ -9,10 +9,10 @@
 //
 // Axes: if the file has an orientation (NIfTI sform or qform, NRRD space, MetaImage TransformMatrix), the voxels are turned to the nearest
 // axes of its world, so that x runs to the patient's right (or along the world's x), y to anterior, z to superior, however they are stored.
-// Slanted slices (a tilted gantry) are straightened. A matrix that is not finite or has no inverse is an error. Without an orientation x,
-// y, z are the file's own index axes, first index fastest; spacing is its absolute value, where 0 and NaN become 1, with a warning. TIFF
-// states no distance of slices: spacing is 1 along x and z, and along y the ratio of the two resolutions. Turning and straightening take
-// memory for the kept bytes once more.
+// Slanted slices (a tilted gantry) are straightened; labels keep their values. A matrix that is not finite or has no inverse is an error.
+// Without an orientation x, y, z are the file's own index axes, first index fastest; spacing is its absolute value, where 0 and NaN become
+// 1, with a warning. TIFF states no distance of slices: spacing is 1 along x and z, and along y the ratio of the two resolutions. Turning
+// and straightening take memory for the kept bytes once more.
 //
 // All functions may be called from any thread.
 #pragma once
@@ -44,7 +44,7 @@ struct VolumeFileInfo {
   int times = 1, time = 0;                 // how many volumes the file holds, and which of them it is
   // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
   std::vector<std::string> notes = {};
-  std::filesystem::path samples_file;  // if the samples are in a file of their own
+  std::vector<std::filesystem::path> other_files;  // that are read beside the path, or the folder of many
 };
 
 struct LoadedVolume {

@@ -117,7 +117,7 @@ void CopyTurned(const VoxelBlock& from, const AxisTurn& turn, VoxelBlock& to) {
 }
 
 template <class T>
-void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, VoxelBlock& to) {
+void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, Sampling sampling, VoxelBlock& to) {
   const Index3 slanted = from.box.size(), size = to.box.size();
   const T* const in = from.samples<T>();
   T* out = to.samples<T>();
@@ -125,6 +125,7 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
     const bool inside = x >= 0 && x < slanted.x && y >= 0 && y < slanted.y;
     return inside ? double(in[NumberIn(slanted, {x, y, z})]) : outside;
   };
+  const auto nearest = [](double place) { return std::int32_t(std::floor(place + 0.5)); };
   for (std::int32_t z = 0; z < size.z; ++z) {
     for (std::int32_t straight_y = 0; straight_y < size.y; ++straight_y) {
       const double y = straight_y + slant.first.y - slant.y_per_z * z;
@@ -132,6 +133,10 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
       const double beyond_y = y - y0;
       for (std::int32_t straight_x = 0; straight_x < size.x; ++straight_x) {
         const double x = straight_x + slant.first.x - slant.x_per_y * y - slant.x_per_z * z;
+        if (sampling == Sampling::kNearest) {
+          *out++ = T(sample(nearest(x), nearest(y), z));
+          continue;
+        }
         const auto x0 = std::int32_t(std::floor(x));
         const double beyond_x = x - x0;
         const double near = std::lerp(sample(x0, y0, z), sample(x0 + 1, y0, z), beyond_x);
@@ -214,9 +219,9 @@ VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn) {
   return turned;
 }
 
-VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside) {
+VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside, Sampling sampling) {
   VoxelBlock straight = MakeVoxelBlock({{0, 0, 0}, size}, block.type);
-  VisitScalarType(block.type, [&]<class T>(const T*) { SampleStraight<T>(block, slant, outside, straight); });
+  VisitScalarType(block.type, [&]<class T>(const T*) { SampleStraight<T>(block, slant, outside, sampling, straight); });
   return straight;
 }
 

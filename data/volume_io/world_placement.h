@@ -1,6 +1,6 @@
 // From the axes that a file stores its voxels in to those nearest to its world's. Voxels are turned (axes exchanged and run backwards),
 // which moves samples and changes none. If the stored axes are not at right angles, as in CT with a tilted gantry, the voxels are
-// straightened: sampled anew on a grid whose axes are, by linear interpolation within slices.
+// straightened: sampled anew on a grid whose axes are, within slices: measurements by linear interpolation, labels by the nearest voxel.
 #pragma once
 
 #include <array>
@@ -46,6 +46,7 @@ std::string InBrackets(const Vec3& v);  // "(0, 1.5, nan)", for messages
 // `block`: the whole volume as stored.
 VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn);
 // `outside`: what voxels of the straight grid hold that the slanted one does not reach, a sample.
-VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside);
+enum class Sampling { kLinear, kNearest };
+VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside, Sampling sampling);
 
 }  // namespace slabstream

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <span>
+
 #include "common/base/files.h"
 #include "data/layers/color_table.h"
 #include "data/volume_io/volume_reader.h"
@@ -95,6 +98,22 @@ TEST_F(LayerReader, WhatIsNoLabelIsNamed) {
   std::vector<float> values(kMaxLabels + 2);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = float(i);
   EXPECT_THAT(ErrorOf({.labels = Write("e.nrrd", values)}, Grid(2)), HasSubstr("more than 4096 labels"));
+}
+
+TEST_F(LayerReader, SlantedLabelsKeepTheirNumbers) {
+  const std::string path = directory_ / "slanted.nrrd";
+  const std::string header =
+      "NRRD0004\ntype: uint8\ndimension: 3\nspace: RAS\nsizes: 4 4 4\nencoding: raw\nspace directions: (1,0,0) (0.4,1,0) (0,0.3,1)\n\n";
+  std::string samples;
+  for (int i = 0; i < 64; ++i) samples += i % 3 == 0 ? char(9) : char(200);
+  ASSERT_TRUE(WriteTextFile(path, header + samples).ok());
+  const VolumeGeometry grid{{4, 4, 4}, {1, 1, 1}, {.world = World::kPatient, .origin = {}}};
+  const Layers layers = ReadLayers({.labels = path, .overlay = path}, grid).value();
+  ASSERT_EQ(layers.table->labels.size(), 2U);
+  EXPECT_EQ(layers.table->labels[0].value, 9U);
+  EXPECT_EQ(layers.table->labels[1].value, 200U);
+  const std::span overlay(layers.overlay->block.samples<float>(), 64);
+  EXPECT_TRUE(std::ranges::any_of(overlay, [](float value) { return value > 10 && value < 199; })) << "an overlay is interpolated";
 }
 
 TEST_F(LayerReader, LayersLieInTheSameWorld) {

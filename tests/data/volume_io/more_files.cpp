@@ -88,6 +88,15 @@ FileBytes MrcHeader(const MrcSpec& spec) {
   return bytes;
 }
 
+FileBytes MghHeader(const Index3& size, std::int32_t type, const std::array<float, 15>& fields, bool good) {
+  FileBytes bytes(284, '\0');
+  const std::int32_t integers[] = {1, size.x, size.y, size.z, 1, type};
+  for (std::size_t i = 0; i < 6; ++i) PutNumber(bytes, 4 * i, integers[i], true);
+  PutNumber(bytes, 28, std::int16_t(good ? 1 : 0), true);
+  for (std::size_t i = 0; i < fields.size(); ++i) PutNumber(bytes, 30 + 4 * i, fields[i], true);
+  return bytes;
+}
+
 FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool fortran, int version) {
   FileBytes text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", descr, fortran ? "True" : "False", shape);
   const std::size_t before = version == 1 ? 10 : 12;
@@ -215,6 +224,7 @@ std::vector<SampleFile> OneOfEachFormat() {
       whole("v.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())), zlib),
       whole("v.mrc", MrcHeader({.mode = 1, .extension = 40}), samples),
       whole("v.map.gz", "", Gzip(MrcHeader({.mode = 1, .big_endian = true}) + swapped)),
+      whole("v.mgh", MghHeader(spec.size, 4, {1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1}), swapped),
       all("v.vtk", VtkFile(spec, swapped, true)),
       all("v.vtk", VtkFile(spec, AsText(values), false)),
       all("v.vti", VtiFile(spec, samples)),

@@ -1,6 +1,7 @@
 // Files of further formats, byte by byte like those of volume_files.h; pictures through their libraries.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,9 @@ struct MrcSpec {
   std::int32_t imod = 0;  // flags of IMOD; with its stamp unless 0
 };
 FileBytes MrcHeader(const MrcSpec& spec);  // with the extension
+
+// `fields`: spacing, x_ras, y_ras, z_ras and c_ras; `good`: ras_good_flag.
+FileBytes MghHeader(const Index3& size, std::int32_t type, const std::array<float, 15>& fields, bool good = true);
 
 // `shape`: as Python writes it, "(2, 3, 4)".
 FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool fortran = false, int version = 1);

@@ -149,7 +149,7 @@ TEST_F(ReadersTest, MrcAxesAreThoseOfTheCell) {
 }
 
 TEST_F(ReadersTest, MrcSaysWhatItIsNot) {
-  EXPECT_THAT(WhyNot("v.mrc", MrcHeader({.mode = 4}) + FileBytes(192, 'x')), HasSubstr("MRC mode 4 is not supported"));
+  EXPECT_THAT(WhyNot("v.mrc", MrcHeader({.mode = 4}) + FileBytes(192, 'x')), HasSubstr("MRC mode 4 (complex floats) is not supported"));
   FileBytes old = MrcHeader({});
   old.replace(208, 4, 4, '\0');
   EXPECT_THAT(WhyNot("v.map", old + FileBytes(24, 'x')), HasSubstr("'MAP '"));
