@@ -20,21 +20,21 @@ constexpr std::int64_t kGap = 4096;
 
 }  // namespace
 
-Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int channel) {
+Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int component) {
   FileDescriptor file(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.number() < 0) {
     return Status::Unavailable(
         fmt::format("{}: cannot be opened for reading: {}", payload.file.string(), std::generic_category().message(errno)));
   }
-  return std::shared_ptr<StoredSamples>(new StoredSamples(header, payload, channel, std::move(file)));
+  return std::shared_ptr<StoredSamples>(new StoredSamples(header, payload, component, std::move(file)));
 }
 
-StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file)
+StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file)
     : name_(payload.file.string()),
       file_(std::move(file)),
       type_(header.type),
       big_endian_(payload.big_endian),
-      first_(payload.offset + channel * std::int64_t(BytesPerSample(header.type))),
+      first_(payload.offset + component * std::int64_t(BytesPerSample(header.type))),
       sample_(std::int64_t(BytesPerSample(header.type))),
       voxel_(sample_ * header.components),
       row_(voxel_ * header.size.x),

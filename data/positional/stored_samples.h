@@ -41,7 +41,7 @@ class StoredSamples {
     std::int64_t row = 0, slice = 0;
   };
 
-  StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file);
+  StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file);
   Pitch PitchFor(const Index3& size) const;
   bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }
