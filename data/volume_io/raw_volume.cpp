@@ -14,15 +14,6 @@
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
-namespace {
-
-template <class T>
-T Luminance(const T* rgb) {  // of ITU-R BT.709
-  const double value = 0.2126 * double(rgb[0]) + 0.7152 * double(rgb[1]) + 0.0722 * double(rgb[2]);
-  return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
-}
-
-}  // namespace
 
 Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options) {
   while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
@@ -120,10 +111,7 @@ void TakeChannel(RawVolume& raw, const ReadOptions& options) {
   const std::size_t count = CountIn(raw.header.size);
   VisitSampleType(raw.header.type, [&]<class T>(const T*) {
     T* const samples = reinterpret_cast<T*>(raw.bytes.data());
-    for (std::size_t i = 0; i < count; ++i) {
-      const T* const voxel = samples + i * components;
-      samples[i] = options.channel == kLuminance ? Luminance(voxel) : voxel[options.channel.value_or(0)];
-    }
+    for (std::size_t i = 0; i < count; ++i) samples[i] = TakenComponent(samples + i * components, options.channel);
   });
   raw.header.components = 1;
   raw.bytes.resize(std::size_t(raw.header.sample_bytes()));

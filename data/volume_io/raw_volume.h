@@ -2,12 +2,14 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
@@ -88,6 +90,14 @@ Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& l
 
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
 Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& located, const ReadOptions& options);
+
+// Of the components of a voxel the one that `channel` takes (ReadOptions::channel), or the luminance of the first three by ITU-R BT.709.
+template <class T>
+T TakenComponent(const T* voxel, std::optional<int> channel) {
+  if (channel != kLuminance) return voxel[channel.value_or(0)];
+  const double value = 0.2126 * double(voxel[0]) + 0.7152 * double(voxel[1]) + 0.0722 * double(voxel[2]);
+  return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
+}
 
 // Of several components the one that options.channel takes, or their luminance, in place.
 void TakeChannel(RawVolume& raw, const ReadOptions& options);

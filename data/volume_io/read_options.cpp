@@ -158,7 +158,7 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"endian", "little|big", "Byte order of raw samples (default: little)", SetEndian, IsGiven<&ReadOptions::big_endian>},
       {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset, IsGiven<&ReadOptions::offset>},
       {"series", "NUMBER|UID", "Which series of a DICOM folder; `slabstream info` lists them", SetSeries, IsGiven<&ReadOptions::series>},
-      {"array", "NAME", "Which array of an unstructured grid, or which array or group of a Zarr hierarchy", SetArray,
+      {"array", "NAME", "Which array of a VTK file, or which array or group of a Zarr or N5 hierarchy", SetArray,
        IsGiven<&ReadOptions::array>},
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},

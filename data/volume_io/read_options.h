@@ -40,7 +40,7 @@ struct ReadOptions {
   std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
   std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
   std::optional<Vec3> spacing;    // each > 0, finite
-  // Of unstructured grids. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
+  // Of VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
   std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
   // Of HDF5 files.

@@ -139,7 +139,10 @@ Status CheckVolume(const std::string& path, const ReadOptions& options) {
     return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
   }
   const VolumeFormat* const format = FindFormat(path, options);
-  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume, which " + ReadableText()));
+  if (format == nullptr) {
+    const std::string_view why = WhyUnread(path);
+    return Printable(Status::InvalidArgument(path + ": " + (why.empty() ? "not a volume, which " + ReadableText() : std::string(why))));
+  }
   return Printable(CheckOptions(*format, path, options));
 }
 

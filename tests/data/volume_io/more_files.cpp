@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "common/base/check.h"
+#include "tests/data/codecs/packed_bytes.h"
 
 namespace slabstream {
 namespace {
@@ -43,7 +44,10 @@ FileBytes VtkXmlSamples(const FileSpec& spec, const FileBytes& samples, const Vt
   FileBytes sizes, blocks;
   std::size_t count = 0;
   for (std::size_t begin = 0; begin < samples.size(); begin += options.block, ++count) {
-    const FileBytes block = Zlib(samples.substr(begin, options.block));
+    const FileBytes block = PackBytes(options.compressor == "LZMA"  ? "xz"
+                                      : options.compressor == "LZ4" ? "lz4 block"
+                                                                    : "zlib",
+                                      samples.substr(begin, options.block));
     sizes += Word(block.size(), spec, options);
     blocks += block;
   }
@@ -129,16 +133,19 @@ FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptio
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n"
       "<ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\"{}>\n<Piece Extent=\"{}\">\n<PointData {}>\n",
       spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
-      options.block > 0 ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, options.origin.x, options.origin.y, options.origin.z,
-      spec.spacing.x, spec.spacing.y, spec.spacing.z, options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent,
-      options.attributes);
+      options.block > 0 ? " compressor=\"vtk" + options.compressor + "DataCompressor\"" : "", extent, options.origin.x, options.origin.y,
+      options.origin.z, spec.spacing.x, spec.spacing.y, spec.spacing.z,
+      options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent, options.attributes);
   const FileBytes stored = VtkXmlSamples(spec, samples, options);
   const bool appended = options.format == "appended";
   for (int i = 0; i < options.arrays; ++i) {
     text += fmt::format("<DataArray type=\"{}\" Name=\"density{}\" NumberOfComponents=\"{}\" format=\"{}\"{}>\n", kTypes[int(spec.type)],
                         i == 0 ? "" : std::to_string(i + 1), options.components, options.format, appended ? " offset=\"0\"" : "");
-    if (!appended) text += "<InformationKey name=\"range\">0 1</InformationKey>\n" + stored + "\n";
-    text += "</DataArray>\n";
+    // As VTK does for arrays of several components.
+    if (!appended) text += stored + "\n";
+    text +=
+        "<InformationKey name=\"L2_NORM_RANGE\" location=\"vtkDataArray\" length=\"2\"><Value "
+        "index=\"0\">0</Value></InformationKey>\n</DataArray>\n";
   }
   text += "</PointData>\n</Piece>\n</ImageData>\n";
   if (appended) text += "<AppendedData encoding=\"" + options.encoding + "\">\n  _" + stored + "\n</AppendedData>\n";
