@@ -54,8 +54,14 @@ Result<CodecChain> CodecsOf(const metadata::Field& attributes, std::size_t eleme
     chain.push_back(ZstdCodec());
   } else if (*name == "blosc") {
     chain.push_back(BloscCodec());
+  } else if (*name == "lz4") {
+    chain.push_back(Lz4JavaCodec());
+  } else if (*name == "bzip2") {
+    chain.push_back(Bzip2Codec());
+  } else if (*name == "xz") {
+    chain.push_back(XzCodec());
   } else {
-    return type.Wrong("a supported compression: raw, gzip, zstd or blosc");
+    return type.Wrong("a supported compression: raw, gzip, zstd, blosc, lz4, bzip2 or xz");
   }
   return chain;
 }
