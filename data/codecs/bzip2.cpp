@@ -8,8 +8,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::string_view kName = "bzip2";
-
 class Decompressor {
  public:
   Decompressor() { Begin(); }
@@ -52,7 +50,7 @@ class Bzip2 : public ChunkCodec {
  public:
   Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
     Decompressor decompressor;
-    return DecodeGrowing(kName, packed.span(), most, [&](auto& in, auto& out) { return decompressor.Step(in, out); });
+    return DecodeGrowing("bzip2", packed.span(), most, [&](auto& in, auto& out) { return decompressor.Step(in, out); });
   }
 };
 

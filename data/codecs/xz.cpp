@@ -8,7 +8,6 @@
 namespace slabstream {
 namespace {
 
-constexpr std::string_view kName = "xz";
 constexpr std::uint64_t kMostMemory = std::uint64_t{256} << 20;  // four times what the highest level of xz takes
 
 class Decoder {
@@ -41,7 +40,7 @@ class Xz : public ChunkCodec {
  public:
   Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
     Decoder decoder;
-    return DecodeGrowing(kName, packed.span(), most, [&](auto& in, auto& out) { return decoder.Step(in, out); });
+    return DecodeGrowing("xz", packed.span(), most, [&](auto& in, auto& out) { return decoder.Step(in, out); });
   }
 };
 
