@@ -9,6 +9,7 @@
 #include "data/volume_io/volume_reader.h"
 #include "tests/data/volume_io/vtu_files.h"
 #include "tests/support/expect_near.h"
+#include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
 namespace slabstream {
@@ -261,6 +262,40 @@ TEST_F(VtkTest, FilesOfVtkThatAreNotReadAreNamed) {
   EXPECT_THAT(WhyNot("V.VTS", "<VTKFile/>"), HasSubstr("a curvilinear grid of VTK (StructuredGrid), which is not read"));
   EXPECT_THAT(WhyNot("v.vtp", "<VTKFile/>"), HasSubstr("a surface of VTK (PolyData), which holds no volume"));
   EXPECT_THAT(WhyNot("v.vtx", "<VTKFile/>"), HasSubstr("not a volume, which must end in .nii"));
+}
+
+TEST_F(VtkTest, FilesThatAreCutOffOrAlteredDoNoHarm) {
+  Random random(57);
+  SCOPED_TRACE(random.trace());
+  const std::string extent = "0 2 0 1 0 1";
+  const std::string coordinates = "<Coordinates>\n" + Array("x", {0, 1, 2}) + Array("y", {0, 3}) + Array("z", {5, 6}) + "</Coordinates>\n";
+  const FileSpec bytes{.type = SampleType::kUint8};
+  const std::pair<const char*, std::string> files[] = {
+      {"v.vti", Image("0 4 0 1 0 0", Piece("0 2 0 1 0 0", Points(Array("p", Counted(6))) + Cells(Array("c", Counted(2)))) +
+                                         Piece("2 4 0 1 0 0", Points(Array("p", Counted(6))) + Cells(Array("c", Counted(2)))))},
+      {"v.vtr", XmlFile("RectilinearGrid", "WholeExtent=\"" + extent + "\"", Piece(extent, Cells(Array("c", Counted(2))) + coordinates))},
+      {"v.vti",
+       VtiFile(bytes, EncodeSamples(SampleType::kUint8, Counted(24), false), {.format = "binary", .block = 9, .compressor = "LZ4"})},
+      {"v.vti", VtiFile(bytes, EncodeSamples(SampleType::kUint8, Counted(24), false), {.block = 9, .compressor = "LZMA"})},
+      {"v.vtk",
+       "# vtk DataFile Version 3.0\nt\nASCII\nDATASET RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 float\n0 1\nY_COORDINATES 2 int\n"
+       "0 1\nZ_COORDINATES 2 int\n0 1\nFIELD f 1\nn 1 1 string\nabc\nCELL_DATA 1\nCOLOR_SCALARS c 1\n0.5\n"}};
+  for (const auto& [name, good] : files) {
+    ASSERT_TRUE(Read(name, good).ok()) << good;
+    const auto check = [&](const std::string& file) {
+      const Result<LoadedVolume> loaded = Read(name, file, {.array = random.Chance(0.5) ? "c" : ""});
+      if (!loaded.ok()) EXPECT_THAT(loaded.status().message(), testing::Not(HasSubstr("\n")));
+    };
+    for (std::size_t length = 0; length < good.size(); length += 7) check(good.substr(0, length));
+    for (int i = 0; i < 300; ++i) {
+      std::string file = good;
+      for (int change = random.Integer(1, 3); change > 0; --change) {
+        char& byte = file[random.Integer<std::size_t>(0, file.size() - 1)];
+        byte = byte >= '0' && byte <= '9' ? char('0' + random.Integer(0, 9)) : char(random.Integer(0, 255));
+      }
+      check(file);
+    }
+  }
 }
 
 TEST(ChosenArray, IsTheNamedOneTheActiveOneOrTheOnlyOne) {
