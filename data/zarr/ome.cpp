@@ -110,20 +110,6 @@ OmeChannel ReadChannel(const Field& field) {
 
 }  // namespace
 
-AxisKind AxisNamed(std::string_view name) {
-  std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-  static constexpr std::pair<std::string_view, AxisKind> kNames[] = {{"x", AxisKind::kX},
-                                                                     {"y", AxisKind::kY},
-                                                                     {"z", AxisKind::kZ},
-                                                                     {"t", AxisKind::kTime},
-                                                                     {"time", AxisKind::kTime},
-                                                                     {"c", AxisKind::kChannel},
-                                                                     {"channel", AxisKind::kChannel}};
-  const auto* const found = std::ranges::find(kNames, lower, [](const auto& known) { return known.first; });
-  return found == std::end(kNames) ? AxisKind::kOther : found->second;
-}
-
 bool IsOmeImage(const Field& attributes, int zarr_version) { return OmeField(attributes, zarr_version)["multiscales"].stated(); }
 
 Result<OmeImage> ParseOmeImage(const Field& attributes, int zarr_version) {

@@ -13,10 +13,9 @@
 #include "common/volume/orientation.h"
 #include "common/volume/summary.h"
 #include "data/metadata/json_fields.h"
+#include "data/sources/axis_choice.h"
 
 namespace slabstream::zarr {
-
-enum class AxisKind : std::uint8_t { kX, kY, kZ, kTime, kChannel, kOther };
 
 struct OmeAxis {
   std::string name;  // "z"
@@ -49,8 +48,5 @@ bool IsOmeImage(const metadata::Field& attributes, int zarr_version);
 
 // InvalidArgument, naming the field: it is missing, wrong, or something that is not supported.
 Result<OmeImage> ParseOmeImage(const metadata::Field& attributes, int zarr_version);
-
-// The axis that a name stands for, in upper or lower case: x, y, z, t, c, time, channel.
-AxisKind AxisNamed(std::string_view name);
 
 }  // namespace slabstream::zarr

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "common/base/printable.h"
-#include "data/zarr/axis_choice.h"
+#include "data/sources/axis_choice.h"
 #include "data/zarr/ome.h"
 #include "data/zarr/world_attributes.h"
 #include "data/zarr/zarr_array.h"

@@ -1,4 +1,4 @@
-#include "data/zarr/axis_choice.h"
+#include "data/sources/axis_choice.h"
 
 #include <fmt/format.h>
 
@@ -7,12 +7,26 @@
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 
-namespace slabstream::zarr {
+namespace slabstream {
 namespace {
 
 Status Wrong(const std::string& array, const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", array, why)); }
 
 }  // namespace
+
+AxisKind AxisNamed(std::string_view name) {
+  std::string lower(name);
+  std::ranges::transform(lower, lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
+  static constexpr std::pair<std::string_view, AxisKind> kNames[] = {{"x", AxisKind::kX},
+                                                                     {"y", AxisKind::kY},
+                                                                     {"z", AxisKind::kZ},
+                                                                     {"t", AxisKind::kTime},
+                                                                     {"time", AxisKind::kTime},
+                                                                     {"c", AxisKind::kChannel},
+                                                                     {"channel", AxisKind::kChannel}};
+  const auto* const found = std::ranges::find(kNames, lower, [](const auto& known) { return known.first; });
+  return found == std::end(kNames) ? AxisKind::kOther : found->second;
+}
 
 Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const std::vector<std::string>& names,
                                                const ReadOptions& options) {
@@ -74,4 +88,4 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   return choice;
 }
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream

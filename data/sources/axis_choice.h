@@ -1,16 +1,23 @@
 // Which axes of an array are x, y and z, and which index of the others is shown.
+//
+// Pure.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
 #include "data/volume_io/read_options.h"
-#include "data/zarr/ome.h"
 
-namespace slabstream::zarr {
+namespace slabstream {
+
+enum class AxisKind : std::uint8_t { kX, kY, kZ, kTime, kChannel, kOther };
+
+// The axis that a name stands for, in upper or lower case: x, y, z, t, c, time, channel.
+AxisKind AxisNamed(std::string_view name);
 
 struct AxisChoice {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
@@ -28,4 +35,4 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
                               const ReadOptions& options, std::vector<std::string> names = {});
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream
