@@ -75,7 +75,7 @@ class Level : public std::enable_shared_from_this<Level> {
   VolumeSource::Counts counts() const { return {stored_bytes_, chunks_}; }
 
   void Read(const std::shared_ptr<Reading>& reading) {
-    const Box& box = reading->box();
+    const Box box = Mirrored(reading->box());
     const Index3 first = {box.begin.x / chunk_.x, box.begin.y / chunk_.y, box.begin.z / chunk_.z};
     const Index3 last = {(box.end.x - 1) / chunk_.x, (box.end.y - 1) / chunk_.y, (box.end.z - 1) / chunk_.z};
     // In the order of the array's axes, in which stores keep chunks: the last axis varies fastest.
@@ -100,7 +100,17 @@ class Level : public std::enable_shared_from_this<Level> {
  private:
   using Readings = std::vector<std::shared_ptr<Reading>>;
 
+  // Of elements of the array.
   Box BoxOf(const Index3& chunk) const { return {chunk * chunk_, Min((chunk + Uniform(1)) * chunk_, size_)}; }
+
+  // From voxels of the level to elements of the array along x, y and z, and back.
+  Box Mirrored(Box box) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!level_.mirrored[std::size_t(axis)]) continue;
+      box.begin[axis] = size_[axis] - std::exchange(box.end[axis], size_[axis] - box.begin[axis]);
+    }
+    return box;
+  }
 
   void Want(const Index3& chunk, const std::shared_ptr<Reading>& reading) {
     const std::uint64_t number = NumberIn(counts_, chunk);
@@ -181,7 +191,7 @@ class Level : public std::enable_shared_from_this<Level> {
   Readings TakeFlight(const Index3& chunk, const Bytes& elements = {}) {
     const std::lock_guard lock(mutex_);
     const auto flight = flights_.find(NumberIn(counts_, chunk));
-    const Box all = BoxOf(chunk);
+    const Box all = Mirrored(BoxOf(chunk));
     if (!elements.empty() && std::ranges::none_of(flight->second, [&](const auto& each) { return each->box().Contains(all); })) {
       try {
         context_->cache().Keep(owner_, flight->first, elements);
@@ -235,19 +245,20 @@ class Level : public std::enable_shared_from_this<Level> {
     if (!reading.goes_on()) return reading.GiveUp();
     if (elements.empty() && fills_with_zeros_ && reading.out().zeroed) return;
     const ArrayShape& shape = level_.array->shape();
-    const Box part = Intersection(BoxOf(chunk), reading.box());
+    const Box stored = Intersection(BoxOf(chunk), Mirrored(reading.box())), part = Mirrored(stored);
     const std::byte* from = shape.fill.data();
     std::array<std::int64_t, 3> steps = {0, 0, 0};
     if (!elements.empty()) {
       const std::array<std::uint64_t, kMaxArrayAxes> sides = ShapeOf(chunk);
-      const Index3 within = part.begin - BoxOf(chunk).begin;
+      const Index3 within = stored.begin - BoxOf(chunk).begin;
       std::int64_t step = 1, first = 0;
       for (std::size_t a = shape.size.size(); a-- > 0; step *= std::int64_t(sides[a])) {
         std::int64_t place = std::int64_t(level_.at[a] % shape.chunk[a]);
         for (int axis = 0; axis < 3; ++axis) {
           if (level_.axes[std::size_t(axis)] != int(a)) continue;
-          place = within[axis];
-          steps[std::size_t(axis)] = step;
+          const bool mirrored = level_.mirrored[std::size_t(axis)];
+          place = within[axis] + (mirrored ? part.size()[axis] - 1 : 0);
+          steps[std::size_t(axis)] = mirrored ? -step : step;
         }
         first += place * step;
       }

@@ -77,6 +77,7 @@ struct RandomPyramid {
     while (order.size() < 3) order.push_back(-1);
     for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.Integer<std::size_t>(0, i - 1)]);
     level.axes = {order[0], order[1], order[2]};
+    for (bool& mirrored : level.mirrored) mirrored = random.Chance(0.3);
     level.at = at;
     array = std::make_shared<MemoryArray>(shape, RandomElements(shape.type, count, random), arrive_on);
     for (std::uint64_t chunk = 0; chunk < array->chunk_count(); ++chunk) {
@@ -88,7 +89,10 @@ struct RandomPyramid {
   double Expected(const Index3& v) const {
     std::vector<std::uint64_t> element = at;
     for (int axis = 0; axis < 3; ++axis) {
-      if (level.axes[std::size_t(axis)] >= 0) element[std::size_t(level.axes[std::size_t(axis)])] = std::uint64_t(v[axis]);
+      if (level.axes[std::size_t(axis)] < 0) continue;
+      const auto a = std::size_t(level.axes[std::size_t(axis)]);
+      const auto along = std::uint64_t(v[axis]);
+      element[a] = level.mirrored[std::size_t(axis)] ? array->shape().size[a] - 1 - along : along;
     }
     return 2 * ValueOf(array->shape().type, array->element(element)) + 3;
   }
