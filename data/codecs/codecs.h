@@ -21,6 +21,14 @@ SharedCodec ZstdCodec();
 SharedCodec BloscCodec();
 // A block of LZ4 behind the number of its decoded bytes (32 bits, little endian), as numcodecs writes it.
 SharedCodec Lz4Codec();
+// A bare block of LZ4, which does not tell how many bytes it holds, as VTK writes it.
+SharedCodec Lz4BlockCodec();
+// Blocks of LZ4 in the frame of lz4-java, as N5 writes them.
+SharedCodec Lz4JavaCodec();
+// Streams of bzip2 and xz, one or more, and a stream of brotli (RFC 7932), none of which tells how many bytes it holds.
+SharedCodec Bzip2Codec();
+SharedCodec XzCodec();
+SharedCodec BrotliCodec();
 // What LibLZF makes of bytes, as h5py writes it. It does not tell how many there are.
 SharedCodec LzfCodec();
 // Four bytes behind the others: their CRC-32C, little endian (RFC 3720). DataLoss unless it is theirs.

@@ -1,8 +1,12 @@
 #include "tests/data/codecs/packed_bytes.h"
 
 #include <blosc.h>
+#include <brotli/encode.h>
+#include <bzlib.h>
 #include <lz4.h>
 #include <lzf.h>
+#include <lzma.h>
+#include <xxhash.h>
 #include <zlib.h>
 #include <zstd.h>
 
@@ -28,6 +32,8 @@ std::string Deflated(const std::string& bytes, int window_bits) {
   return packed;
 }
 
+constexpr std::size_t kLz4JavaBlock = 1000;
+
 std::string Little32(std::uint32_t number) {
   std::string bytes;
   for (int i = 0; i < 4; ++i) bytes += char(number >> (8 * i));
@@ -47,10 +53,47 @@ std::string PackBytes(const std::string& codec, const std::string& bytes, std::s
     packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1));
     return packed;
   }
-  if (codec == "lz4") {
+  if (codec == "lz4") return Little32(std::uint32_t(bytes.size())) + PackBytes("lz4 block", bytes);
+  if (codec == "lz4 block") {
     std::string packed(std::size_t(LZ4_compressBound(int(bytes.size()))), '\0');
     packed.resize(std::size_t(LZ4_compress_default(bytes.data(), packed.data(), int(bytes.size()), int(packed.size()))));
-    return Little32(std::uint32_t(bytes.size())) + packed;
+    return packed;
+  }
+  if (codec == "lz4 java") {
+    std::string stream;
+    for (std::size_t begin = 0; begin < bytes.size(); begin += kLz4JavaBlock) {
+      const std::string block = bytes.substr(begin, kLz4JavaBlock), packed = PackBytes("lz4 block", block);
+      const bool stored = packed.size() >= block.size();
+      const std::uint32_t sum = XXH32(block.data(), block.size(), 0x9747b28c) & 0xfffffff;
+      stream += std::string("LZ4Block") + char(stored ? 0x16 : 0x26) + Little32(std::uint32_t((stored ? block : packed).size())) +
+                Little32(std::uint32_t(block.size())) + Little32(sum) + (stored ? block : packed);
+    }
+    return stream + "LZ4Block" + char(0x16) + std::string(12, '\0');
+  }
+  if (codec == "bzip2") {
+    std::string packed(bytes.size() + bytes.size() / 100 + 600, '\0');
+    auto size = unsigned(packed.size());
+    CHECK_EQ(BZ2_bzBuffToBuffCompress(packed.data(), &size, const_cast<char*>(bytes.data()), unsigned(bytes.size()), 1, 0, 0), BZ_OK);
+    packed.resize(size);
+    return packed;
+  }
+  if (codec == "xz") {
+    std::string packed(lzma_stream_buffer_bound(bytes.size()), '\0');
+    std::size_t size = 0;
+    CHECK_EQ(lzma_easy_buffer_encode(0, LZMA_CHECK_CRC32, nullptr, reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(),
+                                     reinterpret_cast<std::uint8_t*>(packed.data()), &size, packed.size()),
+             LZMA_OK);
+    packed.resize(size);
+    return packed;
+  }
+  if (codec == "brotli") {
+    std::string packed(BrotliEncoderMaxCompressedSize(bytes.size()) + 64, '\0');
+    std::size_t size = packed.size();
+    CHECK_EQ(BrotliEncoderCompress(1, 18, BROTLI_MODE_GENERIC, bytes.size(), reinterpret_cast<const std::uint8_t*>(bytes.data()), &size,
+                                   reinterpret_cast<std::uint8_t*>(packed.data())),
+             BROTLI_TRUE);
+    packed.resize(size);
+    return packed;
   }
   if (codec == "lzf") {
     std::string packed(bytes.size() + bytes.size() / 16 + 64, '\0');
