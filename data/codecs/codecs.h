@@ -37,6 +37,16 @@ SharedCodec Crc32cCodec();
 SharedCodec SwapBytesCodec(std::size_t element_bytes);
 // The first byte of each element, then the second one of each, and so on. `element_bytes` is at least 1.
 SharedCodec ShuffleCodec(std::size_t element_bytes);
+// The first bit of each element, then the second one of each, and so on, in blocks of so many elements (a multiple of 8, above 0); fewer
+// than 8 elements at the end are as they were. `element_bytes` is at least 1.
+SharedCodec BitshuffleCodec(std::size_t element_bytes, std::size_t block_elements);
+// Blocks that are packed one by one in the frame of the LZ4 filter of HDF5, and of its bitshuffle filter, which shuffles before it packs.
+struct BlockFormat {
+  SharedCodec packing;  // of a block
+  bool bitshuffle = false;
+  std::size_t element_bytes = 1;  // of what is shuffled
+};
+SharedCodec BlocksCodec(const BlockFormat& format);
 
 std::uint32_t Crc32c(std::span<const std::byte> bytes);
 

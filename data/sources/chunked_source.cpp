@@ -369,7 +369,7 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   const KeptType kept = KeptTypeOf(type);
   const ValueMapping mapping = {pyramid.rescale.scale, pyramid.rescale.FromStored(kept.shift)};
   SourceInfo info = std::move(pyramid.info);
-  info.file_type = ToString(type);
+  if (info.file_type.empty()) info.file_type = ToString(type);
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
   for (PyramidLevel& level : pyramid.levels) {

@@ -45,4 +45,15 @@ std::optional<LengthUnit> LengthUnitNamed(std::string_view name) {
 
 std::string_view FileNameOf(LengthUnit unit) { return std::ranges::find(kUnitNames, unit, &UnitName::unit)->name; }
 
+double MetresIn(LengthUnit unit) {
+  switch (unit) {
+    case LengthUnit::kMillimetre: return 1e-3;
+    case LengthUnit::kMicrometre: return 1e-6;
+    case LengthUnit::kNanometre: return 1e-9;
+    case LengthUnit::kAngstrom: return 1e-10;
+    case LengthUnit::kCentimetre: return 1e-2;
+    default: return 1;
+  }
+}
+
 }  // namespace slabstream

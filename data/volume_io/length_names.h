@@ -14,4 +14,7 @@ std::optional<LengthUnit> LengthUnitNamed(std::string_view name);
 // The name that is written, in ASCII: "um". `unit` is one that files state.
 std::string_view FileNameOf(LengthUnit unit);
 
+// How long it is; `unit` is one that files state.
+double MetresIn(LengthUnit unit);
+
 }  // namespace slabstream

@@ -20,8 +20,6 @@ constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostTransformati
 // From Zarr 3 on, what OME says has a member of its own.
 Field OmeField(const Field& attributes, int zarr_version) { return zarr_version == 3 ? attributes["ome"] : attributes; }
 
-bool IsSpace(AxisKind kind) { return kind == AxisKind::kX || kind == AxisKind::kY || kind == AxisKind::kZ; }
-
 Result<OmeAxis> ReadAxis(const Field& field) {
   const Field name_field = field.is_text() ? field : field["name"];  // before 0.4 an axis is its name
   const Result<std::string> name = name_field.Text();

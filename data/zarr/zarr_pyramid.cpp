@@ -9,6 +9,7 @@
 
 #include "common/base/printable.h"
 #include "data/sources/axis_choice.h"
+#include "data/volume_io/length_names.h"
 #include "data/zarr/ome.h"
 #include "data/zarr/world_attributes.h"
 #include "data/zarr/zarr_array.h"
@@ -140,17 +141,6 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   return pyramid;
 }
 
-double Metres(LengthUnit unit) {
-  switch (unit) {
-    case LengthUnit::kMillimetre: return 1e-3;
-    case LengthUnit::kMicrometre: return 1e-6;
-    case LengthUnit::kNanometre: return 1e-9;
-    case LengthUnit::kAngstrom: return 1e-10;
-    case LengthUnit::kCentimetre: return 1e-2;
-    default: return 1;
-  }
-}
-
 // The unit of x, if y and z state one as well, and by what theirs differ from it.
 struct CommonUnit {
   std::optional<LengthUnit> unit;
@@ -163,7 +153,7 @@ CommonUnit UnitOf(const OmeImage& image, const AxisChoice& choice) {
     if (number < 0) continue;
     const std::optional<LengthUnit> unit = image.axes[std::size_t(number)].unit;
     if (!unit || !common.unit) return {};
-    if (unit != common.unit) common.factor[axis] = Metres(*unit) / Metres(*common.unit);
+    if (unit != common.unit) common.factor[axis] = MetresIn(*unit) / MetresIn(*common.unit);
   }
   return common;
 }

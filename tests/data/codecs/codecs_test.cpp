@@ -51,6 +51,10 @@ const std::vector<Case>& Cases() {
       {"blosc", BloscCodec(), [](const std::string& bytes) { return PackBytes("blosc", bytes, 2); }},
       {"lz4", Lz4Codec(), [](const std::string& bytes) { return PackBytes("lz4", bytes); }},
       {"lz4_java", Lz4JavaCodec(), [](const std::string& bytes) { return PackBytes("lz4 java", bytes); }},
+      {"lz4_blocks", BlocksCodec({Lz4BlockCodec()}), [](const std::string& bytes) { return PackBlocks("lz4 block", bytes, 100, 0); }},
+      {"bitshuffle_lz4", BlocksCodec({Lz4BlockCodec(), true, 2}),
+       [](const std::string& bytes) { return PackBlocks("lz4 block", bytes, 64, 2); }},
+      {"bitshuffle_zstd", BlocksCodec({ZstdCodec(), true, 3}), [](const std::string& bytes) { return PackBlocks("zstd", bytes, 240, 3); }},
       {"bzip2", Bzip2Codec(), [](const std::string& bytes) { return PackBytes("bzip2", bytes); }},
       {"bzip2_streams", Bzip2Codec(),
        [](const std::string& bytes) {
@@ -61,6 +65,7 @@ const std::vector<Case>& Cases() {
       {"lzf", LzfCodec(), [](const std::string& bytes) { return PackBytes("lzf", bytes); }, false},
       {"crc32c", Crc32cCodec(), [](const std::string& bytes) { return PackBytes("crc32c", bytes); }},
       {"swap", SwapBytesCodec(4), [](const std::string& bytes) { return SwappedBytes(bytes, 4); }, false},
+      {"bitshuffle", BitshuffleCodec(4, 16), [](const std::string& bytes) { return BitshuffledBytes(bytes, 4, 16); }, false},
       {"shuffle", ShuffleCodec(8), [](const std::string& bytes) { return ShuffledBytes(bytes, 8); }, false}};
   return cases;
 }

@@ -138,4 +138,39 @@ std::string SwappedBytes(const std::string& bytes, std::size_t element_bytes) {
   return swapped;
 }
 
+std::string BitshuffledBytes(const std::string& bytes, std::size_t element_bytes, std::size_t block_elements) {
+  std::string shuffled = bytes;
+  const std::size_t whole = bytes.size() / element_bytes / 8 * 8;  // elements
+  for (std::size_t first = 0; first < whole; first += block_elements) {
+    const std::size_t count = std::min(block_elements, whole - first);
+    char* const out = shuffled.data() + first * element_bytes;
+    std::fill_n(out, count * element_bytes, char{0});
+    for (std::size_t bit = 0; bit < 8 * element_bytes; ++bit) {
+      for (std::size_t i = 0; i < count; ++i) {
+        const unsigned byte = static_cast<unsigned char>(bytes[(first + i) * element_bytes + bit / 8]);
+        const std::size_t place = bit * count + i;
+        out[place / 8] = char(static_cast<unsigned char>(out[place / 8]) | ((byte >> bit % 8 & 1U) << place % 8));
+      }
+    }
+  }
+  return shuffled;
+}
+
+std::string PackBlocks(const std::string& codec, const std::string& bytes, std::size_t block_bytes, std::size_t bitshuffle) {
+  const auto big_endian = [](std::uint64_t number, int count) {
+    std::string text;
+    for (int i = count - 1; i >= 0; --i) text.push_back(char(number >> (8 * i) & 0xff));
+    return text;
+  };
+  const std::size_t plain = bitshuffle == 0 ? 0 : bytes.size() % (8 * bitshuffle);
+  std::string all = big_endian(bytes.size(), 8) + big_endian(block_bytes, 4);
+  for (std::size_t at = 0; at < bytes.size() - plain; at += block_bytes) {
+    const std::string block = bytes.substr(at, std::min(block_bytes, bytes.size() - plain - at));
+    std::string packed = PackBytes(codec, bitshuffle == 0 ? block : BitshuffledBytes(block, bitshuffle, block_bytes / bitshuffle));
+    if (bitshuffle == 0 && packed.size() >= block.size()) packed = block;
+    all += big_endian(packed.size(), 4) + packed;
+  }
+  return all + bytes.substr(bytes.size() - plain);
+}
+
 }  // namespace slabstream
