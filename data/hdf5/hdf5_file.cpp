@@ -50,10 +50,9 @@ std::string OutwardLink(hid_t file, const std::string& path) {
 std::string NewerThanLibrary(const std::string& complaint) {
   if (complaint.find("version number") == std::string::npos) return "";
   return fmt::format(
-      " is stored as only later versions of HDF5 do (\"{}\"), and {}.{}.{} reads it here; write it with the bounds earliest and v110 of "
-      "the "
-      "library's versions (libver)",
-      complaint, H5_VERS_MAJOR, H5_VERS_MINOR, H5_VERS_RELEASE);
+      " is stored in a way that came after HDF5 {}.{}.{}, which reads it here (\"{}\"); it can be read if it is written for the library's "
+      "versions earliest to v110 (libver)",
+      H5_VERS_MAJOR, H5_VERS_MINOR, H5_VERS_RELEASE, complaint);
 }
 
 // Names of links in the order of the file, until there are more than `most`.

@@ -126,8 +126,8 @@ TEST_F(Hdf5TypesTest, ADatasetOfALaterVersionIsNotCalledMissing) {
   ASSERT_EQ(file.find(message, at + 1), std::string::npos);
   file[at] = 5;
   ASSERT_TRUE(WriteTextFile(path_, file).ok());
-  ExpectRefused("dataset '/data' is stored as only later versions of HDF5 do");
-  ExpectRefused("dataset '/data' is stored as only later versions of HDF5 do", {.dataset = "/data"});
+  ExpectRefused("dataset '/data' is stored in a way that came after HDF5 1.");
+  ExpectRefused("dataset '/data' is stored in a way that came after HDF5 1.", {.dataset = "/data"});
 }
 
 // libhdf5 1.10 would copy all of the heap's object to where the attribute's length has room.
