@@ -91,6 +91,8 @@ void TakeSizes(Hdf5File& file, const std::string& path, ImageDescription& image)
 void TakeCoordinates(Hdf5File& file, const std::string& scale, std::uint64_t size, ImageAxis& axis, ImageDescription& image) {
   const AxisKind kind = AxisNamed(axis.name);
   if (scale.empty() || kind == AxisKind::kTime || kind == AxisKind::kChannel) return;
+  // netCDF writes a scale for each dimension, also where no variable has its coordinates.
+  if (file.Text(scale, "NAME").value_or("").starts_with("This is a netCDF dimension but not a netCDF variable")) return;
   const Result<std::vector<double>> values = file.SmallDataset(scale);
   if (!values.ok() || values->size() != size) return;  // a dimension without coordinates, or names
   const std::string unit = file.Text(scale, "units").value_or(file.Text(scale, "unit").value_or(""));

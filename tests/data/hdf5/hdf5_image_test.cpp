@@ -266,6 +266,20 @@ TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOne) {
   EXPECT_EQ(Open()->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
 }
 
+TEST_F(Hdf5ImageTest, DimensionsOfNetcdfWithoutAVariablePlaceNothing) {
+  const std::vector<std::int16_t> samples = Counted(8);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/x", {2}, {0, 7});
+    writer.Text("/x", "NAME", "This is a netCDF dimension but not a netCDF variable.         2");
+    writer.Scales("/data", {"", "", "/x"});
+  }
+  const VolumeGeometry& geometry = Open()->info().levels[0].description.geometry;
+  EXPECT_EQ(geometry.spacing, (Vec3{1, 1, 1}));
+  EXPECT_EQ(geometry.orientation.world, World::kVoxels);
+}
+
 TEST_F(Hdf5ImageTest, UnsignedSamplesInSignedOnesAreToldByCf) {
   const std::vector<std::int8_t> samples = {0, 1, -1, -2, 100, -128, 7, 8};
   {
