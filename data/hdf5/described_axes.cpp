@@ -70,7 +70,7 @@ bool TakeNumbers(Hdf5File& file, const std::string& path, const char* attribute,
   return true;
 }
 
-// Fiji and PlantSeg; CREMI, whose lengths are nm; funlib. Each in the order of the axes.
+// Fiji and PlantSeg, funlib, CREMI: numbers in the order of the axes.
 void TakeSizes(Hdf5File& file, const std::string& path, ImageDescription& image) {
   static constexpr std::pair<const char*, std::optional<LengthUnit>> kAttributes[] = {
       {"element_size_um", LengthUnit::kMicrometre}, {"voxel_size", std::nullopt}, {"resolution", std::nullopt}};

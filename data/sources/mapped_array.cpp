@@ -103,7 +103,9 @@ class MappedArray : public ChunkedArray, public std::enable_shared_from_this<Map
 
 bool ElementMeaning::linear() const {
   const bool all_mean_some = std::ranges::all_of(missing, [](double element) { return std::isnan(element); });
-  return mappings.size() == 1 && all_mean_some && std::isinf(least) && std::isinf(most);
+  const ValueMapping& first = mappings.front();
+  const bool invertible = first.scale > 0 && std::isfinite(first.scale) && std::isfinite(first.offset);
+  return mappings.size() == 1 && invertible && all_mean_some && std::isinf(least) && std::isinf(most);
 }
 
 std::shared_ptr<ChunkedArray> MakeMappedArray(std::shared_ptr<ChunkedArray> array, ElementMeaning meaning) {

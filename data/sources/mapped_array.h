@@ -22,7 +22,7 @@ struct ElementMeaning {
   bool clamp = false;
   std::vector<double> missing = {};  // elements that stand for no value
 
-  // One mapping says it all, so that no MappedArray is needed.
+  // One mapping with a scale above 0 says it all, so that no MappedArray is needed.
   bool linear() const;
 };
 

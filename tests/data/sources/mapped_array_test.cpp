@@ -76,6 +76,7 @@ TEST(MappedArrayTest, ALinearMeaningNeedsNoArray) {
   EXPECT_TRUE((ElementMeaning{.mappings = {{2, 3}}, .missing = {std::nan("")}}.linear()));
   EXPECT_FALSE((ElementMeaning{.missing = {0}}.linear()));
   EXPECT_FALSE((ElementMeaning{.most = 4095}.linear()));
+  EXPECT_FALSE((ElementMeaning{.mappings = {{0, 5}}}.linear()));
   EXPECT_FALSE((ElementMeaning{.mappings = {{1, 0}, {2, 0}}, .mapped_axes = 1}.linear()));
 }
 
