@@ -275,7 +275,8 @@ TEST_F(Hdf5ImageTest, DimensionsOfNetcdfWithoutAVariablePlaceNothing) {
     writer.Text("/x", "NAME", "This is a netCDF dimension but not a netCDF variable.         2");
     writer.Scales("/data", {"", "", "/x"});
   }
-  const VolumeGeometry& geometry = Open()->info().levels[0].description.geometry;
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
   EXPECT_EQ(geometry.spacing, (Vec3{1, 1, 1}));
   EXPECT_EQ(geometry.orientation.world, World::kVoxels);
 }
@@ -323,7 +324,8 @@ TEST_F(Hdf5ImageTest, ResolutionAndOffsetAreInTheOrderOfTheAxes) {
     writer.Numbers("/volumes/raw", "offset", {400, 12, 16});
     writer.Text("/volumes/raw", "units", "nm");
   }
-  const VolumeGeometry& geometry = Open()->info().levels[0].description.geometry;
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
   EXPECT_EQ(geometry.spacing, (Vec3{8, 4, 40}));
   EXPECT_EQ(geometry.orientation.origin, (Vec3{16, 12, 400}));
   EXPECT_EQ(geometry.orientation.unit, LengthUnit::kNanometre);

@@ -162,7 +162,7 @@ TEST_F(Hdf5TypesTest, AClassicNetcdfFileIsNamed) {
   ExpectRefused("old.nc: is a classic netCDF file");
 }
 
-// One chunk of 16 samples in `packed`, written without the filter's own code.
+// A chunk that is packed already. The library asks for code of the filter, which it does not call.
 TEST_F(Hdf5TypesTest, FiltersOfLibrariesThatAreNotThere) {
   std::string bytes;
   for (int i = 0; i < 24; ++i) bytes += std::string{char(i * 3), char(i / 7)};
@@ -202,7 +202,6 @@ TEST_F(Hdf5TypesTest, FiltersOfLibrariesThatAreNotThere) {
       H5Pclose(creation);
       H5Sclose(space);
     }
-    ASSERT_GE(H5Zunregister(each.filter), 0);
     const auto samples = SamplesOf<std::uint16_t>(*Open());
     ASSERT_TRUE(samples.ok()) << samples.status().message();
     EXPECT_EQ(std::string(reinterpret_cast<const char*>(samples->data()), 2 * samples->size()), bytes);
