@@ -37,7 +37,9 @@ std::string Listed(const std::shared_ptr<Hdf5File>& file, const std::vector<std:
 
 // No dataset of three axes or more: what there is instead.
 Status NoVolume(const std::shared_ptr<Hdf5File>& file, const Hdf5File::Found& found) {
-  if (!found.closed.empty()) return file->Dataset(found.closed.front()).status();
+  for (const std::string& path : found.closed) {
+    if (const Status status = file->Dataset(path).status(); !status.ok()) return status;
+  }
   const std::vector<std::string> pictures = file->Datasets(2).paths;
   return Status::InvalidArgument(file->path() + ": has no dataset of three axes or more" +
                                  (pictures.empty() ? "" : "; --dataset takes one of two: " + Listed(file, pictures)));
