@@ -31,8 +31,10 @@ SharedCodec XzCodec();
 SharedCodec BrotliCodec();
 // What LibLZF makes of bytes, as h5py writes it. It does not tell how many there are.
 SharedCodec LzfCodec();
-// Four bytes behind the others: their CRC-32C, little endian (RFC 3720). DataLoss unless it is theirs.
-SharedCodec Crc32cCodec();
+// Four bytes behind the others, or in front of them: their checksum, little endian. DataLoss unless it is theirs.
+enum class Checksum : std::uint8_t { kCrc32c, kCrc32, kAdler32 };  // RFC 3720, 1952 and 1950
+SharedCodec ChecksumCodec(Checksum checksum, bool in_front = false);
+inline SharedCodec Crc32cCodec() { return ChecksumCodec(Checksum::kCrc32c); }
 // Elements of so many bytes (1, 2, 4 or 8) in the other byte order.
 SharedCodec SwapBytesCodec(std::size_t element_bytes);
 // The first byte of each element, then the second one of each, and so on. `element_bytes` is at least 1.
