@@ -5,6 +5,8 @@
 #include <string>
 
 #include "common/base/find_named.h"
+#include "common/base/trimmed.h"
+#include "data/volume_io/text_header.h"
 
 namespace slabstream {
 namespace {
@@ -36,7 +38,7 @@ constexpr std::array<UnitName, 16> kUnitNames = {{
 }  // namespace
 
 std::optional<LengthUnit> LengthUnitNamed(std::string_view name) {
-  std::string one(name);
+  std::string one = ToLower(std::string(Trimmed(name)));
   if (one.ends_with('s')) one.pop_back();
   if (const std::size_t at = one.find("meter"); at != std::string::npos) one.replace(at, 5, "metre");
   const UnitName* const found = FindNamed(kUnitNames, one);

@@ -8,7 +8,7 @@
 
 namespace slabstream {
 
-// "mm", "microns", "nanometers"; none: a name that is not known.
+// "mm", "microns", "Nanometers", in upper or lower case; none: a name that is not known.
 std::optional<LengthUnit> LengthUnitNamed(std::string_view name);
 
 // The name that is written, in ASCII: "um". `unit` is one that files state.
