@@ -110,6 +110,17 @@ Label LookOf(std::uint32_t value, const ColorTable& table) {
   return label;
 }
 
+// What the label volume itself says of its labels.
+ColorTable TableOf(const std::vector<LabelLook>& looks) {
+  ColorTable table;
+  for (const LabelLook& look : looks) {
+    if (look.value > kMaxLabelValue) continue;
+    const auto value = std::uint32_t(look.value);
+    table.entries.emplace(value, ColorTable::Entry{look.color.value_or(StandardColor(value)), look.name});
+  }
+  return table;
+}
+
 std::string_view WorldText(World world) {
   return world == World::kPatient ? "a patient" : world == World::kScene ? "a scene with axes of its own" : "no orientation";
 }
@@ -183,10 +194,11 @@ Result<Layers> LabelLayer(const Volume& labels, const ColorTable& colors, const 
 Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& layers) {
   const Result<SourceText> source = ParseSourceText(files.labels);
   if (!source.ok()) return source.status();
-  const Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
+  Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
   const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
+  if (*colors == ColorTable{}) colors = TableOf(read->info.looks);
   if (read->info.straightened) {
     return Status::InvalidArgument(source->path + ": its axes are not at right angles, and labels cannot be interpolated");
   }

@@ -91,10 +91,10 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
         context_(std::move(context)) {}
 
   const ArrayShape& shape() const override { return shape_; }
+  std::string NameOf(std::span<const std::uint64_t> index) const override { return store_->name() + "/" + KeyOf(index); }
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    std::string key = path_;
-    for (std::size_t axis = index.size(); axis-- > 0;) key = metadata::Join(key, std::to_string(index[axis]));
+    const std::string key = KeyOf(index);
     // What does not shrink becomes a little longer.
     constexpr std::uint64_t kOverhead = 65536;
     auto decode = [self = shared_from_this(), what = store_->name() + "/" + key, done = std::move(done)](Result<Bytes> answer) {
@@ -104,6 +104,12 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
   }
 
  private:
+  std::string KeyOf(std::span<const std::uint64_t> index) const {
+    std::string key = path_;
+    for (std::size_t axis = index.size(); axis-- > 0;) key = metadata::Join(key, std::to_string(index[axis]));
+    return key;
+  }
+
   void Decode(const std::string& what, Result<Bytes> answer, const ChunkDone& done) const {
     if (!answer.ok()) return DecodeOn(context_, codecs_, std::move(answer), 0, what, done);
     const std::uint64_t stored_bytes = answer->size();

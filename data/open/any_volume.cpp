@@ -46,6 +46,7 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .stored_size = finest.geometry.size,
           .steps = StepsOf(finest.geometry.spacing),
           .labels = source.labels,
+          .looks = source.looks,
           .channels = source.channels,
           .channel = source.channel,
           .times = source.times,

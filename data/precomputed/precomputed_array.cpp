@@ -40,18 +40,15 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   }
 
   const ArrayShape& shape() const override { return shape_; }
+  std::string NameOf(std::span<const std::uint64_t> index) const override {
+    return store_->name() + "/" + metadata::Join(scale_.key, scale_.sharding ? ShardOf(index).file : FileOf(index));
+  }
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    std::string name;
     std::array<std::uint64_t, 3> size{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::uint64_t begin = index[3 - axis] * scale_.chunk[axis], end = std::min(begin + scale_.chunk[axis], scale_.size[axis]);
-      size[axis] = end - begin;
-      name +=
-          fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(begin), scale_.offset[axis] + std::int64_t(end));
-    }
+    for (std::size_t axis = 0; axis < 3; ++axis) size[axis] = EndOf(index, axis) - BeginOf(index, axis);
     if (scale_.sharding) return ReadFromShard(index, size, std::move(done));
-    const std::string key = metadata::Join(scale_.key, name);
+    const std::string key = metadata::Join(scale_.key, FileOf(index));
     // CloudVolume gives gzipped files an ending.
     store_->Read(key, {}, MostStored(), [self = shared_from_this(), key, size, done = std::move(done)](Result<Bytes> answer) {
       if (answer.status().code() != StatusCode::kNotFound)
@@ -63,12 +60,32 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   }
 
  private:
-  // The index of the shard, that of the minishard, and the chunk, one after the other.
-  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+  // Of a chunk, in voxels of the scale along x, y and z.
+  std::uint64_t BeginOf(std::span<const std::uint64_t> index, std::size_t axis) const { return index[3 - axis] * scale_.chunk[axis]; }
+  std::uint64_t EndOf(std::span<const std::uint64_t> index, std::size_t axis) const {
+    return std::min(BeginOf(index, axis) + scale_.chunk[axis], scale_.size[axis]);
+  }
+
+  std::string FileOf(std::span<const std::uint64_t> index) const {
+    std::string name;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      name += fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(BeginOf(index, axis)),
+                          scale_.offset[axis] + std::int64_t(EndOf(index, axis)));
+    }
+    return name;
+  }
+
+  std::uint64_t NumberOf(std::span<const std::uint64_t> index) const {
     std::array<std::uint64_t, 3> counts{};
     for (std::size_t axis = 0; axis < 3; ++axis) counts[axis] = (scale_.size[axis] - 1) / scale_.chunk[axis] + 1;
-    const std::uint64_t chunk = ChunkNumber({index[3], index[2], index[1]}, counts);
-    const ShardPlace place = PlaceOf(*scale_.sharding, chunk);
+    return ChunkNumber({index[3], index[2], index[1]}, counts);
+  }
+  ShardPlace ShardOf(std::span<const std::uint64_t> index) const { return PlaceOf(*scale_.sharding, NumberOf(index)); }
+
+  // The index of the shard, that of the minishard, and the chunk, one after the other.
+  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+    const std::uint64_t chunk = NumberOf(index);
+    const ShardPlace place = ShardOf(index);
     const std::string key = metadata::Join(scale_.key, place.file);
     const std::string what = fmt::format("{}/{}: chunk {}", store_->name(), key, chunk);
     constexpr std::uint64_t kEntryBytes = 16;

@@ -14,20 +14,6 @@ Status Wrong(const std::string& array, const std::string& why) { return Status::
 
 }  // namespace
 
-AxisKind AxisNamed(std::string_view name) {
-  std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-  static constexpr std::pair<std::string_view, AxisKind> kNames[] = {{"x", AxisKind::kX},
-                                                                     {"y", AxisKind::kY},
-                                                                     {"z", AxisKind::kZ},
-                                                                     {"t", AxisKind::kTime},
-                                                                     {"time", AxisKind::kTime},
-                                                                     {"c", AxisKind::kChannel},
-                                                                     {"channel", AxisKind::kChannel}};
-  const auto* const found = std::ranges::find(kNames, lower, [](const auto& known) { return known.first; });
-  return found == std::end(kNames) ? AxisKind::kOther : found->second;
-}
-
 Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const std::vector<std::string>& names,
                                                const ReadOptions& options) {
   if (names.size() < 2) return Wrong(array, fmt::format("has {} axis, must have 2 or more", names.size()));
@@ -36,13 +22,10 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
   const auto count = [&](AxisKind kind) { return std::ranges::count(kinds, kind); };
   const bool twice = std::ranges::any_of(kinds, [&](AxisKind kind) { return kind != AxisKind::kOther && count(kind) > 1; });
   if (twice) std::ranges::fill(kinds, AxisKind::kOther);
-  if (count(AxisKind::kX) != 1 || count(AxisKind::kY) != 1) {
-    std::array<AxisKind, 3> rest = {AxisKind::kX, AxisKind::kY, AxisKind::kZ};
-    auto next = rest.begin();
-    for (auto kind = kinds.rbegin(); kind != kinds.rend(); ++kind) {
-      if (*kind == AxisKind::kTime || *kind == AxisKind::kChannel) continue;
-      *kind = next == rest.end() ? AxisKind::kOther : *next++;
-    }
+  // The last axes that are left take the letters that are.
+  for (const AxisKind kind : {AxisKind::kX, AxisKind::kY, AxisKind::kZ}) {
+    const auto last = std::find(kinds.rbegin(), kinds.rend(), AxisKind::kOther);
+    if (count(kind) == 0 && last != kinds.rend()) *last = kind;
   }
   // What is left over before them.
   const auto unknown = count(AxisKind::kOther);
@@ -80,6 +63,7 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   if (!channel.ok()) return channel.status();
   choice.times = int(times);
   choice.channels = int(channels);
+  choice.time = int(*time);
   choice.channel = *channel;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     if (kinds[axis] == AxisKind::kTime) choice.at[axis] = std::uint64_t(*time);

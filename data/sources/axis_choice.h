@@ -6,24 +6,19 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
+#include "data/sources/axis_kind.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
-
-enum class AxisKind : std::uint8_t { kX, kY, kZ, kTime, kChannel, kOther };
-
-// The axis that a name stands for, in upper or lower case: x, y, z, t, c, time, channel.
-AxisKind AxisNamed(std::string_view name);
 
 struct AxisChoice {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
   int times = 1, channels = 1;             // how many there are
-  int channel = 0;
+  int time = 0, channel = 0;
 };
 
 // The kinds of the axes of a plain array, by their names ("" where there is none) and, where these do not say it, by their order.

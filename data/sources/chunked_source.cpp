@@ -8,9 +8,12 @@
 #include <exception>
 #include <mutex>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/base/printable.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -50,12 +53,22 @@ class Reading {
   Status failure_;  // the first one
 };
 
+// What is known of the chunks of all levels.
+struct Findings {
+  std::atomic<bool> settled = false;  // one is there, or a warning has said that there is none
+};
+
 // A level, which lives as long as the source or a read of it. A chunk that several reads need at a time is read once: it has one flight,
 // for which all of them wait.
 class Level : public std::enable_shared_from_this<Level> {
  public:
-  Level(std::string name, PyramidLevel level, const Index3& size, SourceContext context)
-      : name_(std::move(name)), level_(std::move(level)), size_(size), context_(std::move(context)), owner_(context_->cache().NewOwner()) {
+  Level(std::string name, PyramidLevel level, const Index3& size, SourceContext context, std::shared_ptr<Findings> findings)
+      : name_(std::move(name)),
+        level_(std::move(level)),
+        size_(size),
+        context_(std::move(context)),
+        findings_(std::move(findings)),
+        owner_(context_->cache().NewOwner()) {
     const ArrayShape& shape = level_.array->shape();
     for (std::size_t a = 0; a < shape.size.size(); ++a) index_.push_back(level_.at[a] / shape.chunk[a]);
     for (int axis = 0; axis < 3; ++axis) {
@@ -154,12 +167,7 @@ class Level : public std::enable_shared_from_this<Level> {
       return context_->Release(bytes);
     }
     try {
-      std::vector<std::uint64_t> index = index_;
-      for (int axis = 0; axis < 3; ++axis) {
-        const int a = level_.axes[std::size_t(axis)];
-        if (a >= 0) index[std::size_t(a)] = std::uint64_t(chunk[axis]);
-      }
-      level_.array->ReadChunk(index, [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
+      level_.array->ReadChunk(IndexOf(chunk), [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
         self->Land(chunk, std::move(read));
         self->context_->Release(bytes);
       });
@@ -169,8 +177,37 @@ class Level : public std::enable_shared_from_this<Level> {
     }
   }
 
+  // Along all axes of the array.
+  std::vector<std::uint64_t> IndexOf(const Index3& chunk) const {
+    std::vector<std::uint64_t> index = index_;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int a = level_.axes[std::size_t(axis)];
+      if (a >= 0) index[std::size_t(a)] = std::uint64_t(chunk[axis]);
+    }
+    return index;
+  }
+
+  // A volume of which no chunk is there is rather an incomplete copy than an empty one. Nothing is read to find that out.
+  void NoteMissing(const Index3& chunk) try {
+    constexpr std::uint64_t kMostNoted = std::uint64_t{1} << 16;
+    const std::uint64_t count = std::uint64_t(counts_.x) * std::uint64_t(counts_.y) * std::uint64_t(counts_.z);
+    if (findings_->settled || context_->only_keeps() || count > kMostNoted) return;
+    {
+      const std::lock_guard lock(mutex_);
+      missing_.insert(NumberIn(counts_, chunk));
+      if (missing_.size() < count) return;
+    }
+    const std::string object = level_.array->NameOf(IndexOf(Index3{}));
+    if (object.empty() || findings_->settled.exchange(true)) return;
+    LogWarning(Printable(fmt::format("{}: no chunk was found, so that all voxels have the fill value; looked for {}{}", name_, object,
+                                     count > 1 ? fmt::format(" and {} others", count - 1) : "")));
+  } catch (const std::exception&) {  // no memory: nothing is said
+  }
+
   void Land(const Index3& chunk, Result<std::optional<StoredChunk>> read) {
     Status status = read.status();
+    if (status.ok() && *read) findings_->settled = true;
+    if (status.ok() && !*read) NoteMissing(chunk);
     Bytes elements;
     const ArrayShape& shape = level_.array->shape();
     if (status.ok() && *read) {
@@ -279,6 +316,7 @@ class Level : public std::enable_shared_from_this<Level> {
   const PyramidLevel level_;
   Index3 size_;
   const SourceContext context_;
+  const std::shared_ptr<Findings> findings_;
   const ChunkCache::Owner owner_;
   Index3 chunk_, counts_;             // voxels of a chunk, and chunks, along each axis
   std::vector<std::uint64_t> index_;  // of chunks along the other axes of the array
@@ -286,6 +324,7 @@ class Level : public std::enable_shared_from_this<Level> {
   std::atomic<std::uint64_t> stored_bytes_ = 0, chunks_ = 0;
   std::mutex mutex_;                                     // guards what follows
   std::unordered_map<std::uint64_t, Readings> flights_;  // who waits, by the number of the chunk
+  std::unordered_set<std::uint64_t> missing_;            // chunks, as long as none was found
 };
 
 class ChunkedSource : public VolumeSource {
@@ -369,9 +408,10 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   const KeptType kept = KeptTypeOf(type);
   const ValueMapping mapping = {pyramid.rescale.scale, pyramid.rescale.FromStored(kept.shift)};
   SourceInfo info = std::move(pyramid.info);
-  info.file_type = ToString(type);
+  if (info.file_type.empty()) info.file_type = ToString(type);
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
+  const auto findings = std::make_shared<Findings>();
   for (PyramidLevel& level : pyramid.levels) {
     const std::string level_name = levels.empty() ? name : fmt::format("{}: level {}", name, levels.size());
     const SampleType its_type = level.array->shape().type;
@@ -382,7 +422,7 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
     if (Status status = CheckShape(level_name, level); !status.ok()) return status;
     const Result<VolumeGeometry> geometry = GeometryOf(level_name, pyramid, level);
     if (!geometry.ok()) return geometry.status();
-    levels.push_back(std::make_shared<Level>(level_name, std::move(level), geometry->size, context));
+    levels.push_back(std::make_shared<Level>(level_name, std::move(level), geometry->size, context, findings));
     info.levels.push_back({{*geometry, kept.type, mapping}, levels.back()->chunk()});
   }
   return std::shared_ptr<VolumeSource>(std::make_shared<ChunkedSource>(name, std::move(info), std::move(levels)));

@@ -1,6 +1,8 @@
 // ChunkedSource: a VolumeSource of arrays that are stored in chunks, one for each level. A format says which axes of the arrays are x, y
 // and z, at which index of the others the volume lies, and where the voxels of each level are.
 //
+// A line of the log tells if all chunks of a level were asked for, and no chunk of the source was there.
+//
 // Samples are kept as in volume_reader.h, but as their type alone says, since nobody has seen all values: int8 and int16 are shifted into
 // the unsigned type; integers of more bits and float64 become float32.
 #pragma once
@@ -32,7 +34,7 @@ struct Pyramid {
   std::vector<PyramidLevel> levels;  // finest first
   Orientation orientation = {};      // of all levels; its origin does not matter, since each level has its own
   ValueMapping rescale = {};         // from stored values to data values
-  SourceInfo info = {};              // without its levels and file_type
+  SourceInfo info = {};              // without its levels; file_type: "" means that of the arrays
 };
 
 // InvalidArgument, naming `name`: no level; one whose sides are out of [1, kMaxVolumeSide]; levels of different types; a spacing that is

@@ -22,6 +22,7 @@
 #include "common/base/status.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/label_look.h"
 
 namespace slabstream {
 
@@ -37,6 +38,7 @@ struct SourceInfo {
   std::string format;                      // "OME-Zarr 0.5"
   std::string file_type;                   // of samples as they are stored: "int16"
   bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<LabelLook> looks = {};       // of labels, by ascending values, as far as the source says it
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it shows
   int times = 1, time = 0;                 // how many the source holds, and which of them it shows

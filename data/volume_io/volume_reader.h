@@ -26,6 +26,7 @@
 #include "common/base/status.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/file_samples.h"
+#include "data/volume_io/label_look.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -39,6 +40,7 @@ struct VolumeFileInfo {
   std::array<Vec3, 3> steps;
   bool straightened = false;               // the stored axes are not at right angles
   bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<LabelLook> looks = {};       // of labels, by ascending values, as far as the file says it
   std::vector<std::string> channels = {};  // of an image: names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it is
   int times = 1, time = 0;                 // how many volumes the file holds, and which of them it is

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
 #include "common/base/files.h"
 #include "data/layers/color_table.h"
 #include "data/volume_io/volume_reader.h"
@@ -65,6 +67,26 @@ TEST_F(LayerReader, ColoursComeFromTheTableThatIsNamed) {
   const Layers layers = ReadLayers({.labels = path, .label_colors = directory_ / "lut.txt"}, Grid(3)).value();
   EXPECT_EQ(layers.table->labels[1], (Label{2, {1, 0, 0}, "two"}));
   EXPECT_EQ(layers.table->labels[0].color, StandardColor(1)) << "which the table does not have";
+}
+
+TEST_F(LayerReader, ColoursOfALabelImageCountWithoutATable) {
+  const std::string image = directory_ / "cells.zarr";
+  std::filesystem::create_directories(image + "/0");
+  const auto write = [&](const std::string& name, const std::string& text) { ASSERT_TRUE(WriteTextFile(image + "/" + name, text).ok()); };
+  write(".zgroup", R"({"zarr_format": 2})");
+  write(".zattrs", R"({"multiscales": [{"version": "0.4", "axes": [{"name": "z", "type": "space"}, {"name": "y", "type": "space"},
+    {"name": "x", "type": "space"}], "datasets": [{"path": "0"}]}], "image-label": {"properties": [{"label-value": 9, "name": "nine"}],
+    "colors": [{"label-value": 2, "rgba": [0, 0, 255, 255]}]}})");
+  write("0/.zarray", R"({"zarr_format": 2, "shape": [1, 1, 3], "chunks": [1, 1, 3], "dtype": "|u1", "compressor": null, "filters": null,
+    "fill_value": 0, "order": "C"})");
+  write("0/0.0.0", "\x01\x02\x09");
+  const Layers layers = ReadLayers({.labels = image}, Grid(3, World::kVoxels)).value();
+  EXPECT_THAT(layers.table->labels,
+              ElementsAre(Label{1, StandardColor(1), ""}, Label{2, {0, 0, 1}, ""}, Label{9, StandardColor(9), "nine"}));
+  ASSERT_TRUE(WriteTextFile(directory_ / "lut.txt", "9 other 255 0 0 0\n").ok());
+  const Layers named = ReadLayers({.labels = image, .label_colors = directory_ / "lut.txt"}, Grid(3, World::kVoxels)).value();
+  EXPECT_THAT(named.table->labels,
+              ElementsAre(Label{1, StandardColor(1), ""}, Label{2, StandardColor(2), ""}, Label{9, {1, 0, 0}, "other"}));
 }
 
 TEST_F(LayerReader, ATableBesideANiftiFileCounts) {
