@@ -64,6 +64,10 @@ void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> excep
   app.option_defaults()->group(kReadingGroup);
   for (const ReadOption& option : ReadOptionList()) {
     if (std::ranges::count(except, option.name) > 0) continue;
+    if (option.value.empty()) {
+      app.add_flag(fmt::format("--{}", option.name), std::string(option.purpose));
+      continue;
+    }
     const auto check = [&option](const CLI::results_t& texts) {
       ReadOptions scratch;
       if (Status status = option.set(scratch, fmt::format("--{}", option.name), texts.back()); !status.ok()) {

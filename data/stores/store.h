@@ -55,8 +55,9 @@ std::future<Result<Bytes>> BeginRead(Store& store, const std::string& key, std::
 // Waits for it.
 Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most = kMostMetadataBytes);
 
-// A folder of the file system; links that lead out of it are not followed. Does not check that it exists.
-std::shared_ptr<Store> FolderStore(const std::string& path);
+// A folder of the file system. Does not check that it exists.
+enum class Links : std::uint8_t { kStayInside, kMayLeadOut };  // those that lead out of the folder are not followed, or are
+std::shared_ptr<Store> FolderStore(const std::string& path, Links links = Links::kStayInside);
 // The objects in a zip archive that are stored or deflated. Reads its directory. NotFound, InvalidArgument, DataLoss, ResourceExhausted.
 Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;

@@ -101,6 +101,11 @@ Status SetDataset(ReadOptions& options, std::string_view option, std::string_vie
   return Status::Ok();
 }
 
+Status SetFollowLinks(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.follow_links = text == "yes" || text == "true";
+  return options.follow_links || text == "no" || text == "false" ? Status::Ok() : Wrong(option, text, "yes or no");
+}
+
 // The end of the option that begins at `begin`: a comma with a name and = behind it, since values may hold commas too.
 std::size_t OptionEnd(const std::string& source, std::size_t begin) {
   const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; };
@@ -163,6 +168,8 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},
       {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
+      {"follow-links", "", "Follow links that lead out of a folder of Zarr, N5 or precomputed, such as those of git-annex and DataLad",
+       SetFollowLinks, IsGiven<&ReadOptions::follow_links>},
   };
   return options;
 }

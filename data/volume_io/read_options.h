@@ -50,6 +50,7 @@ struct ReadOptions {
   std::optional<SampleType> type;
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
+  bool follow_links = false;           // of folders of objects: links that lead out of the folder, such as those of git-annex, are followed
   // What users cannot say.
   bool describe = false;             // without `time`, a source of several volumes opens the first one
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
@@ -58,7 +59,7 @@ struct ReadOptions {
 
 struct ReadOption {
   std::string_view name;     // "time"
-  std::string_view value;    // how its values are written, for help texts: "T"
+  std::string_view value;    // how its values are written, for help texts: "T"; "": yes or no, and of commands a flag without a value
   std::string_view purpose;  // for help texts
   // InvalidArgument: the message begins with `option` and names the text.
   Status (*set)(ReadOptions& options, std::string_view option, std::string_view text);

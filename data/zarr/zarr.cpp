@@ -27,7 +27,7 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
@@ -40,7 +40,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 SourceFormat Zarr() {
   return {.name = "Zarr",
           .recognises = zarr::Recognises,
-          .options = {"time", "channel", "spacing", "array"},
+          .options = {"time", "channel", "spacing", "array", "follow-links"},
           .markers = {zarr::kNodeObjects.begin(), zarr::kNodeObjects.end()},
           .open = zarr::Open};
 }
