@@ -23,6 +23,8 @@ TEST(SourceText, IsAPathWithOptionsBehindIt) {
   EXPECT_EQ(ParseSourceText("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
   EXPECT_EQ(ParseSourceText("head.nii.gz?channel=luminance")->options.channel, kLuminance);
   EXPECT_EQ(ParseSourceText("scan.h5?dataset=/exchange/data,time=2")->options.dataset, "/exchange/data");
+  EXPECT_TRUE(ParseSourceText("atlas.zarr?follow-links=yes,time=2")->options.follow_links);
+  EXPECT_FALSE(ParseSourceText("atlas.zarr?follow-links=no")->options.follow_links);
   EXPECT_EQ(ParseSourceText("head.nii.gz")->path, "head.nii.gz");
   EXPECT_EQ(ParseSourceText("what?")->path, "what?") << "no option stands behind the question mark";
 }
@@ -66,6 +68,7 @@ TEST(SourceText, SaysWhatIsWrong) {
       {"v?endian=middle", "endian 'middle' must be little or big"},
       {"v?offset=-1", "offset '-1' must be a whole number of bytes"},
       {"v?dataset=", "dataset '' must be the path of a dataset"},
+      {"v?follow-links=perhaps", "follow-links 'perhaps' must be yes or no"},
       {"v?channel=red", "channel 'red' must be luminance or a whole number"},
   };
   for (const auto& [text, why] : cases) {
