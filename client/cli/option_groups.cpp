@@ -65,7 +65,8 @@ void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> excep
   for (const ReadOption& option : ReadOptionList()) {
     if (std::ranges::count(except, option.name) > 0) continue;
     if (option.value.empty()) {
-      app.add_flag(fmt::format("--{}", option.name), std::string(option.purpose));
+      const std::string purpose(option.purpose);
+      app.add_flag(fmt::format("--{}", option.name), purpose);
       continue;
     }
     const auto check = [&option](const CLI::results_t& texts) {
