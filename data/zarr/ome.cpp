@@ -48,6 +48,15 @@ Field AxesOf(const Field& image) {
   return systems[0]["axes"];
 }
 
+bool AreIdentities(const Field& transformations) {
+  bool all = true;
+  for (std::size_t i = 0; i < transformations.size(); ++i) {
+    const Field type = transformations[i]["type"];
+    all = all && type.is_text() && type.value() == "identity";
+  }
+  return all;
+}
+
 // What axes say that is not taken.
 std::vector<std::string> NotesOfAxes(const Field& fields, const std::vector<OmeAxis>& axes) {
   std::vector<std::string> notes;
@@ -114,9 +123,9 @@ Result<OmeImage> ParseOmeImage(const Field& attributes) {
   if (!axes.ok()) return axes.status();
   read.axes = *std::move(axes);
   read.notes = NotesOfAxes(axes_field, read.axes);
-  // From 0.6 on these lead to further coordinate systems; before, they move all levels alike.
-  const bool further = image["coordinateSystems"].is_array();
-  if (further && of_all.size() > 0) {
+  // From 0.6 on, and as spatialdata writes them, these lead to further coordinate systems; else they move all levels alike.
+  const bool further = image["coordinateSystems"].is_array() || of_all[0]["output"].given();
+  if (further && !AreIdentities(of_all)) {
     read.notes.emplace_back("places are those of the image's own coordinate system; its transformations to others are not applied");
   }
   if (images.size() > 1) read.notes.push_back(fmt::format("of {} multiscales the first one is shown", images.size()));

@@ -190,7 +190,7 @@ Result<ZarrLayout> ParseLayout3(const Field& metadata) {
   if (!grid["name"].is_text() || grid["name"].value() != "regular") return grid["name"].Wrong("\"regular\"");
   const Result<std::vector<std::uint64_t>> chunk = chunk_field.Counts(size->size());
   if (!chunk.ok()) return chunk.status();
-  if (!metadata["fill_value"].given()) return metadata["fill_value"].Wrong("a value of data_type");
+  if (!metadata["fill_value"].stated()) return metadata["fill_value"].Wrong("a value of data_type");
   Result<std::vector<std::byte>> fill = ReadFill(metadata["fill_value"], *type);
   if (!fill.ok()) return fill.status();
 

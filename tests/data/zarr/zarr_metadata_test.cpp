@@ -220,6 +220,19 @@ TEST(ZarrMetadataTest, CoordinateSystemsAndSequencesOf06AreRead) {
   EXPECT_THAT(read().status().message(), HasSubstr("in at most 4 sequences"));
 }
 
+// spatialdata leads from pixels to several coordinate systems.
+TEST(ZarrMetadataTest, TransformationsToOtherSystemsDoNotMoveTheImage) {
+  ZarrJson metadata = RightImage();
+  ZarrJson& all = metadata["multiscales"][0]["coordinateTransformations"];
+  const auto read = [&] { return zarr::ParseOmeImage(Field("object", metadata)); };
+  all = {{{"type", "identity"}, {"output", {{"name", "global"}}}}};
+  EXPECT_THAT(read()->notes, testing::IsEmpty());
+  all.push_back({{"type", "affine"}, {"affine", {{0, 1}, {1, 0}}}, {"output", {{"name", "other"}}}});
+  ASSERT_TRUE(read().ok()) << read().status().message();
+  EXPECT_THAT(read()->levels[0].place.scale, testing::ElementsAre(1, 2, 0.5, 0.5));
+  EXPECT_THAT(read()->notes, testing::ElementsAre(HasSubstr("are not applied")));
+}
+
 TEST(ZarrMetadataTest, VersionsWithEndingsAreKnown) {
   ZarrJson metadata = RightImage();
   for (const char* const version : {"0.1", "0.4-dev-spatialdata", "0.5.2", "0.5-dev-spatialdata", "0.6.dev3"}) {
