@@ -291,5 +291,18 @@ TEST_F(N5Test, AnEmptyContainerSaysSo) {
   ExpectRefused({}, "scan.n5: holds no dataset");
 }
 
+TEST(N5Source, OneLineTellsThatNoBlockIsThere) {
+  const TemporaryDirectory directory;
+  Random random(15);
+  SCOPED_TRACE(random.trace());
+  // Attributes that Python wrote may hold NaN.
+  WriteDataset(directory / "a.n5", {.size = {6, 5, 4}, .block = {3, 3, 3}, .missing = 1}, random, R"(, "offset": NaN)");
+  const auto source = Opened(OpenSource(directory / "a.n5", {}, TestReadContext()));
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(*SamplesOf<std::uint16_t>(*source), std::vector<std::uint16_t>(120, 0));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("no chunk was found, so that all voxels have the fill value; looked for " +
+                                                                (directory / "a.n5/0/0/0") + " and 7 others"));
+}
+
 }  // namespace
 }  // namespace slabstream

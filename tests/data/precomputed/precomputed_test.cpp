@@ -399,5 +399,22 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   ExpectRefused({.time = TimeRange{0, 0}}, "takes no option time");
 }
 
+TEST_F(PrecomputedTest, OneLineTellsThatNoChunkIsThere) {
+  const auto said = [&](const std::string& more) {
+    WriteText(root_ + "/info", Info("image", "uint8", 1,
+                                    R"({"key": "s", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
+      "resolution": [8, 8, 40], "voxel_offset": [-8, 0, 0], "encoding": "raw")" +
+                                        more + "}"));
+    const auto source = Opened(Open());
+    testing::internal::CaptureStderr();
+    EXPECT_TRUE(SamplesOf<std::uint8_t>(*source).ok());
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(said(""), HasSubstr("looked for " + root_ + "/s/-8--4_0-4_0-3 and 11 others"));
+  EXPECT_THAT(said(R"(, "sharding": {"@type": "neuroglancer_uint64_sharded_v1", "hash": "identity", "minishard_bits": 1, "shard_bits": 2,
+    "preshift_bits": 0})"),
+              HasSubstr("looked for " + root_ + "/s/0.shard and 11 others"));
+}
+
 }  // namespace
 }  // namespace slabstream
