@@ -220,7 +220,7 @@ struct WayToRead {
 
 Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
                                 ReadProgress& progress) {
-  Result<Survey> survey = SurveySource(*source, IsUrl(place) ? kFarSurvey : SurveyBytes(), &progress);
+  Result<Survey> survey = SurveySource(*source, !SchemeOf(place).empty() ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }
@@ -236,7 +236,7 @@ Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layer
 
 // Other processes may run in other folders.
 std::string PlaceOf(const DataSource& data, const SourceText& text) {
-  return (IsUrl(text.path) ? text.path : fs::absolute(text.path).string()) + data.path.substr(text.path.size());
+  return IsUrl(text.path) ? data.path : fs::absolute(text.path).string() + text.options_text;
 }
 
 // Of a source that its format can read in parts.
@@ -309,7 +309,7 @@ Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, con
 
 const std::string* DataArgument::RelativePath() const {
   for (const std::string* file : {&path, &layers.labels, &layers.label_colors, &layers.overlay}) {
-    if (!file->empty() && !file->starts_with('/') && !IsUrl(*file)) return file;
+    if (!file->empty() && !file->starts_with('/') && SchemeOf(*file).empty()) return file;
   }
   return nullptr;
 }
@@ -397,7 +397,7 @@ Result<IndexFile> IndexFileOf(const std::string& source) {
   if (!IsReadInParts(parsed->path, parsed->options)) {
     return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
   }
-  return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));
+  return IndexFile::Of(parsed->path, parsed->options_text);
 }
 
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell) {
