@@ -9,9 +9,11 @@
 
 namespace slabstream {
 
-// OpenStore, for sources of this context.
-inline Result<std::shared_ptr<Store>> OpenStoreFor(const SourceContext& context, const std::string& path) {
-  return OpenStore(path, context->only_keeps() ? KeptObjects::kAreTaken : KeptObjects::kAreChecked);
+// The store that the options hold, else OpenStore for sources of this context.
+inline Result<std::shared_ptr<Store>> OpenStoreFor(const SourceContext& context, const std::string& path, const ReadOptions& options) {
+  if (options.store != nullptr) return options.store;
+  const auto kept = context->only_keeps() ? WebOptions::Kept::kAreTaken : WebOptions::Kept::kAreChecked;
+  return OpenStore(path, {.kept = kept, .query = options.query, .headers = options.headers});
 }
 
 }  // namespace slabstream
