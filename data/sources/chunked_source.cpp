@@ -176,13 +176,15 @@ class Level : public std::enable_shared_from_this<Level> {
     End(chunk, TakeFlight(chunk, status.ok() ? elements : Bytes()), status, elements);
   }
 
-  // Ends the flight. A chunk of which no read took all may be needed again: it goes to the cache, before later reads find that it has no
-  // flight.
+  // Ends the flight. A chunk of which no read took all may be needed again, or one of a small level: it goes to the cache, before later
+  // reads find that it has no flight.
   Readings TakeFlight(const Index3& chunk, const Bytes& elements = {}) {
     const std::lock_guard lock(mutex_);
     const auto flight = flights_.find(NumberIn(counts_, chunk));
     const Box all = BoxOf(chunk);
-    if (!elements.empty() && std::ranges::none_of(flight->second, [&](const auto& each) { return each->box().Contains(all); })) {
+    const bool is_small = CountIn(size_) * BytesPerSample(level_.array->shape().type) <= context_->small_bytes();
+    const bool is_taken = std::ranges::any_of(flight->second, [&](const auto& each) { return each->box().Contains(all); });
+    if (!elements.empty() && (is_small || !is_taken)) {
       try {
         context_->cache().Keep(owner_, flight->first, elements);
       } catch (const std::exception&) {  // no memory: it is read again

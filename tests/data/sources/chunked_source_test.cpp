@@ -256,6 +256,16 @@ TEST(ChunkedSourceTest, KeepsChunksOfWhichNoReadTookAll) {
   EXPECT_EQ(context->cache().bytes(), 0U);
 }
 
+TEST(ChunkedSourceTest, KeepsAllChunksOfASmallLevel) {
+  for (const std::uint64_t small : {std::uint64_t{511}, std::uint64_t{512}}) {
+    const std::shared_ptr<MemoryArray> array = SmallCube();
+    const auto source = SourceOf(array, Context({.decode_threads = 1, .small_bytes = small}));
+    std::vector<std::byte> out(512);
+    for (int i = 0; i < 2; ++i) EXPECT_TRUE(source->ReadNow(0, kCube, out).ok());
+    EXPECT_EQ(array->asked().size(), small < 512 ? 16U : 8U);
+  }
+}
+
 TEST(ChunkedSourceTest, ChunksUnderWayStayWithinTheLimit) {
   for (const std::uint64_t most : {1U, 2U, 3U, 8U}) {
     const SourceContext context = Context({.decode_threads = 4, .under_way_bytes = most * 128, .cache_bytes = 0});
