@@ -66,7 +66,9 @@ Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const st
   const std::size_t colon = text.rfind(':');
   // A colon of the scheme, of a port, or of how other programs spell an address.
   const std::size_t host = SchemeOf(text).empty() ? text.size() : text.rfind("://") + 3;
-  const bool of_address = host < text.size() && colon != std::string::npos && (colon < text.find('/', host) || text.find('|') < colon);
+  const std::size_t bar = text.find('|');
+  const bool of_spelling = bar < colon && colon < text.find('?', bar);
+  const bool of_address = colon != std::string::npos && host < text.size() && (of_spelling || colon < text.find_first_of("/?,", host));
   std::error_code error;
   if (colon == std::string::npos || of_address || (is_file && std::filesystem::exists(text, error))) return whole;
   VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};

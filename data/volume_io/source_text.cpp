@@ -157,8 +157,9 @@ std::string ShownSource(const std::string& source) {
   Parts parts = Divide(source);
   for (OptionText& option : parts.options) {
     const std::size_t colon = option.value.find(':');
-    const bool is_secret = option.name == "header" && option.value.find(":@") != colon;  // a file's name is none
-    if (is_secret) option.value = option.value.substr(0, colon) + ":...";
+    const bool names_file = colon != std::string::npos && option.value.find(":@") == colon;
+    if (option.name == "header" && !names_file)
+      option.value = (colon == std::string::npos ? "" : option.value.substr(0, colon + 1)) + "...";
   }
   return Redacted(parts.place) + (parts.query.empty() ? "" : "?...") + JoinedOptions(parts.options);
 }
