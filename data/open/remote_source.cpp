@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/base/printable.h"
+#include "data/stores/store.h"
 
 namespace slabstream {
 namespace {

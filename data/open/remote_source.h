@@ -10,9 +10,10 @@
 #include "common/base/status.h"
 #include "data/open/unchanged_source.h"
 #include "data/sources/source_format.h"
-#include "data/stores/store.h"
 
 namespace slabstream {
+
+class Store;
 
 struct RemoteFormat {
   const SourceFormat* format = nullptr;  // of those that were given
