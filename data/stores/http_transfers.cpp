@@ -257,7 +257,7 @@ struct HttpTransfers::Impl {
     const auto total = slash == std::string_view::npos ? std::nullopt : ParseNumber<std::uint64_t>(range.substr(slash + 1));
     if (transfer.get.span && slash != std::string_view::npos) object.size = total.value_or(0);
     if (status == 416 && transfer.get.span) return Answer(std::move(owned), std::move(object));  // it ends before the part begins
-    if (status == 403) return Answer(std::move(owned), HttpObject{.instead = http});
+    if (status == 403 || status == 204) return Answer(std::move(owned), HttpObject{.instead = http});
     if (status != 200 && status != 206) return fail(StatusCode::kUnavailable, http);
     if (IsPage(transfer)) return Answer(std::move(owned), HttpObject{.instead = "a page of HTML came"});
     if (transfer.get.span && status == 206) {

@@ -52,8 +52,8 @@ struct HttpGet {
 };
 
 struct HttpObject {
-  // Empty: it is the object. Else the server sent something instead, and this says what: HTTP 403, or a page of HTML. Many servers answer
-  // so for what is not there; others, for what one may not read.
+  // Empty: it is the object. Else the server sent something instead, and this says what: HTTP 403 or 204, or a page of HTML. Many servers
+  // answer so for what is not there; others, for what one may not read.
   std::string instead = {};
   Bytes bytes = {};          // fewer than asked for if the object ends before
   std::uint64_t size = 0;    // of the whole object

@@ -204,6 +204,7 @@ TEST_F(HttpStoreTest, ForbiddenIsMissingWhereOthersCanBeRead) {
   std::atomic<bool> open = true;
   const ScriptedServer server([&](const ServerRequest& request) {
     if (open && request.target.starts_with("/there")) return AnswerText("200 OK", kTen);
+    if (request.target == "/empty") return std::string("HTTP/1.1 204 No Content\r\n\r\n");
     return AnswerText("403 Forbidden", "<?xml?><Error><Code>AccessDenied</Code></Error>");
   });
   const std::shared_ptr<Store> store = StoreAt(server.url());
@@ -211,6 +212,7 @@ TEST_F(HttpStoreTest, ForbiddenIsMissingWhereOthersCanBeRead) {
   EXPECT_EQ(first.code(), StatusCode::kUnavailable) << "perhaps all is forbidden";
   EXPECT_THAT(first.message(), HasSubstr("HTTP 403 (AccessDenied): it is not public"));
   EXPECT_EQ(Read(*store, "there").value(), kTen);
+  EXPECT_EQ(Read(*store, "empty").status().code(), StatusCode::kNotFound);
   std::atomic<int> left = 40, missing = 0;
   std::promise<void> all;
   for (int i = 0; i < 40; ++i) {
