@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/read_progress.h"
@@ -222,16 +224,26 @@ Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::strin
                                 ReadProgress& progress) {
   Result<Survey> survey = SurveySource(*source, IsUrl(place) ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
+  const ValueRange& range = survey->summary->range;
+  const SampleType type = source->info().exact.type;
+  constexpr double kExactFloats = 1 << 24;  // float32 holds all whole numbers up to here
+  if (MayRoundLabels(type) && std::max(std::abs(range.min), std::abs(range.max)) > kExactFloats) {
+    LogWarning(place + ": " + RoundingText(type));
+  }
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }
 
 // The voxels, those of layers too.
-Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
-  Result<LoadedVolume> read = ReadAnyVolume(text.path, text.options);
+Result<ReadableSource> Shown(Result<LoadedVolume> read, const SourceText& text, const LayerFiles& layers) {
   if (!read.ok()) return read.status();
+  PrepareToShow(text.path, *read);
   Result<Layers> with = ReadLayers(layers, read->volume->description.geometry);
   if (!with.ok()) return with.status();
-  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr});
+  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr, std::move(read->exact)});
+}
+
+Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
+  return Shown(ReadAnyVolume(text.path, text.options), text, layers);
 }
 
 // Other processes may run in other folders.
@@ -251,12 +263,7 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   } else if (IsReadWhole(text.path, text.options)) {
     way.read = [text] { return ReadWhole(text, {}); };
   } else {
-    way.read = [source, text, progress]() -> Result<ReadableSource> {
-      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
-      Result<std::shared_ptr<const Volume>> volume = ReadLevel(*source, 0, progress);
-      if (!volume.ok()) return volume.status();
-      return ReadableSource(LoadedSource{FileInfoOf(source->info()), *std::move(volume), {}, nullptr});
-    };
+    way.read = [source, text] { return Shown(ReadFinest(*source, text.path, text.options), text, {}); };
   }
   return way;
 }
@@ -402,9 +409,9 @@ Result<IndexFile> IndexFileOf(const std::string& source) {
 
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell) {
   if (source.load) {
-    Result<LayeredVolume> loaded = source.load(tell);
+    Result<LoadedData> loaded = source.load(tell);
     if (!loaded.ok()) return loaded.status();
-    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr});
+    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr, std::move(loaded->exact)});
   }
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

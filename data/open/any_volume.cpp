@@ -12,6 +12,7 @@
 #include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/chosen_channel.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -62,18 +63,27 @@ bool IsReadWhole(const std::string& path, const ReadOptions& options) {
 }
 
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
-  if (IsReadWhole(path, options)) {
-    Result<LoadedVolume> loaded = ReadVolume(path, options);
-    if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
-    return loaded;
+  if (!IsReadWhole(path, options)) {
+    const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+    return source.ok() ? ReadFinest(**source, path, options) : source.status();
   }
-  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
-  if (!source.ok()) return source.status();
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, options.progress);
-  if (!volume.ok()) return volume.status();
-  LoadedVolume loaded{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  Result<LoadedVolume> loaded = ReadVolume(path, options);
+  if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
+  return loaded;
+}
+
+Result<LoadedVolume> ReadFinest(VolumeSource& source, const std::string& path, const ReadOptions& options) {
+  Result<LevelInMemory> level = ReadLevel(source, 0, options.progress);
+  if (!level.ok()) return level.status();
+  LoadedVolume loaded{FileInfoOf(source.info()), std::move(level->volume), std::move(level->exact)};
+  loaded.rounded = loaded.exact != nullptr;
   WarnOfChannel(path, options, loaded.info);
   return loaded;
+}
+
+void PrepareToShow(const std::string& path, LoadedVolume& loaded) {
+  if (loaded.rounded) LogWarning(path + ": " + RoundingText(loaded.exact->of.type, loaded.exact.get()));
+  if (!loaded.rounded || !MayRoundLabels(loaded.exact->of.type)) loaded.exact = nullptr;
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {

@@ -61,11 +61,13 @@ Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& o
   SourceInfo info = {.levels = {{description, BlockOf(header, placed->turn)}},
                      .format = std::string(format.name),
                      .file_type = std::string(ToString(header.type)),
+                     .exact = {header.type, header.rescale},
                      .labels = header.labels,
                      .times = int(header.volumes),
                      .time = int(header.number),
                      .notes = header.notes,
                      .files = {path}};
+  if (MayBeRounded(header.type)) info.notes.push_back(RoundingText(header.type));
   if (header.components > 1) info.channels.resize(std::size_t(header.components));
   if (payload->file != path) info.files.push_back(payload->file.string());
   return LocatedVolume{header, *std::move(payload), placed->turn, options.channel.value_or(0), std::move(info)};

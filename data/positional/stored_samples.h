@@ -27,7 +27,7 @@ class StoredSamples {
   std::vector<Box> Parts(const Box& box) const;
   // Bytes of memory that reading a part takes: at most kPartBytes, or those of one voxel.
   std::int64_t MemoryFor(const Box& part, const TurnedBox& to) const;
-  // Fills in the kept samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
+  // Fills in the samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
   // Throws std::bad_alloc.
   Status Read(const Box& part, const TurnedBox& to);
 

@@ -66,7 +66,7 @@ class Level : public std::enable_shared_from_this<Level> {
     }
     counts_ = {(size_.x - 1) / chunk_.x + 1, (size_.y - 1) / chunk_.y + 1, (size_.z - 1) / chunk_.z + 1};
     std::array<std::byte, sizeof(float)> fill{};
-    CopySamples(shape.type, shape.fill.data(), {0, 0, 0}, {1, 1, 1}, fill.data(), 1, 1);
+    CopySamples(shape.type, shape.fill.data(), {0, 0, 0}, {1, 1, 1}, {fill.data(), 1, 1});
     fills_with_zeros_ = std::ranges::all_of(fill, [](std::byte each) { return each == std::byte{0}; });
   }
   ~Level() { context_->cache().Forget(owner_); }
@@ -233,7 +233,7 @@ class Level : public std::enable_shared_from_this<Level> {
 
   void Copy(const Index3& chunk, const Bytes& elements, Reading& reading) const {
     if (!reading.goes_on()) return reading.GiveUp();
-    if (elements.empty() && fills_with_zeros_ && reading.out().zeroed) return;
+    if (elements.empty() && fills_with_zeros_ && reading.out().zeroed && !reading.out().exact) return;
     const ArrayShape& shape = level_.array->shape();
     const Box part = Intersection(BoxOf(chunk), reading.box());
     const std::byte* from = shape.fill.data();
@@ -253,11 +253,10 @@ class Level : public std::enable_shared_from_this<Level> {
       }
       from = elements.span().data() + first * std::int64_t(BytesPerSample(shape.type));
     }
-    const BoxRoom& out = reading.out();
+    BoxRoom out = reading.out();
     const Index3 offset = part.begin - reading.box().begin;
-    const std::int64_t place = offset.x + offset.y * out.row + offset.z * out.slice;
-    CopySamples(shape.type, from, steps, part.size(), out.first + place * std::int64_t(BytesPerSample(KeptTypeOf(shape.type).type)),
-                out.row, out.slice);
+    out.first += (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(CopiedBytes(shape.type, out.exact));
+    CopySamples(shape.type, from, steps, part.size(), out);
   }
 
   Status OutOfMemory(const std::exception& error) const {
@@ -271,7 +270,7 @@ class Level : public std::enable_shared_from_this<Level> {
   const ChunkCache::Owner owner_;
   Index3 chunk_, counts_;             // voxels of a chunk, and chunks, along each axis
   std::vector<std::uint64_t> index_;  // of chunks along the other axes of the array
-  bool fills_with_zeros_ = false;     // where there is no chunk
+  bool fills_with_zeros_ = false;     // kept ones, where there is no chunk
   std::atomic<std::uint64_t> stored_bytes_ = 0, chunks_ = 0;
   std::mutex mutex_;                                     // guards what follows
   std::unordered_map<std::uint64_t, Readings> flights_;  // who waits, by the number of the chunk
@@ -359,6 +358,8 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   const ValueMapping mapping = {pyramid.rescale.scale, pyramid.rescale.FromStored(kept.shift)};
   SourceInfo info = std::move(pyramid.info);
   info.file_type = ToString(type);
+  info.exact = {type, pyramid.rescale};
+  if (MayBeRounded(type)) info.notes.push_back(RoundingText(type));
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
   for (PyramidLevel& level : pyramid.levels) {

@@ -31,7 +31,7 @@ struct Pyramid {
   std::vector<PyramidLevel> levels;  // finest first
   Orientation orientation = {};      // of all levels; its origin does not matter, since each level has its own
   ValueMapping rescale = {};         // from stored values to data values
-  SourceInfo info = {};              // without its levels and file_type
+  SourceInfo info = {};              // without its levels, file_type and exact
 };
 
 // InvalidArgument, naming `name`: no level; one whose sides are out of [1, kMaxVolumeSide]; levels of different types; a spacing that is

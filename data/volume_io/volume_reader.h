@@ -4,7 +4,7 @@
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
-// else float32. If float32 cannot hold a value exactly, the reader logs a warning. A rescale slope and intercept (NIfTI scl_slope,
+// else float32. LoadedVolume::exact has what float32 may round. A rescale slope and intercept (NIfTI scl_slope,
 // scl_inter) goes into ValueMapping.
 //
 // Axes: if the file has an orientation (NIfTI sform or qform, NRRD space, MetaImage TransformMatrix), the voxels are turned to the nearest
@@ -25,6 +25,7 @@
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/file_samples.h"
 #include "data/volume_io/read_options.h"
 
@@ -50,6 +51,9 @@ struct VolumeFileInfo {
 struct LoadedVolume {
   VolumeFileInfo info;
   std::shared_ptr<const Volume> volume;
+  // As they are in the file, turned as the volume's, if their type is one that float32 may round; null: those of the volume are exact.
+  std::shared_ptr<const ExactSamples> exact = {};
+  bool rounded = false;  // float32 has rounded some of them in the volume
 };
 
 // NotFound (no such file), InvalidArgument (not a volume, an option that its format does not take, more than three dimensions, several
@@ -68,6 +72,7 @@ bool LooksLikeVolume(const std::string& path);
 struct WriteOptions {
   std::optional<SampleType> type;  // of the samples in the file; none: see FileSamples
   WriteProgress progress;
+  const ExactSamples* exact = nullptr;  // of the volume, which are written; null: there are none
 };
 
 // Writes the format that the ending names (formats.h; .mhd: with a .raw beside it). Files have no value mapping, but the data values

@@ -97,6 +97,21 @@ TEST_F(LayerReader, WhatIsNoLabelIsNamed) {
   EXPECT_THAT(ErrorOf({.labels = Write("e.nrrd", values)}, Grid(2)), HasSubstr("more than 4096 labels"));
 }
 
+// As float32, 2^24 + 1 is 2^24, which is a label.
+TEST_F(LayerReader, LabelsThatFloat32RoundsAreNotTakenForOthers) {
+  const std::uint32_t most = kMaxLabelValue;
+  const std::vector<std::uint32_t> values = {most, most - 1, most};
+  const std::string header = "NRRD0004\ntype: uint32\ndimension: 3\nsizes: 3 1 1\nencoding: raw\nendian: little\n\n";
+  const auto write = [&](const std::vector<std::uint32_t>& of) {
+    const std::string path = directory_ / "labels.nrrd";
+    EXPECT_TRUE(WriteTextFile(path, header + std::string(reinterpret_cast<const char*>(of.data()), 12)).ok());
+    return path;
+  };
+  const VolumeGeometry grid = Grid(3, World::kVoxels);
+  EXPECT_THAT(Numbers(ReadLayers({.labels = write(values)}, grid).value()), ElementsAre(2, 1, 2));
+  EXPECT_THAT(ErrorOf({.labels = write({most, most + 1, 0})}, grid), HasSubstr("the value 16777217 is no label"));
+}
+
 TEST_F(LayerReader, LayersLieInTheSameWorld) {
   const std::string path = Write("scene.mha", {1, 2}, World::kVoxels);
   const Result<LoadedVolume> read = ReadVolume(path);

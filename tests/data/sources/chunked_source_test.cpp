@@ -85,13 +85,14 @@ struct RandomPyramid {
     level.array = array;
   }
 
-  double Expected(const Index3& v) const {
+  const std::byte* Element(const Index3& v) const {
     std::vector<std::uint64_t> element = at;
     for (int axis = 0; axis < 3; ++axis) {
       if (level.axes[std::size_t(axis)] >= 0) element[std::size_t(level.axes[std::size_t(axis)])] = std::uint64_t(v[axis]);
     }
-    return 2 * ValueOf(array->shape().type, array->element(element)) + 3;
+    return array->element(element);
   }
+  double Expected(const Index3& v) const { return 2 * ValueOf(array->shape().type, Element(v)) + 3; }
 
   Pyramid pyramid() const { return {.levels = {level}, .rescale = {2, 3}}; }
 
@@ -106,11 +107,15 @@ void ExpectBox(VolumeSource& source, const RandomPyramid& random, const Box& box
   std::vector<std::byte> out(std::size_t(box.voxel_count()) * BytesPerSample(description.type), std::byte{0xEE});
   const Status status = source.ReadNow(0, box, out);
   ASSERT_TRUE(status.ok()) << status.message();
+  const std::size_t stored = BytesPerSample(source.info().exact.type);
+  std::vector<std::byte> exact(std::size_t(box.voxel_count()) * stored, std::byte{0xEE});
+  ASSERT_TRUE(source.ReadNow(0, box, BoxRoom::Dense(box, exact.data(), true)).ok());
   std::size_t number = 0;
   for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
     for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {
       for (v.x = box.begin.x; v.x < box.end.x; ++v.x, ++number) {
         ASSERT_EQ(ValueOf(description, out, number), random.Expected(v)) << v.x << " " << v.y << " " << v.z;
+        ASSERT_EQ(std::memcmp(exact.data() + number * stored, random.Element(v), stored), 0) << v.x << " " << v.y << " " << v.z;
       }
     }
   }
@@ -164,6 +169,19 @@ TEST(ChunkedSourceTest, ZerosAreNotWrittenWhereAllIsZero) {
       EXPECT_EQ(out[511], std::byte{5});
     }
   }
+}
+
+// The least int8 is kept as 0, but is not 0 itself.
+TEST(ChunkedSourceTest, WhatIsKeptAsZeroIsWrittenIfItIsExactlyAnotherNumber) {
+  const ArrayShape shape = {.size = {8, 8, 8}, .chunk = {4, 4, 4}, .type = SampleType::kInt8, .fill = {std::byte{0x80}}};
+  const auto array = std::make_shared<MemoryArray>(shape, std::vector<std::byte>(512, std::byte{5}));
+  array->missing = {0};
+  std::vector<std::byte> out(512);
+  BoxRoom room = BoxRoom::Dense(kCube, out.data(), true);
+  room.zeroed = true;
+  ASSERT_TRUE(SourceOf(array, Context())->ReadNow(0, kCube, room).ok());
+  EXPECT_EQ(out[0], std::byte{0x80});
+  EXPECT_EQ(out[511], std::byte{5});
 }
 
 struct RunningRead {
