@@ -105,6 +105,13 @@ class ReadVoxels {
   ProbedVoxels voxels() {
     return {from_.description().geometry.size, [this](const Index3& voxel) { return At(voxel); }};
   }
+  ExactValue ExactAt(const Index3& voxel) {
+    const ExactType& of = from_.source->info().exact;
+    std::array<std::byte, sizeof(std::uint64_t)> sample{};
+    const Box box = {voxel, voxel + Uniform(1)};
+    if (status_.ok()) status_ = from_.source->ReadNow(from_.level, box, BoxRoom::Dense(box, sample.data(), true));
+    return ExactValueOf(of, sample.data());
+  }
 
  private:
   double At(const Index3& voxel) {
@@ -137,7 +144,8 @@ class ReadVoxels {
 template <class Query>
 Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
   ReadVoxels read(from);
-  const ProbeVolume volume{.voxels = read.voxels()};
+  ProbeVolume volume{.voxels = read.voxels()};
+  if (MayBeRounded(from.source->info().exact.type)) volume.exact = [&](const Index3& voxel) { return read.ExactAt(voxel); };
   Result<QuestionReply> answer = Answer(query, {volume, asked.summary, asked.dataset});
   return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
@@ -186,7 +194,12 @@ Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::S
     if (const auto* prefetch = std::get_if<PrefetchQuery>(&asked.question)) return Fetch(*prefetch, asked, prefetcher);
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
   }
-  const ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
+  ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};
+  if (const ExactSamples* const exact = samples.exact.get()) {
+    volume.exact = [exact, size = samples.box().size()](const Index3& voxel) {
+      return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
+    };
+  }
   const Dataset dataset{volume, asked.summary, asked.dataset};
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
 }

@@ -13,6 +13,7 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
+#include "common/base/url.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
@@ -20,6 +21,7 @@
 #include "coordinator/answer_question.h"
 #include "coordinator/dataset_id.h"
 #include "data/survey/brick_index.h"
+#include "data/survey/survey.h"
 
 namespace slabstream {
 namespace {
@@ -140,10 +142,11 @@ Result<BackgroundActions::News> BackgroundActions::Hold(const LoadDataset& actio
   } else {
     samples.volume = volume;
   }
+  samples.exact = loaded.exact;
   if (layers.labels != nullptr) samples.labels = std::make_shared<const BrickedVoxels>(layers.labels->block);
   if (layers.overlay != nullptr) samples.overlay = std::make_shared<const BrickedVoxels>(layers.overlay->block);
   samples.description = volume->description;
-  const DatasetId id = IdOf(action.name, *volume, layers);
+  const DatasetId id = IdOf(action.name, *volume, layers, loaded.exact.get());
   const std::uint64_t bytes = samples.bytes() - (held ? volume->block.bytes.size() : 0);
   return News{DatasetLoaded{action.name, action.load, id, std::move(summary), bytes, loaded.stamp}, id, std::move(samples)};
 }
@@ -178,16 +181,20 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
   for (const SourceLevel& level : std::span(at.source->info().levels).subspan(std::size_t(at.stored.level))) {
     with_coarser += std::uint64_t(level.description.voxel_bytes());
   }
+  // Of a larger one behind an address each process reads what it needs, which may be little.
+  const std::uint64_t most =
+      !SchemeOf(at.stored.source).empty() ? std::min(action.most_bytes, std::uint64_t(kFarSurvey.exact)) : action.most_bytes;
   VoxelServer::Samples samples;
   VolumeSummary summary;
-  if (with_coarser <= action.most_bytes && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
+  if (with_coarser <= most && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     ReadProgress progress(tell);
-    const Result<std::shared_ptr<const Volume>> volume = ReadLevel(*at.source, at.stored.level, &progress);
+    const Result<LevelInMemory> level = ReadLevel(*at.source, at.stored.level, &progress);
     // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
-    const Result<bool> changed = volume.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
-    if (!volume.ok() && (!changed.ok() || !*changed)) return volume.status();
-    if (volume.ok()) {
-      samples.volume = *volume;
+    const Result<bool> changed = level.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
+    if (!level.ok() && (!changed.ok() || !*changed)) return level.status();
+    if (level.ok()) {
+      samples.volume = level->volume;
+      samples.exact = level->exact;
       samples.read_from = at.source;
       samples.description = description;
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -20,6 +21,7 @@
 #include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/read_progress.h"
@@ -220,23 +222,33 @@ struct WayToRead {
 
 Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::string place, std::shared_ptr<const BrickIndex> index,
                                 ReadProgress& progress) {
-  Result<Survey> survey = SurveySource(*source, IsUrl(place) ? kFarSurvey : SurveyBytes(), &progress);
+  Result<Survey> survey = SurveySource(*source, !SchemeOf(place).empty() ? kFarSurvey : SurveyBytes(), &progress);
   if (!survey.ok()) return survey.status();
+  const ValueRange& range = survey->summary->range;
+  const SampleType type = source->info().exact.type;
+  constexpr double kExactFloats = 1 << 24;  // float32 holds all whole numbers up to here
+  if (MayRoundLabels(type) && std::max(std::abs(range.min), std::abs(range.max)) > kExactFloats) {
+    LogWarning(place + ": " + RoundingText(type));
+  }
   return ReadableSource(OpenedSource{std::move(source), *std::move(survey), std::move(place), nullptr, std::move(index)});
 }
 
 // The voxels, those of layers too.
-Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
-  Result<LoadedVolume> read = ReadAnyVolume(text.path, text.options);
+Result<ReadableSource> Shown(Result<LoadedVolume> read, const SourceText& text, const LayerFiles& layers) {
   if (!read.ok()) return read.status();
+  PrepareToShow(text.path, *read);
   Result<Layers> with = ReadLayers(layers, read->volume->description.geometry);
   if (!with.ok()) return with.status();
-  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr});
+  return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr, std::move(read->exact)});
+}
+
+Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
+  return Shown(ReadAnyVolume(text.path, text.options), text, layers);
 }
 
 // Other processes may run in other folders.
 std::string PlaceOf(const DataSource& data, const SourceText& text) {
-  return (IsUrl(text.path) ? text.path : fs::absolute(text.path).string()) + data.path.substr(text.path.size());
+  return IsUrl(text.path) ? data.path : fs::absolute(text.path).string() + text.options_text;
 }
 
 // Of a source that its format can read in parts.
@@ -251,12 +263,7 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   } else if (IsReadWhole(text.path, text.options)) {
     way.read = [text] { return ReadWhole(text, {}); };
   } else {
-    way.read = [source, text, progress]() -> Result<ReadableSource> {
-      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
-      Result<std::shared_ptr<const Volume>> volume = ReadLevel(*source, 0, progress);
-      if (!volume.ok()) return volume.status();
-      return ReadableSource(LoadedSource{FileInfoOf(source->info()), *std::move(volume), {}, nullptr});
-    };
+    way.read = [source, text] { return Shown(ReadFinest(*source, text.path, text.options), text, {}); };
   }
   return way;
 }
@@ -309,7 +316,7 @@ Result<std::shared_ptr<const FileStamp>> StampOf(const ReadableSource& read, con
 
 const std::string* DataArgument::RelativePath() const {
   for (const std::string* file : {&path, &layers.labels, &layers.label_colors, &layers.overlay}) {
-    if (!file->empty() && !file->starts_with('/') && !IsUrl(*file)) return file;
+    if (!file->empty() && !file->starts_with('/') && SchemeOf(*file).empty()) return file;
   }
   return nullptr;
 }
@@ -397,14 +404,14 @@ Result<IndexFile> IndexFileOf(const std::string& source) {
   if (!IsReadInParts(parsed->path, parsed->options)) {
     return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
   }
-  return IndexFile::Of(parsed->path, std::string_view(source).substr(parsed->path.size()));
+  return IndexFile::Of(parsed->path, parsed->options_text);
 }
 
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell) {
   if (source.load) {
-    Result<LayeredVolume> loaded = source.load(tell);
+    Result<LoadedData> loaded = source.load(tell);
     if (!loaded.ok()) return loaded.status();
-    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr});
+    return ReadableSource(LoadedSource{{}, std::move(loaded->volume), std::move(loaded->layers), nullptr, std::move(loaded->exact)});
   }
   constexpr int kAttempts = 2;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {

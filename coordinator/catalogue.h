@@ -80,7 +80,8 @@ struct LoadedSource {
   VolumeFileInfo file;  // of its paths; nothing if a function has loaded it
   std::shared_ptr<const Volume> volume;
   Layers layers;
-  std::shared_ptr<const FileStamp> stamp;  // of its files as they were read; null: they never change
+  std::shared_ptr<const FileStamp> stamp;          // of its files as they were read; null: they never change
+  std::shared_ptr<const ExactSamples> exact = {};  // of whole numbers that are rounded in the volume; null: none is
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

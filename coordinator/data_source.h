@@ -18,6 +18,7 @@
 #include "common/volume/summary.h"
 #include "data/layers/layer_reader.h"
 #include "data/sources/volume_source.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/read_progress.h"
 
 namespace slabstream {
@@ -35,7 +36,10 @@ struct SourceAtLevel {
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
-using DataLoader = std::function<Result<LayeredVolume>(const TellRead&)>;
+struct LoadedData : LayeredVolume {
+  std::shared_ptr<const ExactSamples> exact = nullptr;  // of whole numbers that the volume rounds
+};
+using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 
 // Paths, or a function whose volume never changes.
 struct DataSource {
@@ -46,10 +50,10 @@ struct DataSource {
   DataSource(Loader loader) : load(std::move(loader)) {}  // NOLINT(google-explicit-constructor): a function is a source
   template <std::convertible_to<VolumeLoader> Loader>
   DataSource(Loader loader)  // NOLINT(google-explicit-constructor): so is one whose volume has no layers
-      : load([loader = VolumeLoader(std::move(loader))](const TellRead&) -> Result<LayeredVolume> {
+      : load([loader = VolumeLoader(std::move(loader))](const TellRead&) -> Result<LoadedData> {
           Result<std::shared_ptr<const Volume>> volume = loader();
           if (!volume.ok()) return volume.status();
-          return LayeredVolume{.volume = *std::move(volume)};
+          return LoadedData{{.volume = *std::move(volume)}};
         }) {}
 
   std::string path;       // a file, or a folder of slices; a named one may have options for reading it behind a question mark

@@ -35,7 +35,7 @@ DatasetId IdOf(const std::string& name, const VolumeDescription& description, co
   return IdOf(fmt::format("{} {} {} {:x} {}", OfDescription(description), stored.source, stored.level, stored.version, name));
 }
 
-DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers) {
+DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers, const ExactSamples* exact) {
   std::string of_layers;
   for (const Volume* layer : {layers.labels.get(), layers.overlay.get()}) {
     if (layer != nullptr) of_layers += fmt::format(" {} {:x}", int(layer->block.type), Digest(layer->block.bytes));
@@ -46,7 +46,8 @@ DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& laye
   }
   const std::string text =
       fmt::format("{} {} {:x} {}", OfDescription(volume.description), volume.block.bytes.size(), Digest(volume.block.bytes), name) +
-      (layers.types().any() ? of_layers : "") + (volume.cells == nullptr ? "" : OfCells(*volume.cells));
+      (exact == nullptr ? "" : fmt::format(" {:x}", Digest(exact->bytes))) + (layers.types().any() ? of_layers : "") +
+      (volume.cells == nullptr ? "" : OfCells(*volume.cells));
   return IdOf(text);
 }
 

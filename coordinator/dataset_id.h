@@ -6,11 +6,12 @@
 
 #include "common/frame/frame_setup.h"
 #include "common/volume/layers.h"
+#include "data/volume_io/exact_samples.h"
 
 namespace slabstream {
 
-// Reads every voxel once. Not 0.
-DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers = {});
+// Reads every voxel once. `exact`: its exact samples; null: those of the volume are. Not 0.
+DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers = {}, const ExactSamples* exact = nullptr);
 // Of voxels that nobody has read: their files have another version if they are other voxels. `name`: of the dataset, or of one level of it.
 DatasetId IdOf(const std::string& name, const VolumeDescription& description, const StoredAt& stored);
 

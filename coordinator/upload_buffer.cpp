@@ -69,7 +69,7 @@ Result<DataSource> UploadBuffer::Finish() {
     whole.layers.table = std::make_shared<const LabelTable>(TableOf(order_.labels));
     whole.layers.labels = labels;
   }
-  DataSource source(DataLoader([whole](const TellRead&) -> Result<LayeredVolume> { return whole; }));
+  DataSource source(DataLoader([whole](const TellRead&) -> Result<LoadedData> { return LoadedData{whole}; }));
   source.held_bytes = order_.bytes();
   return source;
 }

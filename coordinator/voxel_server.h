@@ -43,7 +43,8 @@ class VoxelServer {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
     std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
-    std::shared_ptr<const MeshCutter> cells = nullptr;  // of an unstructured grid
+    std::shared_ptr<const MeshCutter> cells = nullptr;    // of an unstructured grid
+    std::shared_ptr<const ExactSamples> exact = nullptr;  // of whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
     struct InParts {
       std::shared_ptr<VolumeSource> source = nullptr;
@@ -63,8 +64,8 @@ class VoxelServer {
     std::uint64_t bytes() const {
       if (in_parts.source != nullptr) return 0;
       const std::uint64_t of_layers = (labels == nullptr ? 0 : labels->bytes()) + (overlay == nullptr ? 0 : overlay->bytes());
-      const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes();
-      return of_layers + of_cells + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
+      const std::uint64_t of_cells = cells == nullptr ? 0 : cells->bytes(), of_exact = exact == nullptr ? 0 : exact->bytes.size();
+      return of_layers + of_cells + of_exact + (volume != nullptr ? volume->block.bytes.size() : bricks->bytes());
     }
     SampleTypes types() const {
       if (in_parts.source != nullptr) return in_parts.description().type;

@@ -18,6 +18,7 @@
 #include "data/open/any_volume.h"
 #include "data/stores/object_cache.h"
 #include "data/survey/survey.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -41,17 +42,29 @@ Status CheckKeepsInput(const ConvertOptions& options, const VolumeFormat& format
 std::optional<SampleType> TypeToWrite(const ConvertOptions& options, const LoadedVolume& loaded) {
   if (options.type) return options.type;
   const std::optional<SampleType> stored = SampleTypeNamed(loaded.info.file_type);
-  return stored && FileSamples::Of(*loaded.volume, stored).ok() ? stored : std::nullopt;
+  return stored && FileSamples::Of(*loaded.volume, loaded.exact.get(), stored).ok() ? stored : std::nullopt;
+}
+
+// Whether floats that somebody asks for round whole numbers.
+bool RoundsLabels(SampleType type, const ExactSamples& exact) {
+  if (!MayRoundLabels(exact.of.type)) return false;
+  if (type == SampleType::kFloat32) return !AllFitFloat(exact.of.type, exact.bytes);
+  if (type != SampleType::kFloat64) return false;
+  const std::size_t bytes = BytesPerSample(exact.of.type);
+  for (std::size_t i = 0; i < exact.bytes.size(); i += bytes) {
+    if (ExactValueOf({exact.of.type, {}}, exact.bytes.data() + i).rest != 0) return true;
+  }
+  return false;
 }
 
 // A box of a level, or the whole volume.
 Result<LoadedVolume> Read(const ConvertOptions& options, const SourceText& source, ProgressBar& bar) {
-  if (!options.converts_part()) return ReadInputVolume(source);
+  if (!options.converts_part() && IsReadWhole(source.path, source.options)) return ReadInputVolume(source);
   const Result<SourceToConvert> part = OpenToConvert(options, source, {}, bar);
   if (!part.ok()) return part.status();
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(*part->source, 0, source.options.progress);
-  if (!volume.ok()) return AsInput(volume.status());
-  return LoadedVolume{.info = FileInfoOf(part->source->info()), .volume = *std::move(volume)};
+  Result<LevelInMemory> level = ReadLevel(*part->source, 0, source.options.progress, ExactWanted::kAll);
+  if (!level.ok()) return AsInput(level.status());
+  return LoadedVolume{FileInfoOf(part->source->info()), std::move(level->volume), std::move(level->exact)};
 }
 
 }  // namespace
@@ -86,15 +99,20 @@ Status RunConvert(const ConvertOptions& options) {
   const Result<LoadedVolume> loaded = Read(options, *source, bar);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
-  if (Status status = CheckKeepsInput(options, *to, {info.samples_file}); !status.ok()) return status;
+  if (Status status = CheckKeepsInput(options, *to, info.other_files); !status.ok()) return status;
   if (const std::string lost = WhatIsLost(*to, info.description.geometry); !lost.empty()) {
     LogWarning(fmt::format("{}: {} files do not keep {}", options.output, to->name, lost));
+  }
+  if (options.type && loaded->exact != nullptr && RoundsLabels(*options.type, *loaded->exact)) {
+    LogWarning(fmt::format("--type {} rounds values of type {}", ToString(*options.type), ToString(loaded->exact->of.type)));
   }
   const auto progress = [&](std::int64_t done, std::int64_t all) {
     const std::string size = MemoryText(std::uint64_t(all));
     bar.Show(double(done) / double(all), fmt::format("writing {}: {} % of {}", options.output, done * 100 / all, size));
   };
-  if (Status status = WriteVolume(*loaded->volume, options.output, {TypeToWrite(options, *loaded), progress}); !status.ok()) return status;
+  if (Status status = WriteVolume(*loaded->volume, options.output, {TypeToWrite(options, *loaded), progress, loaded->exact.get()});
+      !status.ok())
+    return status;
   const Index3& size = info.description.geometry.size;
   std::cout << fmt::format("wrote {}: {}, {} x {} x {} voxels\n", options.output, to->name, size.x, size.y, size.z);
   return Status::Ok();

@@ -38,10 +38,12 @@ Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& so
   const Result<LoadedVolume> loaded = ReadInputVolume(with_progress);
   if (!loaded.ok()) return loaded.status();
   const VolumeFileInfo& info = loaded->info;
+  const std::uint64_t of_exact = loaded->exact == nullptr ? 0 : loaded->exact->bytes.size();
   return SourceToConvert{
       MakeMemorySource(loaded->volume,
-                       {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)}),
-      std::nullopt, std::uint64_t(info.description.voxel_bytes())};
+                       {.format = info.format, .file_type = info.file_type, .labels = info.labels, .files = *std::move(files)},
+                       loaded->exact),
+      std::nullopt, std::uint64_t(info.description.voxel_bytes()) + of_exact};
 }
 
 }  // namespace

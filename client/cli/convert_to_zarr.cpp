@@ -65,7 +65,7 @@ Status ConvertToZarr(const ConvertOptions& options, const SourceText& source) {
                                      {.version = options.zarr_version,
                                       .slices = opened->slices,
                                       .memory = Share(memory, held).writing,
-                                      .source = options.source,
+                                      .source = ShownSource(options.source),
                                       .stop = stop.get_token(),
                                       .progress = progress});
   if (status.code() == StatusCode::kCancelled) {

@@ -21,6 +21,13 @@ std::string Plain(const std::string& text) {
 
 Vec3 SpacingOf(const DicomStack& stack) { return {Length(stack.steps[0]), Length(stack.steps[1]), Length(stack.steps[2])}; }
 
+// "20" slices, or "20 x 3 times".
+std::string SlicesText(const DicomSeries& series) {
+  const DicomStack& stack = series.stack;
+  if (!series.trouble.ok()) return fmt::format("{}", series.frame_count());
+  return stack.volumes > 1 ? fmt::format("{} x {} times", stack.size.z, stack.volumes) : fmt::format("{}", stack.size.z);
+}
+
 // Why it is not read, or is read only if --series asks for it.
 std::string RemarkOn(const DicomSeries& series) {
   if (!series.trouble.ok()) return series.trouble.message();
@@ -52,7 +59,7 @@ std::string SeriesText(const std::vector<DicomSeries>& all) {
     const DicomImage& first = series.images.front();
     const Vec3 spacing = SpacingOf(series.stack);
     text += fmt::format("{:<8} {:<8} {:<20} {:<26} {}{}\n", Plain(series.number), Plain(series.modality),
-                        fmt::format("{} x {} x {}", first.columns, first.rows, series.frame_count()),
+                        fmt::format("{} x {} x {}", first.columns, first.rows, SlicesText(series)),
                         series.trouble.ok() ? fmt::format("{:.6g} x {:.6g} x {:.6g}", spacing.x, spacing.y, spacing.z) : "-",
                         Plain(series.uid), series.description.empty() ? "" : fmt::format(", \"{}\"", Plain(series.description)));
     if (const std::string remark = RemarkOn(series); !remark.empty()) text += fmt::format("{:<8} no volume: {}\n", "", Plain(remark));
@@ -70,6 +77,8 @@ nlohmann::ordered_json SeriesJson(const std::vector<DicomSeries>& all) {
                                    {"description", series.description},
                                    {"size", {first.columns, first.rows, series.frame_count()}}};
     if (series.trouble.ok()) {
+      each["size"][2] = series.stack.size.z;
+      if (series.stack.volumes > 1) each["times"] = series.stack.volumes;
       const Vec3 spacing = SpacingOf(series.stack);
       each["spacing"] = {spacing.x, spacing.y, spacing.z};
     }

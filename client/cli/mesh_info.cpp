@@ -46,8 +46,8 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::opt
   text += fmt::format("lattice      {} x {} x {} voxels (--lattice); renderers that draw the cells instead: {}\n", lattice.x, lattice.y,
                       lattice.z, NamesOfAble(NameOf(Ability::kCells)));
   text += "arrays       name, of what, components, type\n";
-  for (const MeshArray& array : info.arrays) {
-    text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, ToString(array.type));
+  for (const GridArray& array : info.arrays) {
+    text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, array.TypeText());
   }
   return text + fmt::format("values       {:g} ... {:g} in {}\n", range.min, range.max, info.arrays[info.array].name);
 }
@@ -57,8 +57,8 @@ Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {
   auto kinds = Json::object();
   for (const MeshFileInfo::CellCount& cells : info.kinds) kinds[std::string(cells.kind->name)] = cells.count;
   auto arrays = Json::array();
-  for (const MeshArray& array : info.arrays) {
-    arrays.push_back({{"name", array.name}, {"of", NameOf(array.at)}, {"components", array.components}, {"type", ToString(array.type)}});
+  for (const GridArray& array : info.arrays) {
+    arrays.push_back({{"name", array.name}, {"of", NameOf(array.at)}, {"components", array.components}, {"type", array.TypeText()}});
   }
   return {{"format", info.format},
           {"points", info.points},
@@ -80,7 +80,8 @@ Status RunMeshInfo(const InfoOptions& options) {
   }
   const Result<SourceText> source = ParseSourceText(options.path);
   if (!source.ok()) return source.status();
-  const Result<LoadedMesh> loaded = ReadMesh(source->path, {.array = source->options.array});
+  const Result<LoadedMesh> loaded =
+      ReadMesh(source->path, {.array = source->options.array, .time = source->options.time, .channel = source->options.channel});
   if (!loaded.ok()) return AsInput(loaded.status());
   const ValueRange range = RangeOf(loaded->mesh.values);
   std::cout << (options.json ? MeshJson(*loaded, range).dump(2, ' ', false, Json::error_handler_t::replace) + "\n"

@@ -64,15 +64,23 @@ void AddReadOptions(CLI::App& app, std::initializer_list<std::string_view> excep
   app.option_defaults()->group(kReadingGroup);
   for (const ReadOption& option : ReadOptionList()) {
     if (std::ranges::count(except, option.name) > 0) continue;
+    if (option.value.empty()) {
+      const std::string purpose(option.purpose);
+      app.add_flag(fmt::format("--{}", option.name), purpose);
+      continue;
+    }
     const auto check = [&option](const CLI::results_t& texts) {
-      ReadOptions scratch;
-      if (Status status = option.set(scratch, fmt::format("--{}", option.name), texts.back()); !status.ok()) {
-        throw CLI::ValidationError(status.message());
+      for (const std::string& text : texts) {
+        ReadOptions scratch;
+        if (Status status = option.set(scratch, fmt::format("--{}", option.name), text); !status.ok()) {
+          throw CLI::ValidationError(status.message());
+        }
       }
       return true;
     };
-    app.add_option(fmt::format("--{}", option.name), CLI::callback_t(check), std::string(option.purpose))
-        ->type_name(std::string(option.value));
+    CLI::Option* const added = app.add_option(fmt::format("--{}", option.name), CLI::callback_t(check), std::string(option.purpose))
+                                   ->type_name(std::string(option.value));
+    if (option.of_addresses) added->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   }
   app.option_defaults()->group("Options");
 }
@@ -81,7 +89,8 @@ std::string WithReadOptions(const CLI::App& app, std::string source) {
   for (const ReadOption& option : ReadOptionList()) {
     const CLI::Option* const given = app.get_option_no_throw(fmt::format("--{}", option.name));
     const bool reads = given != nullptr && given->get_group() == kReadingGroup;  // a command may have an option of the same name
-    if (reads && given->count() > 0) source = WithReadOption(source, option.name, given->results().back());
+    if (!reads) continue;
+    for (const std::string& value : given->results()) source = WithReadOption(source, option.name, value);
   }
   return source;
 }

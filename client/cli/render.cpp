@@ -143,7 +143,18 @@ Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& option
 std::string SourceAt(const TurntableOptions& options, int time) {
   if (!options.times) return options.frame.source;
   if (options.frame.connection.local_workers == 0) return NameAtTime(options.frame.source, time);
-  return WithReadOption(options.frame.source, "time", std::to_string(time));
+  return AtTime(options.frame.source, time);
+}
+
+// The times that SOURCE?time=FIRST:LAST names are those of --time.
+Result<TurntableOptions> WithTimesOfSource(TurntableOptions options) {
+  if (options.frame.connection.local_workers == 0) return options;
+  const Result<SourceText> source = ParseSourceText(options.frame.source);
+  if (!source.ok()) return source.status();
+  const std::optional<TimeRange> named = source->options.time;
+  if (named && options.times) return Status::InvalidArgument(fmt::format("'{}': time is given twice", options.frame.source));
+  if (named && named->count() > 1) options.times = named;
+  return options;
 }
 
 // Where frame `index` goes.
@@ -208,7 +219,10 @@ Status RunRender(const RenderOptions& options) {
   return Status::Ok();
 }
 
-Status RunTurntable(const TurntableOptions& options) {
+Status RunTurntable(const TurntableOptions& given) {
+  const Result<TurntableOptions> with_times = WithTimesOfSource(given);
+  if (!with_times.ok()) return with_times.status();
+  const TurntableOptions& options = *with_times;
   if (Status status = CheckTurntable(options); !status.ok()) return status;
   const Time start = MonotonicNow();
   const Result<std::vector<FrameJob>> jobs = TurntableJobs(options);

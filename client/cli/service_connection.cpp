@@ -21,12 +21,13 @@ namespace {
 
 constexpr const char* kLocalDataset = "volume";
 
-Result<LayeredVolume> LoadInput(const std::string& path, const LayerFiles& files, const TellRead& tell) {
+Result<LoadedData> LoadInput(const std::string& path, const LayerFiles& files, const TellRead& tell) {
   Result<LoadedVolume> loaded = ReadInputVolume(path, tell);
   if (!loaded.ok()) return loaded.status();
+  PrepareToShow(path, *loaded);
   Result<Layers> layers = ReadLayers(files, loaded->volume->description.geometry);
   if (!layers.ok()) return AsInput(layers.status());
-  return LayeredVolume{.volume = std::move(loaded->volume), .layers = *std::move(layers)};
+  return LoadedData{{std::move(loaded->volume), *std::move(layers)}, std::move(loaded->exact)};
 }
 
 // Of a process that does everything. What it takes before it does anything counts once.

@@ -4,6 +4,7 @@
 
 #include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
@@ -56,7 +57,7 @@ Json FrameJson(const FrameRecord& frame, const FrameSummary& summary) {
 }  // namespace
 
 std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord>& frames) {
-  Json json = {{"source", options.source},
+  Json json = {{"source", ShownSource(options.source)},
                {"renderer", frames.empty() ? options.request.renderer : frames.back().statistics.renderer},
                {"size", {options.request.size.width, options.request.size.height}}};
   FrameSummary all;

@@ -33,8 +33,10 @@ constexpr const char* kGatewayProgram = "slabstream-gateway";
 constexpr Duration kHelperStartTimeout = seconds(60);
 constexpr Duration kHelperPatience = seconds(15);  // for a service to end its processes
 
-// A name of a catalogue for a file: letters, digits, '-', '_' and '.', without its ending.
-std::string DatasetName(const std::filesystem::path& path) {
+// A name of a catalogue for a source: letters, digits, '-', '_' and '.', without its ending.
+std::string DatasetName(const std::string& source) {
+  const Result<SourceText> parsed = ParseSourceText(source);
+  const std::filesystem::path path = std::filesystem::absolute(parsed.ok() ? parsed->path : source);
   std::string name = path.filename().string();
   if (name.empty()) name = path.parent_path().filename().string();
   name = FileNameOf(name.substr(0, name.find('.', 1)));
@@ -48,7 +50,7 @@ bool IsVolumeFile(const std::string& source) {
 
 // The file of a source, or of a layer with what follows its name, with an absolute path.
 std::string AbsoluteSource(const std::string& source) {
-  if (IsUrl(source)) return source;
+  if (!SchemeOf(source).empty()) return source;
   const std::size_t options = source.find('?');
   const std::string path = std::filesystem::absolute(source.substr(0, options)).string();
   return options == std::string::npos ? path : path + source.substr(options);
@@ -56,8 +58,7 @@ std::string AbsoluteSource(const std::string& source) {
 
 // NAME=PATH as --data takes it, with absolute paths.
 std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
-  std::string entry =
-      fmt::format("{}={}", DatasetName(std::filesystem::absolute(source.substr(0, source.find('?')))), AbsoluteSource(source));
+  std::string entry = fmt::format("{}={}", DatasetName(source), AbsoluteSource(source));
   if (!layers.labels.empty()) {
     layers.labels = AbsoluteSource(layers.labels);
     if (!layers.label_colors.empty()) layers.label_colors = AbsoluteSource(layers.label_colors);
@@ -69,7 +70,7 @@ std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
 
 // What the viewer shows first: of several times of a file the first one.
 std::string ShownDataset(const std::string& source) {
-  const std::string name = DatasetName(std::filesystem::absolute(source.substr(0, source.find('?'))));
+  const std::string name = DatasetName(source);
   const Result<SourceText> parsed = ParseSourceText(source);
   const bool several = parsed.ok() && parsed->options.time && parsed->options.time->count() > 1;
   return several ? NameAtTime(name, parsed->options.time->first) : name;

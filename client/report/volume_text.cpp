@@ -3,10 +3,13 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "common/base/printable.h"
+#include "common/volume/exact_value.h"
 
 namespace slabstream {
 namespace {
@@ -15,6 +18,27 @@ using Json = nlohmann::ordered_json;
 
 Json Vector(const Vec3& v) { return Json::array({v.x, v.y, v.z}); }
 Json OrNull(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+// A data value that is a whole number of at most 64 bits.
+std::optional<Int128> WholeValue(const VolumeSample& sample) {
+  constexpr double kEnd = 0x1p64;
+  if (!sample.value || std::abs(*sample.value) > kEnd || std::trunc(*sample.value) != *sample.value) return std::nullopt;
+  return Int128(*sample.value) + sample.rest;
+}
+
+// A whole number is one in JSON, too.
+Json ValueJson(const VolumeSample& sample) {
+  const std::optional<Int128> whole = WholeValue(sample);
+  if (whole && *whole >= 0 && *whole <= std::numeric_limits<std::uint64_t>::max()) return std::uint64_t(*whole);
+  if (whole && *whole < 0 && *whole >= std::numeric_limits<std::int64_t>::min()) return std::int64_t(*whole);
+  return OrNull(sample.value);
+}
+
+std::string ValueText(const VolumeSample& sample) {
+  if (!sample.value) return "value not finite";
+  if (const std::optional<Int128> whole = WholeValue(sample)) return fmt::format("value {}", *whole);
+  return fmt::format("value {:g}", *sample.value);
+}
 
 }  // namespace
 
@@ -51,7 +75,7 @@ Json SampleJson(const VolumeSample& sample) {
   Json json = {{"at", Vector(sample.at)}, {"inside", sample.inside}, {"voxel", nullptr}, {"value", nullptr}};
   if (!sample.inside) return json;
   json["voxel"] = {sample.voxel.x, sample.voxel.y, sample.voxel.z};
-  json["value"] = OrNull(sample.value);
+  json["value"] = ValueJson(sample);
   if (sample.label) json["label"] = {{"value", sample.label->value}, {"name", sample.label->name}};
   if (sample.overlay) json["overlay"] = *sample.overlay;
   json["interpolated"] = OrNull(sample.interpolated);
@@ -83,7 +107,7 @@ std::string SampleText(const VolumeSample& sample) {
   std::string text = fmt::format("{:g} {:g} {:g}", sample.at.x, sample.at.y, sample.at.z);
   if (!sample.inside) return text + "  outside the volume";
   text += fmt::format("  voxel {} {} {}", sample.voxel.x, sample.voxel.y, sample.voxel.z);
-  text += sample.value ? fmt::format("  value {:g}", *sample.value) : "  value not finite";
+  text += "  " + ValueText(sample);
   if (sample.label)
     text += fmt::format("  label {}{}{}", sample.label->value, sample.label->name.empty() ? "" : " ", Printable(sample.label->name));
   if (sample.overlay) text += fmt::format("  overlay {:g}", *sample.overlay);

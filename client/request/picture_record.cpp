@@ -11,6 +11,7 @@
 #include "client/request/shell_word.h"
 #include "common/base/version.h"
 #include "common/wire/request_json.h"
+#include "data/volume_io/read_options.h"
 #include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
@@ -145,7 +146,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
   Json made = Json::parse(RequestToJson(request));
   made.erase("dataset");  // the source says it
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
-               {"source", source},
+               {"source", ShownSource(source)},
                {"request", std::move(made)},
                {"picture", FormatJson(format)},
                {"geometry", GeometryJson(geometry)}};

@@ -64,15 +64,18 @@ bool NamesVolumeFile(const std::string& text) { return Exists(text) || Exists(te
 Result<VolumeArgument> ParseVolumeArgument(const std::string& argument, const std::string& text, bool is_file) {
   const VolumeArgument whole{text, "", {}};
   const std::size_t colon = text.rfind(':');
-  const auto is_port = [](std::string_view after) { return after.find_first_not_of("0123456789") == std::string_view::npos; };
-  const bool of_address =
-      IsUrl(text) && colon != std::string::npos && (colon < text.rfind('/') || is_port(std::string_view(text).substr(colon + 1)));
+  // A colon of the scheme, of a port, or of how other programs spell an address.
+  const std::size_t host = SchemeOf(text).empty() ? text.size() : text.rfind("://") + 3;
+  const std::size_t bar = text.find('|');
+  const bool of_spelling = bar < colon && colon < text.find('?', bar);
+  const bool of_address = colon != std::string::npos && host < text.size() && (of_spelling || colon < text.find_first_of("/?,", host));
   std::error_code error;
   if (colon == std::string::npos || of_address || (is_file && std::filesystem::exists(text, error))) return whole;
   VolumeArgument parts{text.substr(0, colon), text.substr(colon + 1), {}};
   if (is_file && !Exists(parts.volume)) return whole;
   auto transfer = ParseTransfer(fmt::format("{} '{}':", argument, text), parts.transfer_text);
   if (!transfer.ok() && !is_file && !NamesFile(parts.transfer_text)) return whole;
+  if (!transfer.ok() && text.find('?') < colon && Exists(text)) return whole;  // the value of an option may hold a colon
   if (!transfer.ok()) return transfer.status();
   parts.transfer = *std::move(transfer);
   return parts;

@@ -6,6 +6,8 @@
 #include <atomic>
 #include <string>
 
+#include "common/base/url.h"
+
 namespace slabstream {
 namespace {
 
@@ -46,6 +48,6 @@ void InitLog(std::string_view process, LogLevel level) {
 
 LogLevel LeastLogLevel() { return least_level; }
 
-void Log(LogLevel level, std::string_view message) { Logger().log(ToSpdlog(level), spdlog::string_view_t(message.data(), message.size())); }
+void Log(LogLevel level, std::string_view message) { Logger().log(ToSpdlog(level), "{}", Redacted(std::string(message))); }
 
 }  // namespace slabstream

@@ -17,6 +17,7 @@
 #include "common/base/large_buffers.h"
 #include "common/base/log.h"
 #include "common/base/open_files.h"
+#include "common/base/url.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
 #include "common/cli/man_page.h"
@@ -29,7 +30,7 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   try {
     exit_status = program();
   } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << std::endl;
+    std::cerr << name << ": " << Redacted(error.what()) << std::endl;
   }
   const Status written = FlushOutput();
   if (exit_status == 0) exit_status = Finish(name, written);
@@ -37,12 +38,12 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   return exit_status;
 }
 
-void PrintNote(const std::string& message) { std::cerr << "slabstream: note: " << message << std::endl; }
-void PrintWarning(const std::string& message) { std::cerr << "slabstream: warning: " << message << std::endl; }
+void PrintNote(const std::string& message) { std::cerr << "slabstream: note: " << Redacted(message) << std::endl; }
+void PrintWarning(const std::string& message) { std::cerr << "slabstream: warning: " << Redacted(message) << std::endl; }
 
 int Finish(const std::string& who, const Status& status) {
   if (status.ok()) return 0;
-  std::string message = status.message();
+  std::string message = Redacted(status.message());
   std::replace(message.begin(), message.end(), '\n', ' ');
   std::cerr << who << ": " << message << std::endl;
   switch (status.code()) {

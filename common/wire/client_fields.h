@@ -356,6 +356,7 @@ void Fields(auto& io, Is<VolumeSample> auto& m) {  // all but value, overlay and
   using P = v1::VolumeSample;
   io.Message("at", m.at, &P::at, &P::mutable_at);
   io.Any(m.inside, &P::inside, &P::set_inside);
+  io.Any(m.rest, &P::rest, &P::set_rest);
   io.Message("voxel", m.voxel, &P::voxel, &P::mutable_voxel);
   io.Optional("label", m.label, &P::has_label, &P::label, &P::mutable_label);
 }

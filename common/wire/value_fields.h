@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "common/base/url.h"
 #include "common/image/run_image.h"
 #include "common/volume/layers.h"
 #include "common/wire/client_messages.h"
@@ -162,7 +163,7 @@ inline void Read(const v1::LayerTypes& in, LayerTypes& out, Checker& check) {
 
 inline void Write(const Status& in, v1::Status& out) {
   out.set_code(static_cast<v1::StatusCode>(static_cast<int>(in.code())));
-  out.set_message(WireText(in.message(), kMaxTextBytes));
+  out.set_message(WireText(Redacted(in.message()), kMaxTextBytes));
 }
 inline void Read(const v1::Status& in, Status& out, Checker& check) {
   const StatusCode code = check.OneOf("code", in.code(), StatusCode::kInvalidArgument, StatusCode::kInternal);

@@ -67,7 +67,9 @@ VolumeSample SampleAtVoxel(const ProbeVolume& volume, const VolumeSummary& summa
   sample.voxel = voxel;
   const auto finite = [](double value) { return std::isfinite(value) ? std::optional<double>(value) : std::nullopt; };
   const ValueMapping& mapping = summary.description.mapping;
-  sample.value = finite(mapping.FromStored(volume.StoredAt(voxel)));
+  const ExactValue value = volume.exact ? volume.exact(voxel) : ExactValue{mapping.FromStored(volume.StoredAt(voxel))};
+  sample.value = finite(value.value);
+  sample.rest = value.rest;
   sample.interpolated = finite(mapping.FromStored(volume.Interpolated(DataPoint(summary.description.geometry, at))));
   if (volume.labels != nullptr && summary.label_table != nullptr) {
     const std::uint32_t number = volume.LabelNumberAt(voxel);

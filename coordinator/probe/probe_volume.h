@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/volume/bricks.h"
+#include "common/volume/exact_value.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
 #include "coordinator/probe/volume_sample.h"
@@ -33,6 +34,8 @@ class ProbedVoxels {
 struct ProbeVolume {
   ProbedVoxels voxels;
   const BrickedVoxels *labels = nullptr, *overlay = nullptr;  // null: there is no such layer
+  // The data value of a voxel inside the volume, where its stored sample may be rounded. Null: it never is.
+  std::function<ExactValue(const Index3& voxel)> exact = nullptr;
 
   // Of a voxel inside the volume. Stored samples of a layer are numbers of labels and data values.
   double StoredAt(const Index3& voxel) const;

@@ -23,6 +23,7 @@ struct VolumeSample {
   std::optional<LabelAt> label = {};        // if the dataset has labels
   std::optional<double> overlay = {};       // data value of its overlay; none: there is none here
   std::optional<double> interpolated = {};  // data value at the point itself, trilinear (ProbeVolume::Interpolated); none: it is not finite
+  std::int64_t rest = 0;                    // of `value`, as of ExactValue
   friend bool operator==(const VolumeSample&, const VolumeSample&) = default;
 };
 

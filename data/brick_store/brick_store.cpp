@@ -44,7 +44,7 @@ class StoredSource : public VolumeSource {
 
 // "scan-5f3a...": the beginning is for people.
 Result<std::string> NameOf(const SourceText& text, const std::string& source, const SourceInfo& stream) {
-  constexpr int kLayout = 1;  // to be raised when stores are written otherwise
+  constexpr int kLayout = 2;  // to be raised when stores are written otherwise
   constexpr std::size_t kMostOfStem = 40;
   const Result<std::uint64_t> version = VersionOf(stream.files);
   if (!version.ok()) return version.status();

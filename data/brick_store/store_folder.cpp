@@ -118,11 +118,11 @@ std::uint64_t StoreFolder::RoomFor(const std::string& name) const {
 }
 
 void StoreFolder::MakeRoom(const std::string& name, std::uint64_t bytes) const {
-  struct Store {
+  struct OtherStore {
     std::string name;
     fs::file_time_type used;
   };
-  std::vector<Store> stores;
+  std::vector<OtherStore> stores;
   std::error_code error;
   for (fs::directory_iterator each(path_, error), end; !error && each != end; each.increment(error)) {
     const std::string file = each->path().filename().string();
@@ -131,8 +131,8 @@ void StoreFolder::MakeRoom(const std::string& name, std::uint64_t bytes) const {
     const fs::file_time_type used = fs::last_write_time(PathOf(file) + std::string(kLockEnding), without_lock);
     stores.push_back({file, without_lock ? fs::file_time_type::min() : used});
   }
-  std::ranges::sort(stores, {}, &Store::used);
-  for (const Store& store : stores) {
+  std::ranges::sort(stores, {}, &OtherStore::used);
+  for (const OtherStore& store : stores) {
     if (RoomFor(name) >= bytes) return;
     const std::string file = PathOf(store.name) + std::string(kLockEnding);
     const Lock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));

@@ -25,9 +25,15 @@ class ChunkCodec {
 
   // DataLoss: the bytes are damaged. ResourceExhausted: they say that they hold more than `most`.
   virtual Result<Bytes> Decode(Bytes packed, std::uint64_t most) const = 0;
+
+  // The most bytes of which `bytes` decoded ones are made, if what packs them packs well. Codecs add checksums and headers.
+  virtual std::uint64_t MostEncoded(std::uint64_t bytes) const { return bytes + 4096; }
 };
 
 using CodecChain = std::vector<std::shared_ptr<const ChunkCodec>>;  // in the order in which a writer applies them
+
+// The same of a chain.
+std::uint64_t MostEncoded(const CodecChain& chain, std::uint64_t bytes);
 
 // Exactly `bytes` decoded bytes. DataLoss: damaged, or another number of bytes.
 Result<Bytes> DecodeChain(const CodecChain& chain, Bytes packed, std::uint64_t bytes);

@@ -29,17 +29,6 @@ constexpr Remainders MakeRemainders() {
 }
 constexpr Remainders kRemainders = MakeRemainders();
 
-class CheckedSum : public ChunkCodec {
- public:
-  Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
-    Result<SummedBytes> summed = TakeSum("crc32c", std::move(packed), most);
-    if (!summed.ok()) return summed.status();
-    const std::uint32_t sum = Crc32c(summed->bytes.span());
-    if (summed->sum == sum) return std::move(summed->bytes);
-    return Status::DataLoss(fmt::format("damaged: its CRC-32C is {:08x}, stated is {:08x}", sum, summed->sum));
-  }
-};
-
 }  // namespace
 
 std::uint32_t Crc32c(std::span<const std::byte> bytes) {
@@ -54,7 +43,5 @@ std::uint32_t Crc32c(std::span<const std::byte> bytes) {
     remainder = (remainder >> 8) ^ kRemainders[0][(remainder ^ std::to_integer<std::uint32_t>(byte)) & 0xff];
   return ~remainder;
 }
-
-SharedCodec Crc32cCodec() { return std::make_shared<CheckedSum>(); }
 
 }  // namespace slabstream

@@ -15,11 +15,11 @@
 
 namespace slabstream {
 
-// The first bytes, without a copy.
-inline Bytes FirstBytes(Bytes bytes, std::size_t count) {
+// `count` bytes from `begin` on, without a copy.
+inline Bytes PartOf(Bytes bytes, std::size_t begin, std::size_t count) {
   auto whole = std::make_shared<const Bytes>(std::move(bytes));
-  const std::span<const std::byte> first = whole->span().first(count);
-  return {std::move(whole), first};
+  const std::span<const std::byte> part = whole->span().subspan(begin, count);
+  return {std::move(whole), part};
 }
 
 inline Status DamagedBytes(std::string_view codec) { return Status::DataLoss(fmt::format("damaged: these are no bytes of {}", codec)); }
@@ -35,19 +35,19 @@ inline std::uint32_t Little32(std::span<const std::byte> bytes) {
   return number;
 }
 
-// Bytes with a checksum of 32 bits behind them, the lowest byte first.
+// Bytes with a checksum of 32 bits behind them or in front of them, its lowest byte first.
 struct SummedBytes {
   Bytes bytes;
   std::uint32_t sum = 0;  // as it stands there
 };
-// `codec`: for messages. DataLoss: there is no room for a checksum; ResourceExhausted: more than `most` bytes stand before it.
-inline Result<SummedBytes> TakeSum(std::string_view codec, Bytes packed, std::uint64_t most) {
+// `codec`: for messages. DataLoss: there is no room for a checksum; ResourceExhausted: more than `most` bytes are beside it.
+inline Result<SummedBytes> TakeSum(std::string_view codec, Bytes packed, std::uint64_t most, bool in_front = false) {
   constexpr std::size_t kSumBytes = 4;
   if (packed.size() < kSumBytes) return DamagedBytes(codec);
   const std::size_t count = packed.size() - kSumBytes;
   if (count > most) return TooManyBytes(codec, count, most);
-  const std::uint32_t sum = Little32(packed.span().subspan(count));
-  return SummedBytes{FirstBytes(std::move(packed), count), sum};
+  const std::uint32_t sum = Little32(packed.span().subspan(in_front ? 0 : count));
+  return SummedBytes{PartOf(std::move(packed), in_front ? kSumBytes : 0, count), sum};
 }
 
 }  // namespace slabstream

@@ -49,8 +49,8 @@ class Inflate : public ChunkCodec {
 
   Result<Bytes> Decode(Bytes packed, std::uint64_t most) const override {
     // Deflate makes at most 258 bytes of 2 bits. One more than allowed tells that there are more.
-    constexpr std::uint64_t kMostRatio = 1032;
-    const std::uint64_t limit = packed.size() > most / kMostRatio ? most : packed.size() * kMostRatio;
+    constexpr std::uint64_t kDeflateRatio = 1032;
+    const std::uint64_t limit = packed.size() > most / kDeflateRatio ? most : packed.size() * kDeflateRatio;
     UnwrittenVector<std::byte> bytes(limit + 1);
     std::span<const std::byte> in = packed.span();
     std::span<std::byte> out = bytes;

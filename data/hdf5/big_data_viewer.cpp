@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/base/parse_number.h"
+#include "common/base/printable.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
 #include "data/sources/view_setups.h"
@@ -15,8 +16,6 @@
 
 namespace slabstream {
 namespace {
-
-bool IsBigDataViewer(Hdf5File& file) { return file.Has("/s00/resolutions") && file.Has("/t00000"); }
 
 // Names of a letter and digits: "s00".
 std::vector<std::string> Numbered(const std::vector<std::string>& names, char letter) {
@@ -27,8 +26,29 @@ std::vector<std::string> Numbered(const std::vector<std::string>& names, char le
   return found;
 }
 
-// BigDataViewer keeps unsigned samples of 16 bits in signed ones, which is what Java has.
-std::optional<SampleType> Meant(SampleType type) { return type == SampleType::kInt16 ? std::optional(SampleType::kUint16) : std::nullopt; }
+bool IsBigDataViewer(Hdf5File& file) {
+  const Result<std::vector<std::string>> names = file.Names("/");
+  if (!names.ok()) return false;
+  const std::vector<std::string> setups = Numbered(*names, 's');
+  return !setups.empty() && file.Has("/" + setups.front() + "/resolutions") && !Numbered(*names, 't').empty();
+}
+
+// Since 2023 a setup says what its samples are. Before, all were unsigned samples of 16 bits in signed ones, which is what Java has.
+Result<SampleType> Meant(Hdf5File& file, const std::string& setup, SampleType stored) {
+  const std::optional<std::string> text = file.Text("/" + setup, "dataType");
+  if (!text) return stored == SampleType::kInt16 ? SampleType::kUint16 : stored;
+  const std::optional<SampleType> meant = SampleTypeNamed(*text);
+  const auto is_float = [](SampleType type) { return ToString(type).starts_with("float"); };
+  if (meant && BytesPerSample(*meant) == BytesPerSample(stored) && is_float(*meant) == is_float(stored)) return *meant;
+  return Status::InvalidArgument(
+      fmt::format("{}: setup {} has the dataType '{}', but holds {}", file.path(), setup, Printable(*text), ToString(stored)));
+}
+
+// What users should know of a series whose numbers are not 0, 1, 2, ...
+void NoteTime(const std::vector<std::string>& times, std::int64_t time, SourceInfo& info) {
+  const std::string& name = times[std::size_t(time)];
+  if (ParseNumber<std::int64_t>(name.substr(1)) != time) info.notes.push_back(fmt::format("time {} is {} of the file", time, name));
+}
 
 Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
   Pyramid pyramid{.info = {.format = "BigDataViewer HDF5", .files = {file->path()}}};
@@ -38,6 +58,8 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   pyramid.info.times = int(times.size());
   const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times, options);
   if (!time.ok()) return time.status();
+  pyramid.info.time = int(*time);
+  NoteTime(times, *time, pyramid.info);
   const Result<ViewSetupFile> xml = ReadViewSetupsBeside(file->path());
   if (!xml.ok()) return xml.status();
   if (!xml->path.empty()) pyramid.info.files.push_back(xml->path);
@@ -64,12 +86,21 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   for (std::size_t level = 0; level < factors->size() / 3; ++level) {
     const std::string path = fmt::format("/{}/{}/{}/cells", times[std::size_t(*time)], name, level);
     Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(path);
+    if (dataset.status().code() == StatusCode::kNotFound) {
+      return Status::InvalidArgument(fmt::format("{}: setup {} has no samples of level {} at time {}: {}", file->path(), name, level, *time,
+                                                 dataset.status().message()));
+    }
     if (!dataset.ok()) return dataset.status();
     if ((*dataset)->size().size() != 3) {
       return Status::InvalidArgument(file->Named(path) + fmt::format(" has {} axes, must have 3", (*dataset)->size().size()));
     }
-    const std::optional<SampleType> meant = Meant((*dataset)->type());
-    const Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, meant);
+    const SampleType stored = (*dataset)->type();
+    const Result<SampleType> meant = Meant(*file, name, stored);
+    if (!meant.ok()) return meant.status();
+    if (level == 0 && *meant != stored) {
+      pyramid.info.notes.push_back(fmt::format("samples of {} are taken for {}", ToString(stored), ToString(*meant)));
+    }
+    const Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, *meant);
     if (!array.ok()) return array.status();
     PyramidLevel each{.array = *array, .at = {0, 0, 0}};
     for (int axis = 0; axis < 3; ++axis) {

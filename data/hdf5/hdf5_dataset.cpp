@@ -11,7 +11,7 @@
 namespace slabstream {
 namespace {
 
-std::string_view NameOf(H5T_class_t kind) {
+std::string NameOf(H5T_class_t kind) {
   switch (kind) {
     case H5T_INTEGER: return "integers";
     case H5T_FLOAT: return "floats";
@@ -28,6 +28,35 @@ std::string_view NameOf(H5T_class_t kind) {
   }
 }
 
+// Names of the members of a compound or of an enumeration, the first ones if there are many.
+std::vector<std::string> MembersOf(hid_t type) {
+  constexpr int kMost = 8;
+  std::vector<std::string> members;
+  for (int i = 0; i < std::min(H5Tget_nmembers(type), kMost); ++i) {
+    char* const name = H5Tget_member_name(type, unsigned(i));
+    members.emplace_back(name == nullptr ? "" : Printable(std::string(name)).substr(0, 64));
+    (void)H5free_memory(name);
+  }
+  return members;
+}
+
+std::string NamesOfMembers(hid_t type) {
+  const std::vector<std::string> members = MembersOf(type);
+  const bool complex = members == std::vector<std::string>{"r", "i"} || members == std::vector<std::string>{"real", "imag"};
+  return fmt::format("{} (members {})", complex ? "complex numbers" : "compounds", fmt::join(members, ", "));
+}
+
+// Of truth values, as h5py writes them.
+bool IsTruth(hid_t enumeration) { return MembersOf(enumeration) == std::vector<std::string>{"FALSE", "TRUE"}; }
+
+// Whether a type of two bytes is the half float of IEEE 754.
+bool IsHalf(hid_t type) {
+  std::size_t sign = 0, exponent = 0, exponent_bits = 0, mantissa = 0, mantissa_bits = 0;
+  return H5Tget_fields(type, &sign, &exponent, &exponent_bits, &mantissa, &mantissa_bits) >= 0 && H5Tget_size(type) == 2 && sign == 15 &&
+         exponent == 10 && exponent_bits == 5 && mantissa == 0 && mantissa_bits == 10 && H5Tget_ebias(type) == 15 &&
+         H5Tget_norm(type) == H5T_NORM_IMPLIED;
+}
+
 std::optional<SampleType> IntegerType(std::size_t bytes, bool is_signed) {
   switch (bytes) {
     case 1: return is_signed ? SampleType::kInt8 : SampleType::kUint8;
@@ -38,23 +67,6 @@ std::optional<SampleType> IntegerType(std::size_t bytes, bool is_signed) {
   }
 }
 
-hid_t NativeType(SampleType type) {
-  switch (type) {
-    case SampleType::kInt8: return H5T_NATIVE_INT8;
-    case SampleType::kUint8: return H5T_NATIVE_UINT8;
-    case SampleType::kInt16: return H5T_NATIVE_INT16;
-    case SampleType::kUint16: return H5T_NATIVE_UINT16;
-    case SampleType::kInt32: return H5T_NATIVE_INT32;
-    case SampleType::kUint32: return H5T_NATIVE_UINT32;
-    case SampleType::kInt64: return H5T_NATIVE_INT64;
-    case SampleType::kUint64: return H5T_NATIVE_UINT64;
-    case SampleType::kFloat32: return H5T_NATIVE_FLOAT;
-    case SampleType::kFloat16:  // libhdf5 has no such type of its own
-    case SampleType::kFloat64: break;
-  }
-  return H5T_NATIVE_DOUBLE;
-}
-
 }  // namespace
 
 Hdf5Dataset::~Hdf5Dataset() {
@@ -62,27 +74,30 @@ Hdf5Dataset::~Hdf5Dataset() {
   (void)H5Dclose(id_);
 }
 
-Status Hdf5Dataset::DescribeType() {
-  const Hdf5Id type(H5Dget_type(id_), H5Tclose);
+Status Hdf5Dataset::DescribeType(hid_t stored) {
+  const bool enumerated = H5Tget_class(stored) == H5T_ENUM, truth = enumerated && IsTruth(stored);
+  const Hdf5Id type(enumerated ? H5Tget_super(stored) : H5Tcopy(stored), H5Tclose);  // of its numbers
   if (!type.ok()) return Refused("has no type: " + Hdf5Complaint());
   const H5T_class_t kind = H5Tget_class(type.id());
   const std::size_t bytes = H5Tget_size(type.id());
   const auto is = [&](hid_t other) { return H5Tequal(type.id(), other) > 0; };
+  const bool whole = kind == H5T_INTEGER || kind == H5T_BITFIELD;
+  const std::size_t used = whole || kind == H5T_FLOAT ? H5Tget_precision(type.id()) : 8 * bytes;
   std::optional<SampleType> found;
-  if (kind == H5T_INTEGER && H5Tget_precision(type.id()) == 8 * bytes) {
-    found = IntegerType(bytes, H5Tget_sign(type.id()) == H5T_SGN_2);
-    big_endian_ = H5Tget_order(type.id()) == H5T_ORDER_BE;
-  } else if (kind == H5T_FLOAT) {
-    big_endian_ = is(H5T_IEEE_F32BE) || is(H5T_IEEE_F64BE);
-    if (is(H5T_IEEE_F32LE) || is(H5T_IEEE_F32BE)) found = SampleType::kFloat32;
-    if (is(H5T_IEEE_F64LE) || is(H5T_IEEE_F64BE)) found = SampleType::kFloat64;
-  }
+  if (whole && used == 8 * bytes) found = IntegerType(bytes, !truth && kind == H5T_INTEGER && H5Tget_sign(type.id()) == H5T_SGN_2);
+  if (is(H5T_IEEE_F32LE) || is(H5T_IEEE_F32BE)) found = SampleType::kFloat32;
+  if (is(H5T_IEEE_F64LE) || is(H5T_IEEE_F64BE)) found = SampleType::kFloat64;
+  if (kind == H5T_FLOAT && IsHalf(type.id())) found = SampleType::kFloat16;
   if (!found) {
-    const std::size_t used = kind == H5T_INTEGER ? H5Tget_precision(type.id()) : 8 * bytes;
-    return Refused(fmt::format("holds {} of {} bits{}; supported: integers of 8, 16, 32 and 64 bits and floats of 32 and 64", NameOf(kind),
-                               8 * bytes, used == 8 * bytes ? "" : fmt::format(", of which {} are used", used)));
+    return Refused(
+        fmt::format("holds {} of {} bits{}; supported: integers, enumerations and bit fields of 8, 16, 32 and 64 bits and floats "
+                    "of 16, 32 and 64",
+                    kind == H5T_COMPOUND ? NamesOfMembers(type.id()) : NameOf(kind), 8 * bytes,
+                    used == 8 * bytes ? "" : fmt::format(", of which {} are used", used)));
   }
   type_ = *found;
+  big_endian_ = H5Tget_order(type.id()) == H5T_ORDER_BE;
+  enumeration_ = enumerated && !truth;
   return Status::Ok();
 }
 
@@ -136,18 +151,20 @@ Status Hdf5Dataset::Describe() {
   const Hdf5Id space(H5Dget_space(id_), H5Sclose);
   std::array<hsize_t, H5S_MAX_RANK> size{};
   const int axes = space.ok() ? H5Sget_simple_extent_dims(space.id(), size.data(), nullptr) : -1;
-  if (axes < 1) return Refused("has no axes");
+  if (axes < 1) return Refused("has no axes: it is one value, or none");
   if (axes > int(kMaxArrayAxes)) return Refused(fmt::format("has {} axes, must have at most {}", axes, kMaxArrayAxes));
   size_.assign(size.begin(), size.begin() + axes);
-  if (std::ranges::find(size_, 0U) != size_.end()) return Refused("is empty");
+  if (std::ranges::find(size_, 0U) != size_.end()) return Refused(fmt::format("is empty: it is of {}", fmt::join(size_, " x ")));
 
-  if (Status status = DescribeType(); !status.ok()) return status;
+  const Hdf5Id type(H5Dget_type(id_), H5Tclose);
+  if (!type.ok()) return Refused("has no type: " + Hdf5Complaint());
+  if (Status status = DescribeType(type.id()); !status.ok()) return status;
   if (Status status = DescribeLayout(creation.id()); !status.ok()) return status;
 
   fill_.assign(BytesPerSample(type_), std::byte{0});
   H5D_fill_value_t fill{};
   if (H5Pfill_value_defined(creation.id(), &fill) >= 0 && fill == H5D_FILL_VALUE_USER_DEFINED) {
-    (void)H5Pget_fill_value(creation.id(), NativeType(type_), fill_.data());
+    if (H5Pget_fill_value(creation.id(), type.id(), fill_.data()) >= 0 && big_endian_) SwapByteOrder(type_, fill_);
   }
   return Status::Ok();
 }
@@ -174,9 +191,11 @@ Result<Bytes> Hdf5Dataset::ReadCompact() const {
   }
   AlignedVector<std::byte> samples(bytes);
   const Hdf5Lock lock;
-  if (H5Dread(id_, NativeType(type_), H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()) < 0) {
+  const Hdf5Id type(H5Dget_type(id_), H5Tclose);  // as it is stored
+  if (H5Dread(id_, type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, samples.data()) < 0) {
     return Status::DataLoss(file_->Named(path_) + " cannot be read: " + Hdf5Complaint());
   }
+  if (big_endian_) SwapByteOrder(type_, samples);
   return Bytes(std::move(samples));
 }
 

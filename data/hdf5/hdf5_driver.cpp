@@ -119,6 +119,12 @@ hid_t DriverId() {
 
 bool UseHdf5Driver(hid_t access, int descriptor) { return DriverId() >= 0 && H5Pset_driver(access, DriverId(), &descriptor) >= 0; }
 
+bool ReadHdf5Bytes(hid_t file, std::uint64_t begin, std::span<std::byte> out) {
+  void* handle = nullptr;
+  if (H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) < 0 || handle == nullptr) return false;
+  return Read(&static_cast<OpenFile*>(handle)->library, H5FD_MEM_DEFAULT, H5P_DEFAULT, begin, out.size(), out.data()) >= 0;
+}
+
 std::optional<Hdf5Place> FindHdf5Chunk(hid_t file, hid_t dataset, const hsize_t* offset, std::uint32_t& left_out) {
   void* handle = nullptr;
   if (H5Fget_vfd_handle(file, H5P_DEFAULT, &handle) < 0 || handle == nullptr) return std::nullopt;

@@ -9,8 +9,10 @@
 
 #include <hdf5.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 namespace slabstream {
 
@@ -23,5 +25,8 @@ bool UseHdf5Driver(hid_t access, int descriptor);
 
 // Where the chunk lies whose first element is at `offset`. nullopt: it cannot be found. `left_out`: bits of filters that were not applied.
 std::optional<Hdf5Place> FindHdf5Chunk(hid_t file, hid_t dataset, const hsize_t* offset, std::uint32_t& left_out);
+
+// The bytes of the file from `begin` on. False: it has fewer there, or they cannot be read.
+bool ReadHdf5Bytes(hid_t file, std::uint64_t begin, std::span<std::byte> out);
 
 }  // namespace slabstream

@@ -40,18 +40,27 @@ class Hdf5File : public std::enable_shared_from_this<Hdf5File> {
   static constexpr std::size_t kMostNames = 65536;
   Result<std::vector<std::string>> Names(const std::string& group);
 
-  // Attributes of an object. nullopt: there is none, or it holds something else or too much (64 KiB). Texts may also be stored as an array
+  // Attributes of an object. nullopt: there is none, or it holds something else or too much (64 KiB). A text may also be stored as an array
   // of characters, as Imaris writes them.
   std::optional<std::string> Text(const std::string& object, const std::string& attribute);
+  std::optional<std::vector<std::string>> Texts(const std::string& object, const std::string& attribute);  // one or more
   std::optional<std::vector<double>> Numbers(const std::string& object, const std::string& attribute);
 
-  // Paths of all datasets of at least `axes` axes, sorted. Follows no links but hard ones, and looks at kMostNames objects at most.
-  std::vector<std::string> Datasets(int axes);
+  // Paths of the dimension scales of a dataset, one for each axis, "" where there is none; empty: it has no list of them.
+  std::vector<std::string> DimensionScales(const std::string& dataset);
 
-  // NotFound: there is no such dataset. InvalidArgument: its type, its layout or one of its filters is not supported; the message names
-  // it. ResourceExhausted: chunks of more than kMostChunkBytes.
+  // Paths of datasets. Follows no links but hard ones, and looks at kMostNames objects at most.
+  struct Found {
+    std::vector<std::string> paths;   // of those of at least `axes` axes, sorted
+    std::vector<std::string> closed;  // of objects that cannot be opened
+  };
+  Found Datasets(int axes);
+
+  // NotFound: there is no such dataset. InvalidArgument: a later version of HDF5 wrote it; its type, its layout or one of its filters is
+  // not supported; the message names it. ResourceExhausted: chunks of more than kMostChunkBytes.
   Result<std::shared_ptr<Hdf5Dataset>> Dataset(const std::string& path);
-  // The numbers in a small dataset (at most 8192), row by row. Errors of Dataset; ResourceExhausted.
+  // The numbers in a small dataset (at most kMostSmallNumbers), row by row. Errors of Dataset; ResourceExhausted; DataLoss.
+  static constexpr std::uint64_t kMostSmallNumbers = 1 << 20;
   Result<std::vector<double>> SmallDataset(const std::string& path);
 
   // "a.h5: dataset '/x'"
@@ -91,6 +100,7 @@ class Hdf5Dataset {
   const std::vector<std::uint64_t>& size() const { return size_; }
   SampleType type() const { return type_; }
   bool big_endian() const { return big_endian_; }
+  bool enumeration() const { return enumeration_; }  // of more than truth values, which are uint8
   Layout layout() const { return layout_; }
   const std::vector<std::byte>& fill() const { return fill_; }  // one element, in this machine's byte order
 
@@ -112,7 +122,7 @@ class Hdf5Dataset {
   Hdf5Dataset(std::shared_ptr<Hdf5File> file, std::string path, hid_t id) : file_(std::move(file)), path_(std::move(path)), id_(id) {}
   Status Describe();
   Status DescribeLayout(hid_t creation);
-  Status DescribeType();
+  Status DescribeType(hid_t stored);
   Status Refused(const std::string& why) const { return Status::InvalidArgument(file_->Named(path_) + " " + why); }
 
   const std::shared_ptr<Hdf5File> file_;
@@ -120,7 +130,7 @@ class Hdf5Dataset {
   const hid_t id_;
   std::vector<std::uint64_t> size_, chunk_;
   SampleType type_ = SampleType::kUint8;
-  bool big_endian_ = false, filters_cut_chunks_ = true;
+  bool big_endian_ = false, enumeration_ = false, filters_cut_chunks_ = true;
   Layout layout_ = Layout::kCompact;
   std::vector<Hdf5Filter> filters_;
   std::vector<std::byte> fill_;

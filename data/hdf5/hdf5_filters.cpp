@@ -14,7 +14,28 @@ namespace slabstream {
 namespace {
 
 // Numbers of registered filters: https://github.com/HDFGroup/hdf5_plugins/blob/master/docs/RegisteredFilterPlugins.md
-constexpr int kLzf = 32000, kBlosc = 32001, kLz4 = 32004, kBitShuffle = 32008, kZfp = 32013, kZstd = 32015, kBlosc2 = 32026;
+constexpr int kBzip2 = 307, kLzf = 32000, kBlosc = 32001, kLz4 = 32004, kBitshuffle = 32008, kZstd = 32015, kBitGroom = 32022,
+              kBitRound = 32023;
+struct FilterName {
+  int id;
+  std::string_view name;
+};
+constexpr FilterName kNotSupported[] = {{H5Z_FILTER_SZIP, "szip"},
+                                        {H5Z_FILTER_NBIT, "nbit"},
+                                        {H5Z_FILTER_SCALEOFFSET, "scaleoffset"},
+                                        {32003, "snappy"},
+                                        {32007, "JPEG XR"},
+                                        {32012, "JPEG-LS"},
+                                        {32013, "zfp"},
+                                        {32014, "fpzip"},
+                                        {32016, "B3D"},
+                                        {32017, "SZ"},
+                                        {32018, "FCIDECOMP"},
+                                        {32019, "JPEG"},
+                                        {32024, "SZ3"},
+                                        {32026, "blosc2"},
+                                        {32028, "SPERR"},
+                                        {32030, "FFMPEG"}};
 
 // Four bytes behind the others: Fletcher's checksum of their 16-bit words, big endian ones, as HDF5 computes it.
 class Fletcher32 : public ChunkCodec {
@@ -50,16 +71,22 @@ class Fletcher32 : public ChunkCodec {
 };
 
 std::string_view KnownName(int id) {
-  switch (id) {
-    case H5Z_FILTER_SZIP: return "szip";
-    case H5Z_FILTER_NBIT: return "nbit";
-    case H5Z_FILTER_SCALEOFFSET: return "scaleoffset";
-    case kLz4: return "lz4";
-    case kBitShuffle: return "bitshuffle";
-    case kZfp: return "zfp";
-    case kBlosc2: return "blosc2";
-    default: return "";
-  }
+  const auto* const known = std::ranges::find(kNotSupported, id, &FilterName::id);
+  return known == std::end(kNotSupported) ? "" : known->name;
+}
+
+// Its parameters: two numbers of its version, bytes of an element, elements of a block (0: as many as it takes by itself), and how blocks
+// are packed. nullptr: one of them is not known.
+SharedCodec BitshuffleFilter(const std::vector<unsigned>& values, std::size_t element_bytes) {
+  constexpr unsigned kPlain = 0, kByLz4 = 2, kByZstd = 3, kMostElements = 1U << 26;
+  const auto value = [&](std::size_t number) { return number < values.size() ? values[number] : 0; };
+  if (value(2) != 0) element_bytes = value(2);
+  const unsigned packing = value(4);
+  if (packing == kByLz4) return BlocksCodec({Lz4BlockCodec(), true, element_bytes});
+  if (packing == kByZstd) return BlocksCodec({ZstdCodec(), true, element_bytes});
+  const std::size_t by_itself = std::max<std::size_t>(8192 / element_bytes / 8 * 8, 128);
+  const std::size_t block = value(3) == 0 ? by_itself : value(3);
+  return packing != kPlain || block % 8 != 0 || block > kMostElements ? nullptr : BitshuffleCodec(element_bytes, block);
 }
 
 }  // namespace
@@ -76,11 +103,23 @@ Result<CodecChain> CodecsOf(const std::vector<Hdf5Filter>& filters, std::size_t 
       case kLzf: chain.push_back(LzfCodec()); continue;
       case kBlosc: chain.push_back(BloscCodec()); continue;
       case kZstd: chain.push_back(ZstdCodec()); continue;
+      case kBzip2: chain.push_back(Bzip2Codec()); continue;
+      case kLz4: chain.push_back(BlocksCodec({Lz4BlockCodec()})); continue;
+      case kBitshuffle:
+        chain.push_back(BitshuffleFilter(filter.values, element_bytes));
+        if (chain.back() == nullptr) {
+          return Status::InvalidArgument(
+              fmt::format("{} is packed by bitshuffle with the parameters {}, which are not known", named, fmt::join(filter.values, ", ")));
+        }
+        continue;
+      case kBitGroom:
+      case kBitRound: chain.push_back(ShuffleCodec(1)); continue;  // they rounded samples, and there is nothing to undo
       default: break;
     }
     const std::string name(filter.name.empty() ? KnownName(filter.id) : filter.name);
     return Status::InvalidArgument(
-        fmt::format("{} is packed by the filter {}{}, which is not supported; supported: deflate, shuffle, fletcher32, lzf, blosc and zstd",
+        fmt::format("{} is packed by the filter {}{}, which is not supported; supported: deflate, shuffle, fletcher32, lzf, lz4, bzip2, "
+                    "blosc, zstd and bitshuffle",
                     named, filter.id, name.empty() ? "" : " (" + name + ")"));
   }
   return chain;

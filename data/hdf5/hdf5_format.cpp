@@ -13,7 +13,7 @@ namespace {
 bool IsHdf5(const std::string& path, const ReadOptions&) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;
-  constexpr std::array<std::string_view, 4> kEndings = {".ims", ".h5", ".hdf5", ".he5"};
+  constexpr std::array<std::string_view, 7> kEndings = {".ims", ".h5", ".hdf5", ".he5", ".nc", ".nc4", ".mnc"};
   if (std::ranges::any_of(kEndings, [&](std::string_view ending) { return path.ends_with(ending); })) return true;
   constexpr std::string_view kSignature = "\x89HDF\r\n\x1a\n";
   std::array<char, kSignature.size()> first{};

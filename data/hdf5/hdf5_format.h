@@ -1,4 +1,4 @@
-// HDF5 files as sources: those of Imaris and BigDataViewer, and any dataset by its path.
+// HDF5 files as sources: pyramids of Imaris and BigDataViewer, and datasets as images (hdf5_image.h).
 #pragma once
 
 #include <memory>

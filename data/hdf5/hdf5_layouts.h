@@ -19,7 +19,7 @@ struct Hdf5Layout {
 
 Hdf5Layout Imaris();
 Hdf5Layout BigDataViewerHdf5();
-Hdf5Layout PlainHdf5();  // any dataset of any file
+Hdf5Layout AnyHdf5();  // a dataset of any other file (hdf5_image.h)
 
 // How many names PREFIX0, PREFIX1, ... there are without a gap.
 int CountNumbered(const std::vector<std::string>& names, const std::string& prefix);

@@ -18,8 +18,8 @@ int CountNumbered(const std::vector<std::string>& names, const std::string& pref
 Result<Pyramid> ReadHdf5(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   const Result<std::shared_ptr<Hdf5File>> file = Hdf5File::Open(path);
   if (!file.ok()) return file.status();
-  if (!options.dataset.empty()) return PlainHdf5().read(*file, options, context);
-  const std::array layouts = {Imaris(), BigDataViewerHdf5(), PlainHdf5()};
+  if (!options.dataset.empty()) return AnyHdf5().read(*file, options, context);
+  const std::array layouts = {Imaris(), BigDataViewerHdf5(), AnyHdf5()};
   const auto layout = std::ranges::find_if(layouts, [&](const Hdf5Layout& each) { return each.recognises(**file); });
   return layout->read(*file, options, context);
 }

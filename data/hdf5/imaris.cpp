@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "common/base/log.h"
 #include "common/base/parse_number.h"
 #include "data/hdf5/hdf5_array.h"
 #include "data/hdf5/hdf5_layouts.h"
@@ -22,7 +23,8 @@ bool IsImaris(Hdf5File& file) { return file.Has("/DataSetInfo") && file.Has("/Da
 
 std::optional<double> Number(Hdf5File& file, const std::string& object, const std::string& attribute) {
   const std::optional<std::string> text = file.Text(object, attribute);
-  const std::optional<double> number = text ? ParseNumber<double>(*text) : std::nullopt;
+  std::optional<double> number = text ? ParseNumber<double>(*text) : std::nullopt;
+  if (const auto numbers = file.Numbers(object, attribute); numbers && numbers->size() == 1) number = numbers->front();
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
@@ -51,13 +53,13 @@ std::optional<ValueRange> WindowOf(Hdf5File& file, int channel) {
 }
 
 // z, y, x. Empty: the file does not say.
-std::vector<std::uint64_t> ImageSize(Hdf5File& file, const std::string& group) {
+std::vector<std::uint64_t> ImageSize(Hdf5File& file, const std::string& group, int level) {
   std::vector<std::uint64_t> size;
   for (const char axis : {'Z', 'Y', 'X'}) {
-    const std::string text = file.Text(group, fmt::format("ImageSize{}", axis)).value_or("");
-    const std::optional<std::uint64_t> along = ParseNumber<std::uint64_t>(text);
-    if (!along || *along < 1) return {};
-    size.push_back(*along);
+    std::optional<double> along = Number(file, group, fmt::format("ImageSize{}", axis));
+    if (!along && level == 0) along = Number(file, kImage, std::string(1, axis));
+    if (!along || !(*along >= 1) || *along > kMaxVolumeSide) return {};
+    size.push_back(std::uint64_t(*along));
   }
   return size;
 }
@@ -71,6 +73,7 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
   pyramid.info.times = CountNumbered(*times, "TimePoint ");
   const Result<std::int64_t> time = ChosenVolume(file->path(), pyramid.info.times, options);
   if (!time.ok()) return time.status();
+  pyramid.info.time = int(*time);
 
   const Result<std::vector<std::string>> channels = file->Names(fmt::format("/DataSet/ResolutionLevel 0/TimePoint {}", *time));
   if (!channels.ok()) return channels.status();
@@ -94,7 +97,16 @@ Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& o
     const std::string group = fmt::format("/DataSet/ResolutionLevel {}/TimePoint {}/Channel {}", level, *time, *channel);
     Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(group + "/Data");
     if (!dataset.ok()) return dataset.status();
-    const Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, {}, ImageSize(*file, group));
+    const std::vector<std::uint64_t> stated = ImageSize(*file, group, level);
+    const bool another_type = level > 0 && (*dataset)->type() != pyramid.levels.front().array->shape().type;
+    if (level > 0 && (another_type || stated.empty())) {
+      LogWarning(fmt::format("{}: levels from {} on are left out: {}", file->path(), level,
+                             another_type ? fmt::format("its samples are {}, those before {}", ToString((*dataset)->type()),
+                                                        ToString(pyramid.levels.front().array->shape().type))
+                                          : "it does not say how large its image is"));
+      break;
+    }
+    const Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, {}, stated);
     if (!array.ok()) return array.status();
     const std::vector<std::uint64_t>& size = (*array)->shape().size;
     if (size.size() != 3)

@@ -7,8 +7,11 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
+#include <type_traits>
+#include <unordered_map>
 #include <utility>
 
 #include "common/base/files.h"
@@ -19,6 +22,7 @@
 #include "data/layers/color_table.h"
 #include "data/layers/layer_sampling.h"
 #include "data/open/any_volume.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -110,6 +114,17 @@ Label LookOf(std::uint32_t value, const ColorTable& table) {
   return label;
 }
 
+// What the label volume itself says of its labels.
+ColorTable TableOf(const std::vector<StatedLabel>& looks) {
+  ColorTable table;
+  for (const StatedLabel& look : looks) {
+    if (look.value > kMaxLabelValue) continue;
+    const auto value = std::uint32_t(look.value);
+    table.entries.emplace(value, ColorTable::Entry{look.color.value_or(StandardColor(value)), look.name});
+  }
+  return table;
+}
+
 std::string_view WorldText(World world) {
   return world == World::kPatient ? "a patient" : world == World::kScene ? "a scene with axes of its own" : "no orientation";
 }
@@ -127,70 +142,89 @@ std::shared_ptr<const Volume> AsVolume(const VolumeGeometry& grid, VoxelBlock bl
   return volume;
 }
 
-// The data values of the voxels, ascending, without 0.
-Result<std::vector<std::uint32_t>> ValuesOf(const Volume& labels) {
-  return VisitScalarType(labels.block.type, [&]<class T>(const T*) -> Result<std::vector<std::uint32_t>> {
-    std::vector<bool> met;
-    std::size_t count = 0;
-    const ValueMapping mapping = labels.description.mapping;
-    T last{};
-    bool any = false;
-    for (const T sample : std::span(labels.block.samples<T>(), std::size_t(labels.block.box.voxel_count()))) {
-      if (any && sample == last) continue;  // most voxels have the label of the one before
-      last = sample;
-      any = true;
-      const double value = mapping.FromStored(double(sample));
-      if (!(value >= 0 && value <= kMaxLabelValue) || value != std::floor(value)) {
-        return Status::InvalidArgument(
-            fmt::format("the value {:g} is no label, which is a whole number in [0, {}]", value, kMaxLabelValue));
-      }
-      const auto number = std::size_t(value);
-      if (number >= met.size()) met.resize(number + 1);
-      if (number == 0 || met[number]) continue;
-      met[number] = true;
-      if (++count > kMaxLabels) return Status::InvalidArgument(fmt::format("more than {} labels", kMaxLabels));
-    }
-    std::vector<std::uint32_t> values;
-    for (std::size_t value = 1; value < met.size(); ++value) {
-      if (met[value]) values.push_back(std::uint32_t(value));
-    }
-    return values;
-  });
+// The labels of a volume: their values, ascending, without 0, and of each voxel which of them it has, from 1; 0: none.
+struct FoundLabels {
+  std::vector<std::uint32_t> values;
+  VoxelBlock numbers;  // uint16
+};
+
+// Of a sample that is a data value, or of a data value.
+template <class T>
+std::optional<std::uint32_t> LabelOf(T value) {
+  if constexpr (std::is_integral_v<T>) {
+    return std::in_range<std::uint32_t>(value) && std::uint32_t(value) <= kMaxLabelValue ? std::optional(std::uint32_t(value))
+                                                                                         : std::nullopt;
+  } else {
+    const bool is_label = value >= 0 && value <= double(kMaxLabelValue) && value == std::floor(value);
+    return is_label ? std::optional(std::uint32_t(value)) : std::nullopt;
+  }
 }
 
-Result<Layers> LabelLayer(const Volume& labels, const ColorTable& colors, const VolumeGeometry& grid, const std::string& path) {
-  const auto wrong = [&](const Status& status) { return Status(status.code(), path + ": " + status.message()); };
-  if (Status status = CheckSameWorld(labels.description.geometry, grid); !status.ok()) return wrong(status);
-  const Result<std::vector<std::uint32_t>> values = ValuesOf(labels);
-  if (!values.ok()) return wrong(values.status());
-  auto table = std::make_shared<LabelTable>();
-  std::vector<std::uint16_t> numbers(values->empty() ? 1 : values->back() + 1);  // by value
-  for (const std::uint32_t value : *values) {
-    table->labels.push_back(LookOf(value, colors));
-    numbers[value] = std::uint16_t(table->labels.size());
+template <class T>
+Status NoLabel(T value) {
+  return Status::InvalidArgument(fmt::format("the value {} is no label, which is a whole number in [0, {}]", value, kMaxLabelValue));
+}
+
+Result<FoundLabels> FindLabels(const Volume& labels, const ExactSamples* exact) {
+  FoundLabels found{.values = {}, .numbers = MakeVoxelBlock(labels.block.box, ScalarType::kUint16)};
+  auto* const numbers = found.numbers.samples<std::uint16_t>();
+  const auto count = std::size_t(labels.block.box.voxel_count());
+  // In the order in which they are met.
+  std::unordered_map<std::uint32_t, std::uint16_t> met = {{0, 0}};
+  const Status read = VisitBestSamples(labels, exact, [&]<class T>(const T* samples, const ValueMapping& mapping) {
+    const bool plain = mapping == ValueMapping{};
+    for (std::size_t i = 0; i < count; ++i) {
+      if (i > 0 && samples[i] == samples[i - 1]) {  // most voxels have the label of the one before
+        numbers[i] = numbers[i - 1];
+        continue;
+      }
+      const std::optional<std::uint32_t> value = plain ? LabelOf(samples[i]) : LabelOf(mapping.FromStored(double(samples[i])));
+      if (!value) return plain && std::is_integral_v<T> ? NoLabel(samples[i]) : NoLabel(mapping.FromStored(double(samples[i])));
+      numbers[i] = met.emplace(*value, std::uint16_t(met.size())).first->second;
+      if (met.size() > kMaxLabels + 1) return Status::InvalidArgument(fmt::format("more than {} labels", kMaxLabels));
+    }
+    return Status::Ok();
+  });
+  if (!read.ok()) return read;
+  for (const auto& [value, number] : met) {
+    if (value > 0) found.values.push_back(value);
   }
-  const ScalarType type = values->size() < 256 ? ScalarType::kUint8 : ScalarType::kUint16;
+  std::ranges::sort(found.values);
+  std::vector<std::uint16_t> by_value(met.size());  // by the number as it was met
+  for (std::size_t i = 0; i < found.values.size(); ++i) by_value[met[found.values[i]]] = std::uint16_t(i + 1);
+  for (std::uint16_t& number : std::span(numbers, count)) number = by_value[number];
+  return found;
+}
+
+Result<Layers> LabelLayer(const LoadedVolume& read, const ColorTable& colors, const VolumeGeometry& grid, const std::string& path) {
+  const auto wrong = [&](const Status& status) { return Status(status.code(), path + ": " + status.message()); };
+  const VolumeGeometry& geometry = read.volume->description.geometry;
+  if (Status status = CheckSameWorld(geometry, grid); !status.ok()) return wrong(status);
+  const VolumeDescription numbered{.geometry = geometry, .type = ScalarType::kUint16, .mapping = {}};
+  if (Status status = CheckFitsMemory(numbered.voxel_bytes(), path); !status.ok()) return status;
+  const Result<FoundLabels> found = FindLabels(*read.volume, read.exact.get());
+  if (!found.ok()) return wrong(found.status());
+  auto table = std::make_shared<LabelTable>();
+  for (const std::uint32_t value : found->values) table->labels.push_back(LookOf(value, colors));
+  const ScalarType type = table->labels.size() < 256 ? ScalarType::kUint8 : ScalarType::kUint16;
   const VolumeDescription description{.geometry = grid, .type = type, .mapping = {}};
   if (Status status = CheckFitsMemory(description.voxel_bytes(), path); !status.ok()) return status;
-  const ValueMapping mapping = labels.description.mapping;
   Layers layers;
-  layers.labels =
-      AsVolume(grid, NearestOn(grid, labels, type, [&](double stored) { return numbers[std::size_t(mapping.FromStored(stored))]; }));
+  layers.labels = AsVolume(grid, NearestOn(grid, geometry, found->numbers, type));
   layers.table = std::move(table);
   return layers;
 }
 
 Status AddLabels(const LayerFiles& files, const VolumeGeometry& grid, Layers& layers) {
-  const Result<SourceText> source = ParseSourceText(files.labels);
+  Result<SourceText> source = ParseSourceText(files.labels);
   if (!source.ok()) return source.status();
-  const Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
+  source->options.labels = true;
+  Result<ColorTable> colors = ReadColors(FindLabelFiles(files, source->path));
   if (!colors.ok()) return colors.status();
   const Result<LoadedVolume> read = ReadAnyVolume(source->path, source->options);
   if (!read.ok()) return read.status();
-  if (read->info.straightened) {
-    return Status::InvalidArgument(source->path + ": its axes are not at right angles, and labels cannot be interpolated");
-  }
-  Result<Layers> made = LabelLayer(*read->volume, *colors, grid, source->path);
+  if (*colors == ColorTable{}) colors = TableOf(read->info.looks);
+  Result<Layers> made = LabelLayer(*read, *colors, grid, source->path);
   if (!made.ok()) return made.status();
   layers.labels = made->labels;
   layers.table = made->table;

@@ -2,7 +2,8 @@
 //
 // A label volume holds whole numbers in [0, kMaxLabelValue], at most kMaxLabels different ones beside 0. Its colours are those of the table
 // that is named; else, of a NIfTI file X.nii or X.nii.gz, those of X.nii.lut beside it, with the names of X.nii.txt (a number and a name in
-// each line), as MRIcron has them; else StandardColor. A label that the table does not have has its StandardColor.
+// each line), as MRIcron has them; else those that the volume itself states (OME-Zarr's image-label); else StandardColor. A label that the
+// table does not have has its StandardColor.
 //
 // Volume and layer must lie in the same kind of world: in the same patient, in the same scene, or both without an orientation.
 #pragma once

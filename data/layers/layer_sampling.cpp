@@ -84,19 +84,15 @@ double Interpolated(const Vec3& p, const Index3& size, Value&& value) {
 
 }  // namespace
 
-VoxelBlock NearestOn(const VolumeGeometry& grid, const Volume& layer, ScalarType type,
-                     const std::function<std::uint32_t(double)>& number_of) {
+VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, const VoxelBlock& numbers, ScalarType type) {
   VoxelBlock block = MakeVoxelBlock(grid.bounds(), type);
-  VisitScalarType(layer.block.type, [&]<class From>(const From*) {
-    VisitScalarType(type, [&]<class To>(const To*) {
-      const Index3 size = layer.description.geometry.size;
-      const From* const from = layer.block.samples<From>();
-      To* const to = block.samples<To>();
-      ForEachVoxel(grid, layer.description.geometry, [&](std::size_t offset, const Vec3& p) {
-        if (!IsInside(p, size)) return;
-        const auto nearest = [](double q) { return std::int32_t(std::floor(q + 0.5)); };
-        to[offset] = To(number_of(double(from[layer.block.Offset({nearest(p.x), nearest(p.y), nearest(p.z)})])));
-      });
+  VisitScalarType(type, [&]<class To>(const To*) {
+    const auto* const from = numbers.samples<std::uint16_t>();
+    To* const to = block.samples<To>();
+    ForEachVoxel(grid, layer, [&](std::size_t offset, const Vec3& p) {
+      if (!IsInside(p, layer.size)) return;
+      const auto nearest = [](double q) { return std::int32_t(std::floor(q + 0.5)); };
+      to[offset] = To(from[numbers.Offset({nearest(p.x), nearest(p.y), nearest(p.z)})]);
     });
   });
   return block;

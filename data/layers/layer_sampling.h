@@ -8,17 +8,13 @@
 // Parallel. Memory is that of the result; whoever calls has checked that it fits.
 #pragma once
 
-#include <cstdint>
-#include <functional>
-
 #include "common/volume/volume.h"
 
 namespace slabstream {
 
-// Samples of the voxels nearest to those of `grid`: number_of(sample) as `type`, kUint8 or kUint16; 0 outside. Of two voxels equally near,
-// the one with the higher index.
-VoxelBlock NearestOn(const VolumeGeometry& grid, const Volume& layer, ScalarType type,
-                     const std::function<std::uint32_t(double)>& number_of);
+// The numbers, uint16, of the voxels nearest to those of `grid`, as `type`, kUint8 or kUint16, which holds them; 0 outside. Of two voxels
+// equally near, the one with the higher index.
+VoxelBlock NearestOn(const VolumeGeometry& grid, const VolumeGeometry& layer, const VoxelBlock& numbers, ScalarType type);
 
 // Data values as float32, by trilinear interpolation; between the outermost voxels' centres and the layer's border the outermost value. NaN
 // outside, and where a voxel with a part in the value has none that is finite.

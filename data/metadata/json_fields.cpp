@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -13,6 +14,23 @@ namespace {
 
 constexpr int kMostDepth = 64;
 
+// Python's json writes numbers that JSON does not have: NaN, Infinity, -Infinity. Here they become texts of the same name.
+std::string WithNumbersAsTexts(std::string_view text) {
+  static constexpr std::string_view kNumbers[] = {"NaN", "-Infinity", "Infinity"};
+  std::string quoted;
+  bool inside = false;  // of a text
+  while (!text.empty()) {
+    const auto* const number = std::ranges::find_if(kNumbers, [&](std::string_view each) { return !inside && text.starts_with(each); });
+    const bool found = number != std::end(kNumbers);
+    const std::size_t taken = found ? number->size() : inside && text.front() == '\\' ? std::min<std::size_t>(2, text.size()) : 1;
+    if (text.front() == '"') inside = !inside;
+    const std::string_view quote = found ? "\"" : "";
+    quoted.append(quote).append(text.substr(0, taken)).append(quote);
+    text.remove_prefix(taken);
+  }
+  return quoted;
+}
+
 }  // namespace
 
 Result<Json> ParseJson(const std::string& object, std::string_view text) {
@@ -22,6 +40,7 @@ Result<Json> ParseJson(const std::string& object, std::string_view text) {
     return !too_deep;
   };
   Json json = Json::parse(text, keep, false);
+  if (json.is_discarded() && !too_deep) json = Json::parse(WithNumbersAsTexts(text), keep, false);
   if (too_deep) return Status::DataLoss(fmt::format("{}: values nest more than {} deep", object, kMostDepth));
   if (json.is_discarded()) return Status::DataLoss(object + ": damaged: not JSON");
   return json;

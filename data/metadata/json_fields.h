@@ -19,7 +19,8 @@ using Json = nlohmann::json;
 
 inline constexpr std::uint64_t kMostElements = std::uint64_t{1} << 53;  // along an axis: whole numbers that every writer of JSON keeps
 
-// DataLoss: no JSON, or values that nest deeper than any metadata do. `object` names it in messages.
+// The numbers that Python writes although JSON has none of them become texts: "NaN", "Infinity", "-Infinity". DataLoss: no JSON, or values
+// that nest deeper than any metadata do. `object` names it in messages.
 Result<Json> ParseJson(const std::string& object, std::string_view text);
 
 // An object that is being read. Several may be at a time: a server answers them in the time of one.

@@ -18,7 +18,7 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
@@ -29,8 +29,11 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 }  // namespace n5
 
 SourceFormat N5() {
-  return {
-      .name = "N5", .recognises = n5::Recognises, .options = {"time", "channel", "array"}, .markers = {n5::kAttributes}, .open = n5::Open};
+  return {.name = "N5",
+          .recognises = n5::Recognises,
+          .options = {"time", "channel", "array", "follow-links"},
+          .markers = {n5::kAttributes},
+          .open = n5::Open};
 }
 
 }  // namespace slabstream

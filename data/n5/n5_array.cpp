@@ -54,8 +54,14 @@ Result<CodecChain> CodecsOf(const metadata::Field& attributes, std::size_t eleme
     chain.push_back(ZstdCodec());
   } else if (*name == "blosc") {
     chain.push_back(BloscCodec());
+  } else if (*name == "lz4") {
+    chain.push_back(Lz4JavaCodec());
+  } else if (*name == "bzip2") {
+    chain.push_back(Bzip2Codec());
+  } else if (*name == "xz") {
+    chain.push_back(XzCodec());
   } else {
-    return type.Wrong("a supported compression: raw, gzip, zstd or blosc");
+    return type.Wrong("a supported compression: raw, gzip, zstd, blosc, lz4, bzip2 or xz");
   }
   return chain;
 }
@@ -91,10 +97,10 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
         context_(std::move(context)) {}
 
   const ArrayShape& shape() const override { return shape_; }
+  std::string NameOf(std::span<const std::uint64_t> index) const override { return store_->name() + "/" + KeyOf(index); }
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    std::string key = path_;
-    for (std::size_t axis = index.size(); axis-- > 0;) key = metadata::Join(key, std::to_string(index[axis]));
+    const std::string key = KeyOf(index);
     // What does not shrink becomes a little longer.
     constexpr std::uint64_t kOverhead = 65536;
     auto decode = [self = shared_from_this(), what = store_->name() + "/" + key, done = std::move(done)](Result<Bytes> answer) {
@@ -104,6 +110,12 @@ class N5Array : public ChunkedArray, public std::enable_shared_from_this<N5Array
   }
 
  private:
+  std::string KeyOf(std::span<const std::uint64_t> index) const {
+    std::string key = path_;
+    for (std::size_t axis = index.size(); axis-- > 0;) key = metadata::Join(key, std::to_string(index[axis]));
+    return key;
+  }
+
   void Decode(const std::string& what, Result<Bytes> answer, const ChunkDone& done) const {
     if (!answer.ok()) return DecodeOn(context_, codecs_, std::move(answer), 0, what, done);
     const std::uint64_t stored_bytes = answer->size();

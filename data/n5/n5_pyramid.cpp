@@ -1,12 +1,13 @@
-// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), or datasets. Sources:
+// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), channels of these (c0,
+// c1,
+// ...), or datasets. Sources:
 // https://github.com/saalfeldlab/n5-viewer#metadata, https://github.com/bigdataviewer/bigdataviewer-core (N5ImageLoader)
 #include "data/n5/n5_pyramid.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <filesystem>
+#include <array>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -15,10 +16,10 @@
 #include "common/base/parse_number.h"
 #include "common/base/printable.h"
 #include "data/n5/n5_array.h"
-#include "data/sources/space_axes.h"
+#include "data/n5/n5_place.h"
+#include "data/sources/axis_choice.h"
 #include "data/sources/view_setups.h"
 #include "data/volume_io/chosen_channel.h"
-#include "data/volume_io/length_names.h"
 #include "data/volume_io/raw_volume.h"
 
 namespace slabstream::n5 {
@@ -27,6 +28,8 @@ namespace {
 using metadata::Field;
 using metadata::Join;
 using metadata::Json;
+
+constexpr std::size_t kMostLevels = 64;
 
 // Attributes of a group or a dataset; none is a group without any.
 struct Node {
@@ -56,10 +59,22 @@ class Container {
   // Names of folders in a folder, in natural order.
   Result<std::vector<std::string>> Folders(const std::string& path);
 
+  // Names of folders that are PREFIX and a number, in the order of their numbers. `inside`: what has attributes in each of them, "": they
+  // have.
+  Result<std::vector<std::string>> FoldersOf(const std::string& path, const std::string& prefix, const std::string& inside);
+
   Result<Pyramid> Views();
-  // The datasets s0, s1, ... in a group. `above`: the group that it lies in. `setup`: what the XML file says of it.
+  Result<bool> HasLevels(const Node& group);
+  // The datasets that `multiscales` lists in a group, else s0, s1, ... in it. `above`: the group that it lies in. `setup`: what the XML
+  // file says of it.
   Result<Pyramid> Levels(const Node& group, const Node& above, const ViewSetup& setup, const ReadOptions& options);
+  // Its place is still to be set.
+  Status AddLevel(Pyramid& pyramid, const Node& node, const Node& group, const ReadOptions& options);
+  static void PutAt(Pyramid& pyramid, const Place& place);
   Result<Pyramid> Single(const Node& array);
+  Result<Pyramid> Channels(const Node& group);
+  // nullopt: nothing there is a volume.
+  Result<std::optional<Pyramid>> Find(const std::string& path);
   Result<Pyramid> At(const std::string& path);
   // The only one of these folders that holds a volume. InvalidArgument, naming what there is: none, or several.
   Result<std::string> OnlyVolume(const std::vector<std::string>& folders);
@@ -80,7 +95,7 @@ std::vector<std::string> Numbered(const std::vector<std::string>& names, std::st
 }
 
 // The numbers of a list: x, y and z first.
-std::optional<Vec3> Triple(const Field& list) {
+std::optional<Vec3> Factors(const Field& list) {
   if (!list.is_array() || list.size() < 3) return std::nullopt;
   Vec3 triple;
   for (int axis = 0; axis < 3; ++axis) {
@@ -89,23 +104,6 @@ std::optional<Vec3> Triple(const Field& list) {
     triple[axis] = *number;
   }
   return triple;
-}
-
-struct Spacing {
-  Vec3 spacing = {1, 1, 1};
-  std::optional<LengthUnit> unit = {};
-};
-
-// "pixelResolution": {"unit": "um", "dimensions": [x, y, z]}, or a list; or "resolution": [x, y, z] and "units": ["nm", ...].
-std::optional<Spacing> SpacingOf(const Field& attributes) {
-  const Field pixel = attributes["pixelResolution"], unit = pixel["unit"], units = attributes["units"];
-  if (const auto spacing = Triple(pixel.is_array() ? pixel : pixel["dimensions"])) {
-    return Spacing{*spacing, unit.is_text() ? LengthUnitNamed(unit.Text().value()) : std::nullopt};
-  }
-  const auto spacing = Triple(attributes["resolution"]);
-  if (!spacing) return std::nullopt;
-  const Field first = units[std::size_t{0}];
-  return Spacing{*spacing, first.is_text() ? LengthUnitNamed(first.Text().value()) : std::nullopt};
 }
 
 Result<Node> Container::Read(const std::string& path) {
@@ -132,62 +130,149 @@ Result<std::vector<std::string>> Container::Folders(const std::string& path) {
 }
 
 // How many voxels of the finest level one of this level stands for: as its own attributes say, else those of its group or the one above,
-// else by the sizes.
+// else by the sizes. `axes`: of the arrays, x, y and z.
 Vec3 FactorsOf(std::size_t level, const Node& own, const Node& group, const Node& above, const std::vector<std::uint64_t>& finest,
-               const std::vector<std::uint64_t>& size) {
-  if (const auto factors = Triple(own.field()["downsamplingFactors"])) return *factors;
+               const std::vector<std::uint64_t>& size, const std::array<int, 3>& axes) {
+  if (const auto factors = Factors(own.field()["downsamplingFactors"])) return *factors;
   for (const Node* const node : {&group, &above}) {
     for (const char* const name : {"downsamplingFactors", "scales"}) {
-      if (const auto factors = Triple(node->field()[name][level])) return *factors;
+      if (const auto factors = Factors(node->field()[name][level])) return *factors;
     }
   }
   Vec3 factors = {1, 1, 1};
-  for (std::size_t axis = 0; axis < 3 && axis < size.size(); ++axis) {
-    const std::size_t at = size.size() - 1 - axis;
-    factors[int(axis)] = double(finest[at]) / double(size[at]);
+  for (int axis = 0; axis < 3; ++axis) {
+    const int at = axes[std::size_t(axis)];
+    if (at >= 0) factors[axis] = double(finest[std::size_t(at)]) / double(size[std::size_t(at)]);
   }
   return factors;
 }
 
+// The path and the attributes of a dataset of levels in `multiscales`; the path alone, if nothing lists them.
+struct Listed {
+  std::string path;
+  Json attributes;
+};
+std::vector<Listed> ListedLevels(const Node& group) {
+  std::vector<Listed> levels;
+  const Field multiscale = group.field()["multiscales"][std::size_t{0}], datasets = multiscale["datasets"];
+  for (std::size_t i = 0; datasets.is_array() && i < std::min(datasets.size(), kMostLevels); ++i) {
+    const Field path = datasets[i]["path"];
+    if (!path.is_text()) continue;
+    levels.push_back({path.Text().value(), datasets[i].value()});
+    // OME's names for the same.
+    const Field steps = datasets[i]["coordinateTransformations"], axes = multiscale["axes"];
+    Json transform = {{"axes", Json::array()}, {"units", Json::array()}};
+    for (std::size_t axis = 0; axis < axes.size(); ++axis) {
+      for (const auto& [key, list] : {std::pair{"name", "axes"}, {"unit", "units"}}) {
+        transform[list].push_back(axes[axis][key].given() ? axes[axis][key].value() : Json());
+      }
+    }
+    for (std::size_t step = 0; steps.is_array() && step < steps.size(); ++step) {
+      if (steps[step]["scale"].is_array()) transform["scale"] = steps[step]["scale"].value();
+      if (steps[step]["translation"].is_array()) transform["translate"] = steps[step]["translation"].value();
+    }
+    if (transform.contains("scale")) levels.back().attributes["transform"] = std::move(transform);
+  }
+  return levels;
+}
+
+Result<bool> Container::HasLevels(const Node& group) {
+  return ListedLevels(group).empty() ? IsArray(Join(group.path, "s0")) : Result(true);
+}
+
+// The same way for a folder and an address, which cannot be listed: one level after the other is looked for.
 Result<Pyramid> Container::Levels(const Node& group, const Node& above, const ViewSetup& setup, const ReadOptions& options) {
   Pyramid pyramid{.info = {.format = "N5"}};
-  std::optional<Spacing> spacing = SpacingOf(group.field());
-  if (setup.spacing) spacing = Spacing{*setup.spacing, setup.unit};
-  const Result<std::vector<std::string>> folders = Folders(group.path);
-  if (!folders.ok()) return folders.status();
+  Result<std::optional<Place>> base = PlaceOf(group.field());
+  if (!base.ok()) return base.status();
+  if (setup.spacing) *base = Place{.spacing = *setup.spacing, .unit = setup.unit};
+  std::vector<Listed> listed = ListedLevels(group);
+  const std::size_t count = listed.empty() ? kMostLevels : listed.size();
   std::vector<std::uint64_t> finest;
-  for (const std::string& folder : Numbered(*folders, "s")) {
-    const std::string path = Join(group.path, folder);
-    if (folder != "s" + std::to_string(pyramid.levels.size()))
-      return Refused(path, fmt::format("level s{} is missing", pyramid.levels.size()));
+  for (std::size_t level = 0; level < count; ++level) {
+    const std::string path = Join(group.path, listed.empty() ? "s" + std::to_string(level) : listed[level].path);
     const Result<Node> node = Read(path);
     if (!node.ok()) return node.status();
+    if (!node->is_array() && listed.empty()) break;
     if (!node->is_array()) return Refused(path, "must be a dataset, but has no dimensions");
-    const Result<std::shared_ptr<ChunkedArray>> array = OpenArray(store_, path, node->field(), context_);
-    if (!array.ok()) return array.status();
-    const std::vector<std::uint64_t>& size = (*array)->shape().size;
+    Result<std::optional<Place>> place = PlaceOf(node->field());
+    if (!place.ok()) return place.status();
+    if (!listed.empty() && !(*place && (*place)->of_level)) {  // what the group says of the level
+      const Result<std::optional<Place>> of_group = PlaceOf(Field(group.object, listed[level].attributes));
+      if (!of_group.ok()) return of_group.status();
+      if (*of_group) place = of_group;
+    }
+    if (Status status = AddLevel(pyramid, *node, group, options); !status.ok()) return status;
+    PyramidLevel& added = pyramid.levels.back();
+    const std::vector<std::uint64_t>& size = added.array->shape().size;
     if (finest.empty()) finest = size;
-    if (size.size() != finest.size()) return Refused(path, fmt::format("has {} axes, s0 has {}", size.size(), finest.size()));
-    const Result<SpaceAxes> space = LastAxesAreSpace(NameOf(path), size, options);
-    if (!space.ok()) return space.status();
-    if (!spacing) spacing = SpacingOf(node->field());
-    const Vec3 base = spacing.value_or(Spacing{}).spacing;
-    const Vec3 factors = FactorsOf(pyramid.levels.size(), *node, group, above, finest, size);
-    pyramid.info.times = space->times;
-    pyramid.levels.push_back({.array = *array,
-                              .axes = space->axes,
-                              .at = space->at,
-                              .spacing = factors * base,
-                              .origin = 0.5 * (factors - Vec3{1, 1, 1}) * base});  // the mean of the voxels that it stands for
-    if (spacing) pyramid.orientation.unit = spacing->unit;
+    if (size.size() != finest.size()) return Refused(path, fmt::format("has {} axes, the first level {}", size.size(), finest.size()));
+    if (!*base) base = place;
+    if (*place && (*place)->of_level && !setup.spacing) {
+      PutAt(pyramid, **place);
+      continue;
+    }
+    const Place of_finest = base->value_or(Place{});
+    const Vec3 factors = FactorsOf(level, *node, group, above, finest, size, added.axes);
+    PutAt(pyramid, of_finest);
+    added.spacing = factors * of_finest.spacing;
+    added.origin = added.origin + 0.5 * (factors - Vec3{1, 1, 1}) * of_finest.spacing;  // the mean of the voxels that it stands for
   }
   return pyramid;
 }
 
+Status Container::AddLevel(Pyramid& pyramid, const Node& node, const Node& group, const ReadOptions& options) {
+  const Result<std::shared_ptr<ChunkedArray>> array = OpenArray(store_, node.path, node.field(), context_);
+  if (!array.ok()) return array.status();
+  const std::vector<std::uint64_t>& size = (*array)->shape().size;
+  const Result<std::vector<std::string>> names = AxisNames(node.field(), group.field(), size);
+  if (!names.ok()) return names.status();
+  const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(NameOf(node.path), *names, options);
+  if (!kinds.ok()) return kinds.status();
+  const Result<AxisChoice> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
+  if (!choice.ok()) return choice.status();
+  const auto time = std::ranges::find(*kinds, AxisKind::kTime);
+  pyramid.info.times = choice->times;
+  pyramid.info.time = time == kinds->end() ? 0 : int(choice->at[std::size_t(time - kinds->begin())]);
+  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
+  pyramid.info.channel = choice->channel;
+  pyramid.levels.push_back({.array = *array, .axes = choice->axes, .at = choice->at});
+  return Status::Ok();
+}
+
+// The last level.
+void Container::PutAt(Pyramid& pyramid, const Place& place) {
+  PyramidLevel& level = pyramid.levels.back();
+  level.spacing = place.spacing;
+  level.origin = place.origin.value_or(Vec3{});
+  pyramid.orientation.unit = place.unit;
+  if (place.origin) pyramid.orientation.world = World::kScene;
+  if (!place.attribute.empty()) pyramid.info.notes = {"spacing and origin are those of the attribute " + place.attribute};
+}
+
+// Behind an address their number is found by halves.
+Result<std::vector<std::string>> Container::FoldersOf(const std::string& path, const std::string& prefix, const std::string& inside) {
+  const Result<std::vector<std::string>> folders = Folders(path);
+  if (folders.ok()) return Numbered(*folders, prefix);
+  const auto exists = [&](std::int64_t number) -> Result<bool> {
+    const Result<Node> node = Read(Join(path, prefix + std::to_string(number) + inside));
+    return node.ok() ? Result(!node->attributes.is_null()) : node.status();
+  };
+  std::int64_t there = 0, end = kMaxVolumes;  // those below `there` are there, `end` is not
+  while (there < end) {
+    const std::int64_t number = end == kMaxVolumes ? std::min(2 * there, end - 1) : there + (end - there) / 2;
+    const Result<bool> found = exists(number);
+    if (!found.ok()) return found.status();
+    (*found ? there : end) = *found ? number + 1 : number;
+  }
+  std::vector<std::string> names;
+  for (std::int64_t i = 0; i < there; ++i) names.push_back(prefix + std::to_string(i));
+  return names;
+}
+
 Result<Pyramid> Container::Views() {
-  const Result<std::vector<std::string>> folders = Folders("");
-  if (!folders.ok()) return folders.status();
-  const std::vector<std::string> setups = Numbered(*folders, "setup");
+  const Result<std::vector<std::string>> setups = FoldersOf("", "setup", "");
+  if (!setups.ok()) return setups.status();
   const Result<ViewSetupFile> xml = ReadViewSetupsBeside(store_->name());
   if (!xml.ok()) return xml.status();
   if (!xml->path.empty()) files_.push_back(xml->path);
@@ -197,38 +282,53 @@ Result<Pyramid> Container::Views() {
     return found == xml->setups.end() ? ViewSetup{} : *found;
   };
   std::vector<std::string> channels;
-  for (const std::string& name : setups) channels.push_back(setup_of(name).name);
+  for (const std::string& name : *setups) channels.push_back(setup_of(name).name);
   const Result<int> channel = ChosenChannel(store_->name(), channels, options_);
   if (!channel.ok()) return channel.status();
-  const std::string& setup = setups[std::size_t(*channel)];
+  const std::string& setup = (*setups)[std::size_t(*channel)];
 
-  const Result<std::vector<std::string>> of_setup = Folders(setup);
-  if (!of_setup.ok()) return of_setup.status();
-  const std::vector<std::string> times = Numbered(*of_setup, "timepoint");
-  if (times.empty()) return Refused(setup, "has no timepoint");
-  const Result<std::int64_t> time = ChosenVolume(NameOf(setup), std::int64_t(times.size()), options_);
+  const Result<std::vector<std::string>> times = FoldersOf(setup, "timepoint", "/s0");
+  if (!times.ok()) return times.status();
+  if (times->empty()) return Refused(setup, "has no timepoint");
+  const Result<std::int64_t> time = ChosenVolume(NameOf(setup), std::int64_t(times->size()), options_);
   if (!time.ok()) return time.status();
-  const Result<Node> above = Read(setup), group = Read(Join(setup, times[std::size_t(*time)]));
+  const Result<Node> above = Read(setup), group = Read(Join(setup, (*times)[std::size_t(*time)]));
   if (!above.ok()) return above.status();
   if (!group.ok()) return group.status();
   Result<Pyramid> pyramid = Levels(*group, *above, setup_of(setup), {});  // each level is of one channel and one time
   if (!pyramid.ok()) return pyramid;
   pyramid->info.format = "BigDataViewer N5";
-  pyramid->info.times = int(times.size());
+  pyramid->info.times = int(times->size());
+  pyramid->info.time = int(*time);
   pyramid->info.channels = channels;
   pyramid->info.channel = *channel;
   return pyramid;
 }
 
 Result<Pyramid> Container::Single(const Node& array) {
-  const Result<std::shared_ptr<ChunkedArray>> opened = OpenArray(store_, array.path, array.field(), context_);
-  if (!opened.ok()) return opened.status();
-  const Result<SpaceAxes> space = LastAxesAreSpace(NameOf(array.path), (*opened)->shape().size, options_);
-  if (!space.ok()) return space.status();
-  const std::optional<Spacing> spacing = SpacingOf(array.field());
-  Pyramid pyramid{.info = {.format = "N5", .times = space->times}};
-  pyramid.levels.push_back({.array = *opened, .axes = space->axes, .at = space->at, .spacing = spacing.value_or(Spacing{}).spacing});
-  if (spacing) pyramid.orientation.unit = spacing->unit;
+  Pyramid pyramid{.info = {.format = "N5"}};
+  const Result<std::optional<Place>> place = PlaceOf(array.field());
+  if (!place.ok()) return place.status();
+  if (Status status = AddLevel(pyramid, array, array, options_); !status.ok()) return status;
+  if (*place) PutAt(pyramid, **place);
+  return pyramid;
+}
+
+// Folders that n5-viewer writes, a channel each: c0/s0, c1/s0, ...
+Result<Pyramid> Container::Channels(const Node& group) {
+  const Result<std::vector<std::string>> folders = FoldersOf(group.path, "c", "/s0");
+  if (!folders.ok()) return folders.status();
+  const std::vector<std::string> names(folders->size());
+  const Result<int> channel = ChosenChannel(NameOf(group.path), names, options_);
+  if (!channel.ok()) return channel.status();
+  const Result<Node> of_channel = Read(Join(group.path, (*folders)[std::size_t(*channel)]));
+  if (!of_channel.ok()) return of_channel.status();
+  ReadOptions options = options_;
+  options.channel.reset();
+  Result<Pyramid> pyramid = Levels(*of_channel, group, {}, options);
+  if (!pyramid.ok()) return pyramid;
+  if (names.size() > 1) pyramid->info.channels = names;
+  pyramid->info.channel = *channel;
   return pyramid;
 }
 
@@ -242,8 +342,9 @@ Result<std::string> Container::OnlyVolume(const std::vector<std::string>& folder
   constexpr std::size_t kMostLooked = 1000, kMostTold = 20;
   std::vector<std::string> found;
   for (std::size_t i = 0; i < std::min(folders.size(), kMostLooked); ++i) {
-    const Result<bool> array = IsArray(folders[i]), levels = IsArray(Join(folders[i], "s0"));
-    if ((array.ok() && *array) || (levels.ok() && *levels)) found.push_back(folders[i]);
+    const Result<Node> node = Read(folders[i]);
+    const Result<bool> levels = node.ok() ? HasLevels(*node) : node.status();
+    if ((node.ok() && node->is_array()) || (levels.ok() && *levels)) found.push_back(folders[i]);
   }
   if (found.size() == 1) return found[0];
   const std::vector<std::string>& told = found.empty() ? folders : found;
@@ -255,26 +356,39 @@ Result<std::string> Container::OnlyVolume(const std::vector<std::string>& folder
 }
 
 Result<Pyramid> Container::At(const std::string& path) {
+  const Result<std::optional<Pyramid>> found = Find(path);
+  if (!found.ok()) return found.status();
+  if (*found) return **found;
+  return Refused(path, "is no dataset, and no group of levels: neither it nor s0 in it has dimensions");
+}
+
+Result<std::optional<Pyramid>> Container::Find(const std::string& path) {
+  const auto found = [](Result<Pyramid> pyramid) -> Result<std::optional<Pyramid>> {
+    return pyramid.ok() ? Result<std::optional<Pyramid>>(*std::move(pyramid)) : pyramid.status();
+  };
   const Result<Node> node = Read(path);
   if (!node.ok()) return node.status();
-  if (node->is_array()) return Single(*node);
-  const Result<bool> levels = IsArray(Join(path, "s0"));
+  if (node->is_array()) return found(Single(*node));
+  const Result<bool> levels = HasLevels(*node), channels = IsArray(Join(path, "c0/s0"));
   if (!levels.ok()) return levels.status();
-  if (!*levels) return Refused(path, "is no dataset, and no group of levels: neither it nor s0 in it has dimensions");
-  const Result<Node> above = Read(path.substr(0, path.find_last_of('/') == std::string::npos ? 0 : path.find_last_of('/')));
+  if (!*levels && channels.ok() && *channels) return found(Channels(*node));
+  if (!*levels) return std::optional<Pyramid>();
+  const std::size_t slash = path.find_last_of('/');
+  const Result<Node> above = Read(slash == std::string::npos ? "" : path.substr(0, slash));
   if (!above.ok()) return above.status();
-  return Levels(*node, *above, {}, options_);
+  return found(Levels(*node, *above, {}, options_));
 }
 
 Result<Pyramid> Container::Open() {
   const auto open = [&]() -> Result<Pyramid> {
     if (!options_.array.empty()) return At(options_.array);
-    const Result<bool> array = IsArray(""), levels = IsArray("s0");
-    if (!array.ok()) return array.status();
-    if (*array || (levels.ok() && *levels)) return At("");
+    const Result<std::optional<Pyramid>> found = Find("");
+    if (!found.ok()) return found.status();
+    if (*found) return **found;
+    const Result<std::vector<std::string>> setups = FoldersOf("", "setup", "");
+    if (setups.ok() && !setups->empty()) return Views();
     const Result<std::vector<std::string>> folders = Folders("");
     if (!folders.ok()) return folders.status();
-    if (!Numbered(*folders, "setup").empty()) return Views();
     const Result<std::string> only = OnlyVolume(*folders);
     return only.ok() ? At(*only) : only.status();
   };

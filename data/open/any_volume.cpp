@@ -12,16 +12,18 @@
 #include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/chosen_channel.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
 namespace {
 
-// A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again.
+// A quarter of it, at most 128 MiB, for chunks under way, the rest for those that may be needed again. A small level, of which a survey
+// from afar reads all, is then read once more by who holds it.
 ReadContext::Limits LimitsFor(std::uint64_t process_bytes) {
   constexpr std::uint64_t kLeast = 8U << 20, kMostUnderWay = 128U << 20;
   const std::uint64_t all = std::max(SourceBytes(process_bytes), 2 * kLeast), under_way = std::clamp(all / 4, kLeast, kMostUnderWay);
-  return {.under_way_bytes = under_way, .cache_bytes = all - under_way};
+  return {.under_way_bytes = under_way, .cache_bytes = all - under_way, .small_bytes = std::uint64_t(kFarSurvey.exact)};
 }
 
 std::atomic<std::uint64_t> process_memory = 0;  // 0: not said
@@ -46,6 +48,7 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .stored_size = finest.geometry.size,
           .steps = StepsOf(finest.geometry.spacing),
           .labels = source.labels,
+          .looks = source.looks,
           .channels = source.channels,
           .channel = source.channel,
           .times = source.times,
@@ -62,18 +65,27 @@ bool IsReadWhole(const std::string& path, const ReadOptions& options) {
 }
 
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options) {
-  if (IsReadWhole(path, options)) {
-    Result<LoadedVolume> loaded = ReadVolume(path, options);
-    if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
-    return loaded;
+  if (!IsReadWhole(path, options)) {
+    const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+    return source.ok() ? ReadFinest(**source, path, options) : source.status();
   }
-  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
-  if (!source.ok()) return source.status();
-  Result<std::shared_ptr<const Volume>> volume = ReadLevel(**source, 0, options.progress);
-  if (!volume.ok()) return volume.status();
-  LoadedVolume loaded{.info = FileInfoOf((*source)->info()), .volume = *std::move(volume)};
+  Result<LoadedVolume> loaded = ReadVolume(path, options);
+  if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
+  return loaded;
+}
+
+Result<LoadedVolume> ReadFinest(VolumeSource& source, const std::string& path, const ReadOptions& options) {
+  Result<LevelInMemory> level = ReadLevel(source, 0, options.progress);
+  if (!level.ok()) return level.status();
+  LoadedVolume loaded{FileInfoOf(source.info()), std::move(level->volume), std::move(level->exact)};
+  loaded.rounded = loaded.exact != nullptr;
   WarnOfChannel(path, options, loaded.info);
   return loaded;
+}
+
+void PrepareToShow(const std::string& path, LoadedVolume& loaded) {
+  if (loaded.rounded) LogWarning(path + ": " + RoundingText(loaded.exact->of.type, loaded.exact.get()));
+  if (!loaded.rounded || !MayRoundLabels(loaded.exact->of.type)) loaded.exact = nullptr;
 }
 
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options) {

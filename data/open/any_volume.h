@@ -25,8 +25,13 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source);
 // Logs a line if this is one of several channels, and the options do not say which.
 void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info);
 
-// ReadVolume, or the finest level of a source; and WarnOfChannel.
+// For whoever shows the volume: logs a line if its values are rounded, and keeps exact samples only of rounded whole numbers.
+void PrepareToShow(const std::string& path, LoadedVolume& loaded);
+
+// ReadVolume and WarnOfChannel, or ReadFinest.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
+// The finest level of a source that is open; and WarnOfChannel. `exact` is there only if whole numbers are rounded.
+Result<LoadedVolume> ReadFinest(VolumeSource& source, const std::string& path, const ReadOptions& options);
 // CheckVolumeHeaders, or the files of a source, which it opens, or of a compressed stream, which may be larger than the memory.
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});
 // Whether ReadVolume knows the path; else only a source can be it.

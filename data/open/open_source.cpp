@@ -5,6 +5,7 @@
 
 #include "common/base/url.h"
 #include "data/hdf5/hdf5_format.h"
+#include "data/metadata/open_store_for.h"
 #include "data/n5/n5.h"
 #include "data/open/remote_source.h"
 #include "data/open/unchanged_source.h"
@@ -33,17 +34,26 @@ Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const 
   const bool remote = IsUrl(path);
   std::error_code error;
   if (!remote && !std::filesystem::exists(path, error)) return Status::NotFound(path + ": does not exist");
-  const Result<RemoteFormat> there = remote ? FindRemoteFormat(path, SourceFormats()) : RemoteFormat{FindSourceFormat(path, options)};
-  if (!there.ok()) return there.status();
-  const SourceFormat* const format = there->format;
+  ReadOptions with_store = options;
+  RemoteFormat there{.format = remote ? nullptr : FindSourceFormat(path, options)};
+  if (remote) {
+    Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
+    if (!store.ok()) return store.status();
+    with_store.store = *std::move(store);
+    const Result<RemoteFormat> found = FindRemoteFormat(*with_store.store, SourceFormats());
+    if (!found.ok()) return found.status();
+    there = *found;
+  }
+  const SourceFormat* const format = there.format;
   if (format == nullptr) return Status::InvalidArgument(path + ": is no volume that can be read in parts");
   for (const ReadOption& option : ReadOptionList()) {
-    if (option.given(options) && std::ranges::find(format->options, option.name) == format->options.end()) {
+    const bool taken = option.of_addresses ? remote : std::ranges::find(format->options, option.name) != format->options.end();
+    if (option.given(options) && !taken) {
       return Status::InvalidArgument(path + ": " + std::string(format->name) + " takes no option " + std::string(option.name));
     }
   }
-  const auto open = [&] { return format->open(path, options, context); };
-  return remote ? OpenRemote(there->version, open) : OpenUnchanged(path, open);
+  const auto open = [&] { return format->open(path, with_store, context); };
+  return remote ? OpenRemote(there.version, options.query, open) : OpenUnchanged(path, open);
 }
 
 }  // namespace slabstream

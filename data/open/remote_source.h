@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "common/base/status.h"
 #include "data/open/unchanged_source.h"
@@ -12,16 +13,18 @@
 
 namespace slabstream {
 
+class Store;
+
 struct RemoteFormat {
   const SourceFormat* format = nullptr;  // of those that were given
   std::uint64_t version = 0;             // of the markers that are there
 };
 
-// The first of the formats of which a marker lies at this address. NotFound: there is no marker. InvalidArgument: another kind of address.
-// Unavailable: no answer. Waits.
-Result<RemoteFormat> FindRemoteFormat(const std::string& url, std::span<const SourceFormat> formats);
+// The first of the formats of which a marker, a JSON object, lies in this store. NotFound: there is no marker. Unavailable: no answer, or
+// none that tells. Waits.
+Result<RemoteFormat> FindRemoteFormat(Store& store, std::span<const SourceFormat> formats);
 
-// The source that `open` gives, without files and of this version. Errors of `open`.
-Result<std::shared_ptr<VolumeSource>> OpenRemote(std::uint64_t version, const OpenFunction& open);
+// The source that `open` gives, without files, of this version, and with a note of the address' own query, if it has one. Errors of `open`.
+Result<std::shared_ptr<VolumeSource>> OpenRemote(std::uint64_t version, std::string_view query, const OpenFunction& open);
 
 }  // namespace slabstream

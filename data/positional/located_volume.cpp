@@ -26,9 +26,10 @@ Result<LocatedSamples> Locate(const VolumeFormat& format, const std::string& pat
   if (format.locate == nullptr) return NotInParts(path, fmt::format("it is {}", format.name));
   Result<LocatedSamples> located = format.locate(path, options);
   if (!located.ok()) return located;
-  const bool compressed = located->payload.compressed;
+  const bool compressed = located->payload.compressed();
   if (compressed != (packing == Packing::kCompressed))
     return NotInParts(path, compressed ? "its samples are compressed" : "its samples are not compressed");
+  if (packing == Packing::kNone && !located->payload.more.empty()) return NotInParts(path, "its samples are in several files");
   return located;
 }
 
@@ -47,7 +48,7 @@ Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& o
   const Result<LocatedSamples> located = Locate(format, path, options, packing);
   if (!located.ok()) return located.status();
   const RawHeader& header = located->header;
-  if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
+  if (Status status = CheckChannel(path, header, options); !status.ok()) return status;
   if (options.channel == kLuminance) return NotInParts(path, "luminance needs several components of a voxel");
   const Result<WorldPlacement> placed = PlaceUpright(header, path);
   if (!placed.ok()) return placed.status();
@@ -61,14 +62,19 @@ Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& o
   SourceInfo info = {.levels = {{description, BlockOf(header, placed->turn)}},
                      .format = std::string(format.name),
                      .file_type = std::string(ToString(header.type)),
+                     .exact = {header.type, header.rescale},
                      .labels = header.labels,
+                     .channels = header.channels,
+                     .channel = header.channel,
                      .times = int(header.volumes),
                      .time = int(header.number),
                      .notes = header.notes,
                      .files = {path}};
+  if (MayBeRounded(header.type)) info.notes.push_back(RoundingText(header.type));
+  const int component = header.components > 1 ? options.channel.value_or(0) : 0;
   if (header.components > 1) info.channels.resize(std::size_t(header.components));
-  if (payload->file != path) info.files.push_back(payload->file.string());
-  return LocatedVolume{header, *std::move(payload), placed->turn, options.channel.value_or(0), std::move(info)};
+  for (const std::filesystem::path& other : payload->FilesBeside(path)) info.files.push_back(other.string());
+  return LocatedVolume{header, *std::move(payload), placed->turn, component, std::move(info)};
 }
 
 bool HasLocatedSamples(const std::string& path, const ReadOptions& options, Packing packing) {

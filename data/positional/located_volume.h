@@ -16,11 +16,11 @@ struct LocatedVolume {
   RawHeader header;
   Payload payload;  // of this volume alone
   AxisTurn turn;
-  int channel = 0;  // which of the header's components
-  SourceInfo info;  // one level; samples as KeptTypeOf says
+  int component = 0;  // which of the header's, in a voxel
+  SourceInfo info;    // one level; samples as KeptTypeOf says
 };
 
-// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise or lie in several pieces; axes
+// Errors of SourceFormat::open. InvalidArgument, too: samples that are packed otherwise, or uncompressed in several files; axes
 // that are not at right angles; the luminance of several components.
 Result<LocatedVolume> LocateVolume(const std::string& path, const ReadOptions& options, Packing packing);
 

@@ -106,7 +106,7 @@ class PositionalSource : public VolumeSource {
 Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   Result<LocatedVolume> volume = LocateVolume(path, options, Packing::kNone);
   if (!volume.ok()) return volume.status();
-  Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume->header, volume->payload, volume->channel);
+  Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume->header, volume->payload, volume->component);
   if (!samples.ok()) return samples.status();
   return std::shared_ptr<VolumeSource>(
       std::make_shared<PositionalSource>(std::move(volume->info), volume->turn, *std::move(samples), context));
@@ -125,7 +125,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 SourceFormat UncompressedFile() {
   return {.name = "uncompressed file",
           .recognises = Recognises,
-          .options = {"time", "channel", "spacing", "dims", "type", "endian", "offset"},
+          .options = {"time", "channel", "matrix", "spacing", "dims", "type", "endian", "offset"},
           .open = Open};
 }
 

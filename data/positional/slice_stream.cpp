@@ -92,7 +92,7 @@ Status SliceStream::ReadSlices(const Box& box, const BoxRoom& out, const std::st
     if (next_ >= wanted.begin.z) {
       if (volume_.payload.big_endian) SwapByteOrder(header.type, bytes);
       const Box part = {{wanted.begin.x, wanted.begin.y, next_}, {wanted.end.x, wanted.end.y, next_ + count}};
-      const auto first = std::size_t(wanted.begin.x * steps[0] + wanted.begin.y * steps[1] + volume_.channel);
+      const auto first = std::size_t(wanted.begin.x * steps[0] + wanted.begin.y * steps[1] + volume_.component);
       to.Fill(part, header.type, stored_.data() + first * sample_bytes, steps);
     }
     next_ += count;

@@ -1,7 +1,7 @@
-// SliceStream: a volume whose samples are one compressed stream (.nii.gz, gzip NRRD, compressed MetaImage, MRC in .gz), which can only be
-// read from its beginning. As a source it gives any box, but what lies in front of a box is read, too: from the last slice that was read if
-// that lies in front of it, else from the beginning. So read boxes of whole slices in the order of the file (along(), from_end()): then the
-// stream is read once, and nobody holds all of it.
+// SliceStream: a volume whose samples are one compressed stream (.nii.gz, .mgz, gzip NRRD, compressed MetaImage, MRC in .gz), or several,
+// which can only be read from the beginning. As a source it gives any box, but what lies in front of a box is read, too: from the last
+// slice that was read if that lies in front of it, else from the beginning. So read boxes of whole slices in the order of the file
+// (along(), from_end()): then the stream is read once, and nobody holds all of it.
 #pragma once
 
 #include <cstdint>

@@ -20,21 +20,21 @@ constexpr std::int64_t kGap = 4096;
 
 }  // namespace
 
-Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int channel) {
+Result<std::shared_ptr<StoredSamples>> StoredSamples::Open(const RawHeader& header, const Payload& payload, int component) {
   FileDescriptor file(::open(payload.file.c_str(), O_RDONLY | O_CLOEXEC));
   if (file.number() < 0) {
     return Status::Unavailable(
         fmt::format("{}: cannot be opened for reading: {}", payload.file.string(), std::generic_category().message(errno)));
   }
-  return std::shared_ptr<StoredSamples>(new StoredSamples(header, payload, channel, std::move(file)));
+  return std::shared_ptr<StoredSamples>(new StoredSamples(header, payload, component, std::move(file)));
 }
 
-StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file)
+StoredSamples::StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file)
     : name_(payload.file.string()),
       file_(std::move(file)),
       type_(header.type),
       big_endian_(payload.big_endian),
-      first_(payload.offset + channel * std::int64_t(BytesPerSample(header.type))),
+      first_(payload.offset + component * std::int64_t(BytesPerSample(header.type))),
       sample_(std::int64_t(BytesPerSample(header.type))),
       voxel_(sample_ * header.components),
       row_(voxel_ * header.size.x),
@@ -66,11 +66,10 @@ std::vector<Box> StoredSamples::Parts(const Box& box) const {
   return parts;
 }
 
-// Samples that are kept as they are in the file, in its order: rows of them need no memory on the way.
+// Samples that are wanted as they are in the file, in its order: rows of them need no memory on the way.
 bool StoredSamples::CanReadInto(const Box& part, const TurnedBox& to) const {
-  const bool kept_as_stored =
-      type_ == SampleType::kUint8 || ((type_ == SampleType::kUint16 || type_ == SampleType::kFloat32) && !big_endian_);
-  if (!kept_as_stored || voxel_ != sample_ || to.turn != AxisTurn{}) return false;
+  const bool kept_as_stored = to.out.exact || type_ == SampleType::kUint8 || type_ == SampleType::kUint16 || type_ == SampleType::kFloat32;
+  if (!kept_as_stored || (big_endian_ && sample_ > 1) || voxel_ != sample_ || to.turn != AxisTurn{}) return false;
   const Index3 size = part.size();
   // What ReadRows reads together must not hold what belongs to nobody here.
   const bool rows_as_in_file = to.out.row * sample_ == row_, slices_as_in_file = to.out.slice * sample_ == slice_;
@@ -87,7 +86,7 @@ std::int64_t StoredSamples::MemoryFor(const Box& part, const TurnedBox& to) cons
 
 Status StoredSamples::Read(const Box& part, const TurnedBox& to) {
   if (CanReadInto(part, to)) {
-    return ReadRows(part, to.Place(part, type_), {to.out.row * sample_, to.out.slice * sample_});
+    return ReadRows(part, to.Place(part, type_).first, {to.out.row * sample_, to.out.slice * sample_});
   }
 
   UnwrittenVector<std::byte> stored(std::size_t(MemoryFor(part, to)));

@@ -20,14 +20,14 @@ namespace slabstream {
 
 class StoredSamples {
  public:
-  // `payload`: of this volume alone. `channel`: which of the header's components, in [0, components). Unavailable: it cannot be opened.
-  static Result<std::shared_ptr<StoredSamples>> Open(const RawHeader& header, const Payload& payload, int channel);
+  // `payload`: of this volume alone. `component`: which of the header's components, in [0, components). Unavailable: it cannot be opened.
+  static Result<std::shared_ptr<StoredSamples>> Open(const RawHeader& header, const Payload& payload, int component);
 
   // A box, by the stored axes, cut into parts that are read on their own, each with little memory.
   std::vector<Box> Parts(const Box& box) const;
   // Bytes of memory that reading a part takes: at most kPartBytes, or those of one voxel.
   std::int64_t MemoryFor(const Box& part, const TurnedBox& to) const;
-  // Fills in the kept samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
+  // Fills in the samples of a part. Any thread. DataLoss: the file has become shorter. Unavailable: it cannot be read.
   // Throws std::bad_alloc.
   Status Read(const Box& part, const TurnedBox& to);
 
@@ -41,7 +41,7 @@ class StoredSamples {
     std::int64_t row = 0, slice = 0;
   };
 
-  StoredSamples(const RawHeader& header, const Payload& payload, int channel, FileDescriptor file);
+  StoredSamples(const RawHeader& header, const Payload& payload, int component, FileDescriptor file);
   Pitch PitchFor(const Index3& size) const;
   bool CanReadInto(const Box& part, const TurnedBox& to) const;
   std::int64_t RowBytes(const Index3& size) const { return (size.x - 1) * voxel_ + sample_; }

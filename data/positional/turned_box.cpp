@@ -26,9 +26,11 @@ Box TurnedBox::Turned(const Box& part) const {
   return turned;
 }
 
-std::byte* TurnedBox::Place(const Box& turned_part, SampleType type) const {
+BoxRoom TurnedBox::Place(const Box& turned_part, SampleType type) const {
   const Index3 offset = turned_part.begin - box.begin;
-  return out.first + (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(BytesPerSample(KeptTypeOf(type).type));
+  BoxRoom place = out;
+  place.first += (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(CopiedBytes(type, out.exact));
+  return place;
 }
 
 void TurnedBox::Fill(const Box& part, SampleType type, const std::byte* from, const std::array<std::int64_t, 3>& steps) const {
@@ -39,7 +41,7 @@ void TurnedBox::Fill(const Box& part, SampleType type, const std::byte* from, co
     turned_steps[i] = turn.flipped[i] ? -step : step;
     if (turn.flipped[i]) from += step * (turned.size()[int(i)] - 1) * std::int64_t(BytesPerSample(type));
   }
-  CopySamples(type, from, turned_steps, turned.size(), Place(turned, type), out.row, out.slice);
+  CopySamples(type, from, turned_steps, turned.size(), Place(turned, type));
 }
 
 }  // namespace slabstream

@@ -16,12 +16,12 @@ struct TurnedBox {
   AxisTurn turn;
   Index3 size;  // of the volume
   Box box;
-  BoxRoom out;  // for samples as CopySamples keeps them
+  BoxRoom out;  // for samples as CopySamples writes them
 
   Box Stored() const;                 // the box by the axes of the file
   Box Turned(const Box& part) const;  // a part of that, by those of the volume
-  // Where the sample belongs that comes first of a part, which is given by the axes of the volume.
-  std::byte* Place(const Box& turned_part, SampleType type) const;
+  // Where the samples of a part belong, which is given by the axes of the volume.
+  BoxRoom Place(const Box& turned_part, SampleType type) const;
   // Fills in a part, given by the axes of the file, from its samples there: `steps` are samples from one to the next along those axes.
   void Fill(const Box& part, SampleType type, const std::byte* from, const std::array<std::int64_t, 3>& steps) const;
 };

@@ -17,14 +17,14 @@ bool Recognises(const std::string& path, const ReadOptions&) {
   const std::string info = (std::filesystem::path(path) / kInfo).string();
   if (!std::filesystem::is_regular_file(info, error)) return false;
   constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
-  const Result<Bytes> bytes = ReadNow(*FolderStore(path), kInfo, kMostBytes);
+  const Result<Bytes> bytes = ReadNow(*FolderStore(path, Links::kMayLeadOut), kInfo, kMostBytes);
   if (!bytes.ok()) return false;
   const std::string_view text(reinterpret_cast<const char*>(bytes->span().data()), bytes->size());
   return text.find("\"scales\"") != std::string_view::npos || text.find("neuroglancer_multiscale_volume") != std::string_view::npos;
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
@@ -37,7 +37,7 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 SourceFormat Precomputed() {
   return {.name = "Neuroglancer precomputed",
           .recognises = precomputed::Recognises,
-          .options = {"channel"},
+          .options = {"channel", "follow-links"},
           .markers = {precomputed::kInfo},
           .open = precomputed::Open};
 }

@@ -3,8 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstring>
+#include <string_view>
 #include <utility>
+#include <vector>
 
+#include "common/base/url.h"
 #include "data/codecs/codecs.h"
 #include "data/metadata/json_fields.h"
 #include "data/precomputed/jpeg_codec.h"
@@ -14,17 +19,37 @@
 namespace slabstream::precomputed {
 namespace {
 
-bool IsGzip(const Bytes& bytes) { return bytes.size() > 2 && bytes.span()[0] == std::byte{0x1f} && bytes.span()[1] == std::byte{0x8b}; }
+// What CloudVolume appends to the names of files that it packs. Objects of a web server are packed without it, but folders are served, too.
+struct Ending {
+  std::string_view name;
+  SharedCodec codec;  // null: as they are, or packed by a mirror
+};
+const std::vector<Ending>& Endings() {
+  static const std::vector<Ending> endings = {{"", nullptr},          {".gz", GzipCodec()},   {".br", BrotliCodec()},
+                                              {".zstd", ZstdCodec()}, {".bz2", Bzip2Codec()}, {".xz", XzCodec()}};
+  return endings;
+}
 
-// Files of mirrors may be gzipped. What is encoded may be longer than what it holds, so `most` is of its own.
-class MaybeGzip : public ChunkCodec {
+constexpr std::size_t kEndingsOfServers = 4;  // the first ones, which are not rare: each costs a request for a chunk that is not there
+
+bool BeginsWith(const Bytes& bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.span().data(), magic.data(), magic.size()) == 0;
+}
+
+// Unpacks a file with this ending, or what a mirror has packed. It may be longer than what it holds, so `most` is of its own.
+class Unpacking : public ChunkCodec {
  public:
-  explicit MaybeGzip(std::uint64_t most) : most_(most) {}
+  Unpacking(SharedCodec codec, std::uint64_t most) : codec_(std::move(codec)), most_(most) {}
   Result<Bytes> Decode(Bytes packed, std::uint64_t) const override {
-    return IsGzip(packed) ? GzipCodec()->Decode(std::move(packed), most_) : Result<Bytes>(std::move(packed));
+    const SharedCodec codec = codec_ != nullptr                        ? codec_
+                              : BeginsWith(packed, "\x1f\x8b")         ? GzipCodec()
+                              : BeginsWith(packed, "\x28\xb5\x2f\xfd") ? ZstdCodec()
+                                                                       : nullptr;
+    return codec == nullptr ? Result<Bytes>(std::move(packed)) : codec->Decode(std::move(packed), most_);
   }
 
  private:
+  const SharedCodec codec_;
   const std::uint64_t most_;
 };
 
@@ -40,35 +65,57 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   }
 
   const ArrayShape& shape() const override { return shape_; }
+  std::string NameOf(std::span<const std::uint64_t> index) const override {
+    return store_->name() + "/" + metadata::Join(scale_.key, scale_.sharding ? ShardOf(index).file : FileOf(index));
+  }
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
-    std::string name;
     std::array<std::uint64_t, 3> size{};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::uint64_t begin = index[3 - axis] * scale_.chunk[axis], end = std::min(begin + scale_.chunk[axis], scale_.size[axis]);
-      size[axis] = end - begin;
-      name +=
-          fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(begin), scale_.offset[axis] + std::int64_t(end));
-    }
+    for (std::size_t axis = 0; axis < 3; ++axis) size[axis] = EndOf(index, axis) - BeginOf(index, axis);
     if (scale_.sharding) return ReadFromShard(index, size, std::move(done));
-    const std::string key = metadata::Join(scale_.key, name);
-    // CloudVolume gives gzipped files an ending.
-    store_->Read(key, {}, MostStored(), [self = shared_from_this(), key, size, done = std::move(done)](Result<Bytes> answer) {
-      if (answer.status().code() != StatusCode::kNotFound)
-        return self->Decode(self->store_->name() + "/" + key, size, std::move(answer), done);
-      self->store_->Read(key + ".gz", {}, self->MostStored(), [self, key, size, done](Result<Bytes> gzipped) {
-        self->Decode(self->store_->name() + "/" + key + ".gz", size, std::move(gzipped), done);
-      });
-    });
+    ReadFile(metadata::Join(scale_.key, FileOf(index)), size, ending_, 0, std::move(done));
   }
 
  private:
-  // The index of the shard, that of the minishard, and the chunk, one after the other.
-  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+  // Tries the endings in turn, from `first` on.
+  void ReadFile(const std::string& key, const std::array<std::uint64_t, 3>& size, std::size_t first, std::size_t tried, ChunkDone done) {
+    const std::size_t endings = IsUrl(store_->name()) ? kEndingsOfServers : Endings().size(), number = (first + tried) % endings;
+    const std::string file = key + std::string(Endings()[number].name);
+    auto read = [self = shared_from_this(), key, file, size, first, tried, endings, number, done = std::move(done)](Result<Bytes> answer) {
+      const bool missing = answer.status().code() == StatusCode::kNotFound;
+      if (missing && tried + 1 < endings) return self->ReadFile(key, size, first, tried + 1, done);
+      if (answer.ok()) self->ending_ = number;
+      self->Decode(self->store_->name() + "/" + file, size, std::move(answer), done, Endings()[number].codec);
+    };
+    store_->Read(file, {}, MostStored(), std::move(read));
+  }
+
+  // Of a chunk, in voxels of the scale along x, y and z.
+  std::uint64_t BeginOf(std::span<const std::uint64_t> index, std::size_t axis) const { return index[3 - axis] * scale_.chunk[axis]; }
+  std::uint64_t EndOf(std::span<const std::uint64_t> index, std::size_t axis) const {
+    return std::min(BeginOf(index, axis) + scale_.chunk[axis], scale_.size[axis]);
+  }
+
+  std::string FileOf(std::span<const std::uint64_t> index) const {
+    std::string name;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      name += fmt::format("{}{}-{}", axis > 0 ? "_" : "", scale_.offset[axis] + std::int64_t(BeginOf(index, axis)),
+                          scale_.offset[axis] + std::int64_t(EndOf(index, axis)));
+    }
+    return name;
+  }
+
+  std::uint64_t NumberOf(std::span<const std::uint64_t> index) const {
     std::array<std::uint64_t, 3> counts{};
     for (std::size_t axis = 0; axis < 3; ++axis) counts[axis] = (scale_.size[axis] - 1) / scale_.chunk[axis] + 1;
-    const std::uint64_t chunk = ChunkNumber({index[3], index[2], index[1]}, counts);
-    const ShardPlace place = PlaceOf(*scale_.sharding, chunk);
+    return ChunkNumber({index[3], index[2], index[1]}, counts);
+  }
+  ShardPlace ShardOf(std::span<const std::uint64_t> index) const { return PlaceOf(*scale_.sharding, NumberOf(index)); }
+
+  // The index of the shard, that of the minishard, and the chunk, one after the other.
+  void ReadFromShard(std::span<const std::uint64_t> index, const std::array<std::uint64_t, 3>& size, ChunkDone done) {
+    const std::uint64_t chunk = NumberOf(index);
+    const ShardPlace place = ShardOf(index);
     const std::string key = metadata::Join(scale_.key, place.file);
     const std::string what = fmt::format("{}/{}: chunk {}", store_->name(), key, chunk);
     constexpr std::uint64_t kEntryBytes = 16;
@@ -99,20 +146,20 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   // A block of one voxel in the segmentation encoding takes two words and its label.
   std::uint64_t MostStored() const { return 4 * shape_.chunk_bytes() + (std::uint64_t{1} << 20); }
 
-  void Decode(const std::string& what, const std::array<std::uint64_t, 3>& size, Result<Bytes> answer, const ChunkDone& done) const {
+  void Decode(const std::string& what, const std::array<std::uint64_t, 3>& size, Result<Bytes> answer, const ChunkDone& done,
+              const SharedCodec& packing = nullptr) const {
     const std::uint64_t channels = shape_.size[0], voxels = size[0] * size[1] * size[2];
     const std::size_t each = BytesPerSample(shape_.type);
     const std::uint64_t bytes = voxels * channels * each;
+    const auto unpacking = std::make_shared<Unpacking>(packing, MostStored());
     CodecChain chain;
     switch (scale_.encoding) {
       case Encoding::kRaw:
-        if (scale_.sharding ? scale_.sharding->gzip_data : answer.ok() && answer->size() != bytes)
-          chain.push_back(std::make_shared<MaybeGzip>(MostStored()));
+        if (packing != nullptr || (scale_.sharding ? scale_.sharding->gzip_data : answer.ok() && answer->size() != bytes))
+          chain.push_back(unpacking);
         break;
-      case Encoding::kJpeg: chain = {JpegCodec(voxels, int(channels)), std::make_shared<MaybeGzip>(MostStored())}; break;
-      case Encoding::kSegmentation:
-        chain = {SegmentationCodec(size, scale_.block, channels, each), std::make_shared<MaybeGzip>(MostStored())};
-        break;
+      case Encoding::kJpeg: chain = {JpegCodec(voxels, int(channels)), unpacking}; break;
+      case Encoding::kSegmentation: chain = {SegmentationCodec(size, scale_.block, channels, each), unpacking}; break;
     }
     DecodeOn(context_, std::move(chain), std::move(answer), bytes, what, done);
   }
@@ -121,6 +168,7 @@ class PrecomputedArray : public ChunkedArray, public std::enable_shared_from_thi
   const Scale scale_;
   const SourceContext context_;
   ArrayShape shape_;
+  std::atomic<std::size_t> ending_ = 0;  // of Endings(): that of the last file that was there
 };
 
 }  // namespace

@@ -52,6 +52,9 @@ class ChunkedArray {
 
   virtual const ArrayShape& shape() const = 0;
 
+  // The name of the object that holds a chunk, of those that may be missing; "": of none.
+  virtual std::string NameOf(std::span<const std::uint64_t> /*index*/) const { return ""; }
+
   // nullopt: the chunk is not there, so all its elements are `fill`.
   using ChunkDone = std::function<void(Result<std::optional<StoredChunk>>)>;
   // Calls `done` exactly once, on any thread, perhaps before this returns. What `done` does takes as long as decoding, so it is called on a

@@ -8,9 +8,13 @@
 #include <exception>
 #include <mutex>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/log.h"
+#include "common/base/printable.h"
+#include "common/base/url.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -50,12 +54,23 @@ class Reading {
   Status failure_;  // the first one
 };
 
+// What is known of the chunks of all levels.
+struct Findings {
+  std::atomic<bool> settled = false;  // one is there, or a warning has said that there is none
+};
+
 // A level, which lives as long as the source or a read of it. A chunk that several reads need at a time is read once: it has one flight,
 // for which all of them wait.
 class Level : public std::enable_shared_from_this<Level> {
  public:
-  Level(std::string name, PyramidLevel level, const Index3& size, SourceContext context)
-      : name_(std::move(name)), level_(std::move(level)), size_(size), context_(std::move(context)), owner_(context_->cache().NewOwner()) {
+  Level(std::string name, PyramidLevel level, const Index3& size, SourceContext context, std::shared_ptr<Findings> findings)
+      : name_(std::move(name)),
+        far_(IsUrl(name_)),
+        level_(std::move(level)),
+        size_(size),
+        context_(std::move(context)),
+        findings_(std::move(findings)),
+        owner_(context_->cache().NewOwner()) {
     const ArrayShape& shape = level_.array->shape();
     for (std::size_t a = 0; a < shape.size.size(); ++a) index_.push_back(level_.at[a] / shape.chunk[a]);
     for (int axis = 0; axis < 3; ++axis) {
@@ -66,7 +81,7 @@ class Level : public std::enable_shared_from_this<Level> {
     }
     counts_ = {(size_.x - 1) / chunk_.x + 1, (size_.y - 1) / chunk_.y + 1, (size_.z - 1) / chunk_.z + 1};
     std::array<std::byte, sizeof(float)> fill{};
-    CopySamples(shape.type, shape.fill.data(), {0, 0, 0}, {1, 1, 1}, fill.data(), 1, 1);
+    CopySamples(shape.type, shape.fill.data(), {0, 0, 0}, {1, 1, 1}, {fill.data(), 1, 1});
     fills_with_zeros_ = std::ranges::all_of(fill, [](std::byte each) { return each == std::byte{0}; });
   }
   ~Level() { context_->cache().Forget(owner_); }
@@ -75,7 +90,7 @@ class Level : public std::enable_shared_from_this<Level> {
   VolumeSource::Counts counts() const { return {stored_bytes_, chunks_}; }
 
   void Read(const std::shared_ptr<Reading>& reading) {
-    const Box& box = reading->box();
+    const Box box = Mirrored(reading->box());
     const Index3 first = {box.begin.x / chunk_.x, box.begin.y / chunk_.y, box.begin.z / chunk_.z};
     const Index3 last = {(box.end.x - 1) / chunk_.x, (box.end.y - 1) / chunk_.y, (box.end.z - 1) / chunk_.z};
     // In the order of the array's axes, in which stores keep chunks: the last axis varies fastest.
@@ -100,7 +115,17 @@ class Level : public std::enable_shared_from_this<Level> {
  private:
   using Readings = std::vector<std::shared_ptr<Reading>>;
 
+  // Of elements of the array.
   Box BoxOf(const Index3& chunk) const { return {chunk * chunk_, Min((chunk + Uniform(1)) * chunk_, size_)}; }
+
+  // From voxels of the level to elements of the array along x, y and z, and back.
+  Box Mirrored(Box box) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!level_.mirrored[std::size_t(axis)]) continue;
+      box.begin[axis] = size_[axis] - std::exchange(box.end[axis], size_[axis] - box.begin[axis]);
+    }
+    return box;
+  }
 
   void Want(const Index3& chunk, const std::shared_ptr<Reading>& reading) {
     const std::uint64_t number = NumberIn(counts_, chunk);
@@ -144,12 +169,7 @@ class Level : public std::enable_shared_from_this<Level> {
       return context_->Release(bytes);
     }
     try {
-      std::vector<std::uint64_t> index = index_;
-      for (int axis = 0; axis < 3; ++axis) {
-        const int a = level_.axes[std::size_t(axis)];
-        if (a >= 0) index[std::size_t(a)] = std::uint64_t(chunk[axis]);
-      }
-      level_.array->ReadChunk(index, [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
+      level_.array->ReadChunk(IndexOf(chunk), [self = shared_from_this(), chunk, bytes](Result<std::optional<StoredChunk>> read) {
         self->Land(chunk, std::move(read));
         self->context_->Release(bytes);
       });
@@ -159,8 +179,37 @@ class Level : public std::enable_shared_from_this<Level> {
     }
   }
 
+  // Along all axes of the array.
+  std::vector<std::uint64_t> IndexOf(const Index3& chunk) const {
+    std::vector<std::uint64_t> index = index_;
+    for (int axis = 0; axis < 3; ++axis) {
+      const int a = level_.axes[std::size_t(axis)];
+      if (a >= 0) index[std::size_t(a)] = std::uint64_t(chunk[axis]);
+    }
+    return index;
+  }
+
+  // A volume of which no chunk is there is rather an incomplete copy than an empty one. Nothing is read to find that out.
+  void NoteMissing(const Index3& chunk) try {
+    constexpr std::uint64_t kMostNoted = std::uint64_t{1} << 16;
+    const std::uint64_t count = std::uint64_t(counts_.x) * std::uint64_t(counts_.y) * std::uint64_t(counts_.z);
+    if (findings_->settled || context_->only_keeps() || count > kMostNoted) return;
+    {
+      const std::lock_guard lock(mutex_);
+      missing_.insert(NumberIn(counts_, chunk));
+      if (missing_.size() < count) return;
+    }
+    const std::string object = level_.array->NameOf(IndexOf(Index3{}));
+    if (object.empty() || findings_->settled.exchange(true)) return;
+    LogWarning(Printable(fmt::format("{}: no chunk was found, so that all voxels have the fill value; looked for {}{}", name_, object,
+                                     count > 1 ? fmt::format(" and {} others", count - 1) : "")));
+  } catch (const std::exception&) {  // no memory: nothing is said
+  }
+
   void Land(const Index3& chunk, Result<std::optional<StoredChunk>> read) {
     Status status = read.status();
+    if (status.ok() && *read) findings_->settled = true;
+    if (status.ok() && !*read) NoteMissing(chunk);
     Bytes elements;
     const ArrayShape& shape = level_.array->shape();
     if (status.ok() && *read) {
@@ -176,13 +225,15 @@ class Level : public std::enable_shared_from_this<Level> {
     End(chunk, TakeFlight(chunk, status.ok() ? elements : Bytes()), status, elements);
   }
 
-  // Ends the flight. A chunk of which no read took all may be needed again: it goes to the cache, before later reads find that it has no
-  // flight.
+  // Ends the flight. A chunk of which no read took all may be needed again, or one of a small level behind an address, which would be
+  // another request: it goes to the cache, before later reads find that it has no flight.
   Readings TakeFlight(const Index3& chunk, const Bytes& elements = {}) {
     const std::lock_guard lock(mutex_);
     const auto flight = flights_.find(NumberIn(counts_, chunk));
-    const Box all = BoxOf(chunk);
-    if (!elements.empty() && std::ranges::none_of(flight->second, [&](const auto& each) { return each->box().Contains(all); })) {
+    const Box all = Mirrored(BoxOf(chunk));
+    const bool is_small = far_ && CountIn(size_) * BytesPerSample(level_.array->shape().type) <= context_->small_bytes();
+    const bool is_taken = std::ranges::any_of(flight->second, [&](const auto& each) { return each->box().Contains(all); });
+    if (!elements.empty() && (is_small || !is_taken)) {
       try {
         context_->cache().Keep(owner_, flight->first, elements);
       } catch (const std::exception&) {  // no memory: it is read again
@@ -233,31 +284,31 @@ class Level : public std::enable_shared_from_this<Level> {
 
   void Copy(const Index3& chunk, const Bytes& elements, Reading& reading) const {
     if (!reading.goes_on()) return reading.GiveUp();
-    if (elements.empty() && fills_with_zeros_ && reading.out().zeroed) return;
+    if (elements.empty() && fills_with_zeros_ && reading.out().zeroed && !reading.out().exact) return;
     const ArrayShape& shape = level_.array->shape();
-    const Box part = Intersection(BoxOf(chunk), reading.box());
+    const Box stored = Intersection(BoxOf(chunk), Mirrored(reading.box())), part = Mirrored(stored);
     const std::byte* from = shape.fill.data();
     std::array<std::int64_t, 3> steps = {0, 0, 0};
     if (!elements.empty()) {
       const std::array<std::uint64_t, kMaxArrayAxes> sides = ShapeOf(chunk);
-      const Index3 within = part.begin - BoxOf(chunk).begin;
+      const Index3 within = stored.begin - BoxOf(chunk).begin;
       std::int64_t step = 1, first = 0;
       for (std::size_t a = shape.size.size(); a-- > 0; step *= std::int64_t(sides[a])) {
         std::int64_t place = std::int64_t(level_.at[a] % shape.chunk[a]);
         for (int axis = 0; axis < 3; ++axis) {
           if (level_.axes[std::size_t(axis)] != int(a)) continue;
-          place = within[axis];
-          steps[std::size_t(axis)] = step;
+          const bool mirrored = level_.mirrored[std::size_t(axis)];
+          place = within[axis] + (mirrored ? part.size()[axis] - 1 : 0);
+          steps[std::size_t(axis)] = mirrored ? -step : step;
         }
         first += place * step;
       }
       from = elements.span().data() + first * std::int64_t(BytesPerSample(shape.type));
     }
-    const BoxRoom& out = reading.out();
+    BoxRoom out = reading.out();
     const Index3 offset = part.begin - reading.box().begin;
-    const std::int64_t place = offset.x + offset.y * out.row + offset.z * out.slice;
-    CopySamples(shape.type, from, steps, part.size(), out.first + place * std::int64_t(BytesPerSample(KeptTypeOf(shape.type).type)),
-                out.row, out.slice);
+    out.first += (offset.x + offset.y * out.row + offset.z * out.slice) * std::int64_t(CopiedBytes(shape.type, out.exact));
+    CopySamples(shape.type, from, steps, part.size(), out);
   }
 
   Status OutOfMemory(const std::exception& error) const {
@@ -265,16 +316,19 @@ class Level : public std::enable_shared_from_this<Level> {
   }
 
   const std::string name_;
+  const bool far_;  // behind an address
   const PyramidLevel level_;
   Index3 size_;
   const SourceContext context_;
+  const std::shared_ptr<Findings> findings_;
   const ChunkCache::Owner owner_;
   Index3 chunk_, counts_;             // voxels of a chunk, and chunks, along each axis
   std::vector<std::uint64_t> index_;  // of chunks along the other axes of the array
-  bool fills_with_zeros_ = false;     // where there is no chunk
+  bool fills_with_zeros_ = false;     // kept ones, where there is no chunk
   std::atomic<std::uint64_t> stored_bytes_ = 0, chunks_ = 0;
   std::mutex mutex_;                                     // guards what follows
   std::unordered_map<std::uint64_t, Readings> flights_;  // who waits, by the number of the chunk
+  std::unordered_set<std::uint64_t> missing_;            // chunks, as long as none was found
 };
 
 class ChunkedSource : public VolumeSource {
@@ -358,9 +412,12 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   const KeptType kept = KeptTypeOf(type);
   const ValueMapping mapping = {pyramid.rescale.scale, pyramid.rescale.FromStored(kept.shift)};
   SourceInfo info = std::move(pyramid.info);
-  info.file_type = ToString(type);
+  if (info.file_type.empty()) info.file_type = ToString(type);
+  info.exact = {type, pyramid.rescale};
+  if (MayBeRounded(type)) info.notes.push_back(RoundingText(type));
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
+  const auto findings = std::make_shared<Findings>();
   for (PyramidLevel& level : pyramid.levels) {
     const std::string level_name = levels.empty() ? name : fmt::format("{}: level {}", name, levels.size());
     const SampleType its_type = level.array->shape().type;
@@ -371,7 +428,7 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
     if (Status status = CheckShape(level_name, level); !status.ok()) return status;
     const Result<VolumeGeometry> geometry = GeometryOf(level_name, pyramid, level);
     if (!geometry.ok()) return geometry.status();
-    levels.push_back(std::make_shared<Level>(level_name, std::move(level), geometry->size, context));
+    levels.push_back(std::make_shared<Level>(level_name, std::move(level), geometry->size, context, findings));
     info.levels.push_back({{*geometry, kept.type, mapping}, levels.back()->chunk()});
   }
   return std::shared_ptr<VolumeSource>(std::make_shared<ChunkedSource>(name, std::move(info), std::move(levels)));

@@ -7,7 +7,9 @@
 
 namespace slabstream {
 
-// `info`: its levels are made from the volume. Read copies on the thread that calls it. counts(): none, since nothing is stored.
-std::shared_ptr<VolumeSource> MakeMemorySource(std::shared_ptr<const Volume> volume, SourceInfo info);
+// `info`: its levels and `exact` are made from the volume and, if it has some, its exact samples. Read copies on the thread that calls it.
+// counts(): none, since nothing is stored.
+std::shared_ptr<VolumeSource> MakeMemorySource(std::shared_ptr<const Volume> volume, SourceInfo info,
+                                               std::shared_ptr<const ExactSamples> exact = nullptr);
 
 }  // namespace slabstream

@@ -45,6 +45,7 @@ ReadContext::ReadContext(const Limits& limits) : state_(std::make_shared<State>(
 ReadContext::~ReadContext() = default;
 
 ChunkCache& ReadContext::cache() { return state_->cache; }
+std::uint64_t ReadContext::small_bytes() const { return state_->limits.small_bytes; }
 bool ReadContext::only_keeps() const { return state_->limits.only_keeps; }
 
 void ReadContext::PostDecode(std::function<void()> task) {

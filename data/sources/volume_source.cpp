@@ -8,12 +8,20 @@
 namespace slabstream {
 
 void VolumeSource::Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done) {
+  Read(level, box, RoomFor(level, box, out), std::move(stop), std::move(done));
+}
+
+BoxRoom VolumeSource::RoomFor(int level, const Box& box, std::span<std::byte> out) const {
   const ScalarType type = info().levels.at(std::size_t(level)).description.type;
   CHECK_EQ(out.size(), std::size_t(box.voxel_count()) * BytesPerSample(type));
-  Read(level, box, BoxRoom::Dense(box, out.data()), std::move(stop), std::move(done));
+  return BoxRoom::Dense(box, out.data());
 }
 
 Status VolumeSource::ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop) {
+  return ReadNow(level, box, RoomFor(level, box, out), std::move(stop));
+}
+
+Status VolumeSource::ReadNow(int level, const Box& box, const BoxRoom& out, std::stop_token stop) {
   std::promise<Status> end;
   std::future<Status> read = end.get_future();
   Read(level, box, out, std::move(stop), [&end](Status status) { end.set_value(std::move(status)); });

@@ -22,6 +22,8 @@
 #include "common/base/status.h"
 #include "common/volume/summary.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/exact_samples.h"
+#include "data/volume_io/stated_label.h"
 
 namespace slabstream {
 
@@ -36,7 +38,9 @@ struct SourceInfo {
   std::vector<SourceLevel> levels;         // at least one
   std::string format;                      // "OME-Zarr 0.5"
   std::string file_type;                   // of samples as they are stored: "int16"
+  ExactType exact = {};                    // of reads of exact samples (BoxRoom::exact)
   bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<StatedLabel> looks = {};     // of labels, by ascending values, as far as the source says it
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it shows
   int times = 1, time = 0;                 // how many the source holds, and which of them it shows
@@ -50,14 +54,15 @@ struct SourceInfo {
 // Where the samples of a box go: x fastest.
 struct BoxRoom {
   // Without gaps between rows or slices. `out` has room for all samples of the box.
-  static BoxRoom Dense(const Box& box, std::byte* out) {
+  static BoxRoom Dense(const Box& box, std::byte* out, bool exact = false) {
     const Index3 size = box.size();
-    return {out, size.x, std::int64_t{size.x} * size.y};
+    return {out, size.x, std::int64_t{size.x} * size.y, false, exact};
   }
 
   std::byte* first = nullptr;       // the sample of the box's first voxel
   std::int64_t row = 0, slice = 0;  // samples from a voxel to the next along y and z
   bool zeroed = false;              // all samples are 0 already, so that zeros need not be written
+  bool exact = false;               // samples are those of SourceInfo::exact, not of the level's type
 };
 
 class VolumeSource {
@@ -70,15 +75,17 @@ class VolumeSource {
   virtual const SourceInfo& info() const = 0;
 
   using ReadDone = std::function<void(Status)>;
-  // Fills `out` with the samples of `box`, of the level's type, and writes nothing between its rows. `box` is not empty and lies inside the
-  // level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay until then. Once `stop` is told to stop,
-  // what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of ChunkedArray::ReadChunk; ResourceExhausted.
+  // Fills `out` with the samples of `box`, of the level's type or, if out.exact, as they are stored, and writes nothing between its rows.
+  // `box` is not empty and lies inside the level. Calls `done` exactly once, on any thread, perhaps before this returns; `out` must stay
+  // until then. Once `stop` is told to stop, what has not begun is left out, and the end is Cancelled. Unavailable, DataLoss: as of
+  // ChunkedArray::ReadChunk; ResourceExhausted.
   virtual void Read(int level, const Box& box, const BoxRoom& out, std::stop_token stop, ReadDone done) = 0;
 
   // The same without gaps: `out` has exactly box.voxel_count() samples.
   void Read(int level, const Box& box, std::span<std::byte> out, std::stop_token stop, ReadDone done);
 
-  // Waits, so not on a thread that decodes.
+  // These wait, so not on a thread that decodes.
+  Status ReadNow(int level, const Box& box, const BoxRoom& out, std::stop_token stop = {});
   Status ReadNow(int level, const Box& box, std::span<std::byte> out, std::stop_token stop = {});
 
   // Since it was opened: bytes that were read as they are stored, and chunks that were decoded.
@@ -90,6 +97,8 @@ class VolumeSource {
   std::uint64_t TakeStoredBytes();
 
  private:
+  BoxRoom RoomFor(int level, const Box& box, std::span<std::byte> out) const;
+
   std::atomic<std::uint64_t> taken_bytes_ = 0;
 };
 

@@ -1,4 +1,5 @@
-// What lies in a folder may be anybody's, so no link leads out of it: the kernel checks each step of a path (openat2, RESOLVE_BENEATH).
+// What lies in a folder may be anybody's, so no link leads out of it unless the user says so: the kernel checks each step of a path
+// (openat2, RESOLVE_BENEATH).
 // Kernels before 5.6, and sandboxes that do not let it through, get each step checked here, where no link is followed at all.
 #include <dirent.h>
 #include <fcntl.h>
@@ -42,8 +43,9 @@ int OpenStepByStep(const FileDescriptor& root, const std::string& key, int flags
 }
 
 // A descriptor, or -1 with errno. "": the folder itself.
-int OpenBeneath(const std::string& path, const std::string& key, int flags) {
+int OpenBeneath(const std::string& path, const std::string& key, int flags, Links links) {
   if (key.empty()) return ::open(path.c_str(), flags);
+  if (links == Links::kMayLeadOut) return ::open((path + "/" + key).c_str(), flags);
   const FileDescriptor root(::open(path.c_str(), O_PATH | O_CLOEXEC | O_DIRECTORY));
   if (root.number() < 0) return -1;
   open_how how{};
@@ -62,14 +64,18 @@ int OpenBeneath(const std::string& path, const std::string& key, int flags) {
 
 class FolderStoreImpl : public Store {
  public:
-  explicit FolderStoreImpl(std::string path) : path_(std::move(path)) {}
+  FolderStoreImpl(std::string path, Links links) : path_(std::move(path)), links_(links) {}
 
   void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
     if (Status status = CheckObjectKey(path_, key); !status.ok()) return done(std::move(status));
     std::string object = path_ + "/" + key;
-    auto read = [path = path_, key, object, range, most]() -> Result<Bytes> {
-      const FileDescriptor file(OpenBeneath(path, key, kOpen));
-      if (file.number() < 0) return OpenFailure(object, errno);
+    auto read = [path = path_, links = links_, key, object, range, most]() -> Result<Bytes> {
+      const FileDescriptor file(OpenBeneath(path, key, kOpen, links));
+      if (file.number() < 0) {
+        const int error = errno;
+        if (error == ENOENT && IsLink(object)) return Status::Unavailable(object + ": is a link to a file that is not there");
+        return OpenFailure(object, error);
+      }
       struct stat about {};
       if (::fstat(file.number(), &about) == 0 && S_ISDIR(about.st_mode)) return Status::NotFound(object + ": is a folder");
       return ReadRange(file.number(), object, range, most);
@@ -80,7 +86,7 @@ class FolderStoreImpl : public Store {
   Result<std::vector<std::string>> List(const std::string& folder) override {
     if (Status status = CheckFolderKey(path_, folder); !status.ok()) return status;
     const std::string name = folder.empty() ? path_ : path_ + "/" + folder;
-    const int opened = OpenBeneath(path_, folder, kOpen | O_DIRECTORY);
+    const int opened = OpenBeneath(path_, folder, kOpen | O_DIRECTORY, links_);
     if (opened < 0) return OpenFailure(name, errno);
     const std::unique_ptr<DIR, int (*)(DIR*)> entries(::fdopendir(opened), ::closedir);
     if (entries == nullptr) {
@@ -110,11 +116,18 @@ class FolderStoreImpl : public Store {
     return ::fstatat(folder, entry.d_name, &about, 0) == 0 && S_ISDIR(about.st_mode);
   }
 
+  // As git-annex has it for what was not fetched: that is no missing object.
+  static bool IsLink(const std::string& object) {
+    struct stat about {};
+    return ::lstat(object.c_str(), &about) == 0 && S_ISLNK(about.st_mode);
+  }
+
   const std::string path_;
+  const Links links_;
 };
 
 }  // namespace
 
-std::shared_ptr<Store> FolderStore(const std::string& path) { return std::make_shared<FolderStoreImpl>(path); }
+std::shared_ptr<Store> FolderStore(const std::string& path, Links links) { return std::make_shared<FolderStoreImpl>(path, links); }
 
 }  // namespace slabstream

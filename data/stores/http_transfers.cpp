@@ -1,21 +1,18 @@
 #include "data/stores/http_transfers.h"
 
-#include <arpa/inet.h>
 #include <curl/curl.h>
 #include <fmt/format.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
-#include <cstdlib>
-#include <cstring>
+#include <cctype>
 #include <ctime>
 #include <deque>
-#include <iterator>
+#include <map>
 #include <mutex>
 #include <random>
 #include <ranges>
+#include <set>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -24,9 +21,9 @@
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/base/parse_number.h"
-#include "common/base/pooled_vector.h"
 #include "common/base/printable.h"
-#include "common/base/version.h"
+#include "common/base/trimmed.h"
+#include "data/stores/transfer.h"
 
 namespace slabstream {
 namespace {
@@ -37,44 +34,6 @@ using std::chrono::seconds;
 constexpr int kMostRedirects = 5;
 
 std::atomic<bool> process_asks = false;  // of HttpTransfers::OfProcess
-
-std::string PartOf(const std::string& url, CURLUPart part, unsigned flags = 0) {
-  const std::unique_ptr<CURLU, void (*)(CURLU*)> parsed(curl_url(), curl_url_cleanup);
-  char* text = nullptr;
-  if (parsed == nullptr || curl_url_set(parsed.get(), CURLUPART_URL, url.c_str(), 0) != CURLUE_OK ||
-      curl_url_get(parsed.get(), part, &text, flags) != CURLUE_OK) {
-    return {};
-  }
-  std::string value(text);
-  curl_free(text);
-  return value;
-}
-
-std::string HostAndPort(const std::string& url) {
-  return fmt::format("{}:{}", PartOf(url, CURLUPART_HOST), PartOf(url, CURLUPART_PORT, CURLU_DEFAULT_PORT));
-}
-
-// What only this machine or its link sees.
-bool IsLocal(const sockaddr* address) {
-  const auto is_local_v4 = [](std::uint32_t host_order) {
-    return host_order >> 24 == 127 || host_order >> 24 == 0 || host_order >> 16 == 0xA9FE;  // 127/8, 0/8, 169.254/16
-  };
-  if (address->sa_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, address, sizeof v4);
-    return is_local_v4(ntohl(v4.sin_addr.s_addr));
-  }
-  if (address->sa_family != AF_INET6) return true;
-  sockaddr_in6 v6{};
-  std::memcpy(&v6, address, sizeof v6);
-  const in6_addr& at = v6.sin6_addr;
-  if (IN6_IS_ADDR_V4MAPPED(&at) || IN6_IS_ADDR_V4COMPAT(&at)) {
-    std::uint32_t v4 = 0;
-    std::memcpy(&v4, at.s6_addr + 12, sizeof v4);
-    return is_local_v4(ntohl(v4));
-  }
-  return IN6_IS_ADDR_LOOPBACK(&at) || IN6_IS_ADDR_LINKLOCAL(&at) || IN6_IS_ADDR_UNSPECIFIED(&at);
-}
 
 bool MayPass(long status) { return status == 408 || status == 429 || status == 500 || status == 502 || status == 503 || status == 504; }
 
@@ -101,95 +60,43 @@ seconds SecondsUntil(const std::string& text) {
   return seconds(date > now ? std::min(std::uint64_t(date - now), kMost) : 0);
 }
 
-// Who waits for an answer, and for which bytes of it.
-struct Asker {
-  std::optional<ByteSpan> span;  // of the object; none: all of it
-  HttpTransfers::Done done;
-};
-
-// One request, from its first try to its end.
-struct Transfer {
-  HttpGet get;
-  std::vector<Asker> askers;  // one, or several whose spans get.span covers
-  std::string url;            // that is asked now: of the request, or where a redirect led
-  std::string host;
-  int tries = 0, redirects = 0;
-  Time begun;  // the first try
-
-  // Of the present try.
-  Time tried;
-  CURL* easy = nullptr;
-  PooledVector<std::byte> body;
-  std::optional<Status> stopped;  // by us, and why
-  char reason[CURL_ERROR_SIZE] = {};
-  std::unique_ptr<curl_slist, void (*)(curl_slist*)> headers{nullptr, curl_slist_free_all};
-
-  bool elsewhere() const { return PartOf(url, CURLUPART_HOST) != PartOf(get.url, CURLUPART_HOST); }
-  long status() const {
-    long code = 0;
-    curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &code);
-    return code;
-  }
-  std::uint64_t length() const {  // that the server said
-    curl_off_t bytes = -1;
-    curl_easy_getinfo(easy, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &bytes);
-    return bytes < 0 ? 0 : std::uint64_t(bytes);
-  }
-
-  // Whether `other`, which waits, may go along with this one, which begins.
-  bool TakesAlong(const Transfer& other) const {
-    const auto is_plain = [](const Transfer& each) {
-      return each.get.span && !each.get.only_size && each.tries == 0 && each.redirects == 0;
-    };
-    if (!is_plain(*this) || !is_plain(other) || get.url != other.get.url) return false;
-    if (get.known != other.get.known || get.access != other.get.access) return false;
-    const std::uint64_t end = get.span->begin + get.span->bytes, other_end = other.get.span->begin + other.get.span->bytes;
-    return other.get.span->begin >= end && other.get.span->begin - end <= HttpTransfers::kMostBetween &&
-           other_end - get.span->begin <= HttpTransfers::kMostTogether;
-  }
-  void TakeAlong(Transfer other) {
-    get.span->bytes = other.get.span->begin + other.get.span->bytes - get.span->begin;
-    get.most = get.span->bytes;
-    std::ranges::move(other.askers, std::back_inserter(askers));
-  }
-
-  // The value of a header of the answer; empty: there is none.
-  std::string header(const char* name) const {
-    curl_header* found = nullptr;
-    return curl_easy_header(easy, name, 0, CURLH_HEADER, -1, &found) == CURLHE_OK ? found->value : "";
-  }
-
-  bool OnBody(std::span<const std::byte> bytes) {
-    const long code = status();
-    if (code != 200 && code != 206) return true;  // a page about what is wrong
-    // A server that sends whole objects alone may be asked for an object that is no longer than the part.
-    const std::uint64_t least = std::max<std::uint64_t>(body.size() + bytes.size(), length());
-    if (get.span && code == 200 && (get.span->begin > 0 || least > get.span->bytes)) {
-      stopped = Status::Unavailable("the server sends whole objects alone, no parts of them");
-    } else if (least > get.most) {
-      stopped = Status::ResourceExhausted(fmt::format("has more than {} bytes", get.most));
-    } else {
-      try {
-        if (body.empty()) body.reserve(std::max<std::size_t>(length(), bytes.size()));
-        body.insert(body.end(), bytes.begin(), bytes.end());
-      } catch (const std::bad_alloc&) {
-        stopped = Status::ResourceExhausted("no memory for it");
-      }
-    }
-    return !stopped;
-  }
-};
-
-std::size_t TakeBody(char* data, std::size_t, std::size_t bytes, void* transfer) {
-  return static_cast<Transfer*>(transfer)->OnBody(std::as_bytes(std::span(data, bytes))) ? bytes : 0;
+// The beginning of the path: of a store, and often of a bucket.
+std::string BeginOf(const std::string& url) {
+  const std::size_t path = url.find('/', url.find("//") + 2);
+  return url.substr(0, path == std::string::npos ? path : url.find('/', path + 1));
 }
-curl_socket_t OpenSocket(void* data, curlsocktype, curl_sockaddr* address) {
-  auto& transfer = *static_cast<Transfer*>(data);
-  if (transfer.elsewhere() && IsLocal(&address->addr)) {
-    transfer.stopped = Status::Unavailable(fmt::format("leads to {}, which is an address of this machine or its link", transfer.host));
-    return CURL_SOCKET_BAD;
-  }
-  return ::socket(address->family, address->socktype | SOCK_CLOEXEC, address->protocol);
+
+// Another region than that of which a server of buckets was asked, and in which it says the bucket is; empty: it says none.
+std::string OtherRegion(const Transfer& transfer, long status) {
+  if (status != 301 && status != 307 && status != 400 && status != 403) return {};
+  std::string region = transfer.header("x-amz-bucket-region");
+  if (region.empty()) region = transfer.Between("<Region>", "</Region>");
+  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-'; };
+  constexpr std::size_t kMost = 32;
+  if (region.size() > kMost || !std::ranges::all_of(region, in_name)) return {};
+  const bool is_signed = transfer.get.access != nullptr && transfer.get.access->s3;
+  const std::string& asked = !transfer.region.empty() || !is_signed ? transfer.region : transfer.get.access->s3->region;
+  const bool helps = is_signed ? asked != region : InRegion(transfer.url, region) != transfer.url;
+  return transfer.region.empty() && transfer.trusted() && helps ? region : "";
+}
+
+// "HTTP 403 (AccessDenied)"
+std::string Shown(const Transfer& transfer) {
+  const std::string code = transfer.Between("<Code>", "</Code>");
+  const auto in_code = [](unsigned char c) { return std::isalnum(c) != 0; };
+  constexpr std::size_t kMost = 64;
+  const bool is_code = !code.empty() && code.size() <= kMost && std::ranges::all_of(code, in_code);
+  return fmt::format("HTTP {}{}", transfer.status(), is_code ? fmt::format(" ({})", code) : "");
+}
+
+// What answers for a page that is not there, or that wants a password, with a page of its own.
+bool IsPage(const Transfer& transfer) {
+  if (!transfer.says_html()) return false;
+  constexpr std::size_t kMost = 64;
+  std::string text(reinterpret_cast<const char*>(transfer.body.data()), std::min(transfer.body.size(), kMost));
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  const std::string_view begin = Trimmed(text);
+  return begin.starts_with("<!doctype html") || begin.starts_with("<html");
 }
 
 }  // namespace
@@ -223,7 +130,9 @@ struct HttpTransfers::Impl {
   // The thread's own.
   std::map<std::string, Host> hosts;
   std::multimap<Time, Owned> paused;
-  std::vector<CURL*> idle;  // to be used again
+  std::map<std::string, std::string> regions;  // by the beginning of the addresses there
+  std::set<std::string> headless;              // hosts that do not say by HEAD how long an object is
+  std::vector<CURL*> idle;                     // to be used again
   std::minstd_rand random{std::random_device{}()};
   std::jthread thread;
 
@@ -260,7 +169,14 @@ struct HttpTransfers::Impl {
     for (Owned& transfer : taken) Wait(std::move(transfer));
   }
 
-  void Wait(Owned transfer) { hosts[transfer->host].waiting.push_back(std::move(transfer)); }
+  void Wait(Owned transfer) {
+    if (const auto region = regions.find(BeginOf(transfer->get.url)); region != regions.end() && transfer->region.empty()) {
+      transfer->region = region->second;
+      transfer->Lead(InRegion(transfer->url, transfer->region));
+    }
+    if (transfer->get.only_size && headless.contains(transfer->host)) transfer->ReadStart();
+    hosts[transfer->host].waiting.push_back(std::move(transfer));
+  }
 
   void Start(Host& host) {
     Owned owned = std::move(host.waiting.front());
@@ -275,60 +191,12 @@ struct HttpTransfers::Impl {
         ++other;
       }
     }
-    transfer.tried = MonotonicNow();
-    if (++transfer.tries == 1) transfer.begun = transfer.tried;
     CURL* easy = idle.empty() ? curl_easy_init() : idle.back();
-    if (easy == nullptr) return Answer(std::move(owned), Status::ResourceExhausted(transfer.url + ": no memory to ask for it"));
+    if (easy == nullptr) return Answer(std::move(owned), Status::ResourceExhausted(transfer.get.url + ": no memory to ask for it"));
     if (!idle.empty()) idle.pop_back();
-    transfer.easy = easy;
-    transfer.body = {};
-    transfer.stopped.reset();
-    transfer.reason[0] = 0;
-    curl_easy_setopt(easy, CURLOPT_PRIVATE, &transfer);
-    curl_easy_setopt(easy, CURLOPT_URL, transfer.url.c_str());
-    curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
-    curl_easy_setopt(easy, CURLOPT_USERAGENT, UserAgent().c_str());
-    if (const char* const authorities = std::getenv("SSL_CERT_FILE")) curl_easy_setopt(easy, CURLOPT_CAINFO, authorities);
-    curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
-    curl_easy_setopt(easy, CURLOPT_PIPEWAIT, 1L);  // one connection for all, if the server speaks HTTP/2
-    curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(std::chrono::ceil<milliseconds>(timing.connecting).count()));
-    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
-    curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, long(std::chrono::ceil<seconds>(timing.stalled).count()));
-    curl_easy_setopt(easy, CURLOPT_ERRORBUFFER, transfer.reason);
-    curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, TakeBody);
-    curl_easy_setopt(easy, CURLOPT_WRITEDATA, &transfer);
-    curl_easy_setopt(easy, CURLOPT_OPENSOCKETFUNCTION, OpenSocket);
-    curl_easy_setopt(easy, CURLOPT_OPENSOCKETDATA, &transfer);
-    curl_easy_setopt(easy, CURLOPT_NOBODY, transfer.get.only_size ? 1L : 0L);
-    if (transfer.get.span) {
-      const ByteSpan& span = *transfer.get.span;
-      curl_easy_setopt(easy, CURLOPT_RANGE, fmt::format("{}-{}", span.begin, span.begin + span.bytes - 1).c_str());
-    }
-    transfer.headers.reset();
-    if (!transfer.get.known.empty()) AddHeader(transfer, "If-None-Match: " + transfer.get.known);
-    if (transfer.get.access != nullptr && !transfer.elsewhere()) Sign(transfer);
-    curl_easy_setopt(easy, CURLOPT_HTTPHEADER, transfer.headers.get());
+    transfer.Prepare(easy, timing);
     host.active.emplace(easy, std::move(owned));
     curl_multi_add_handle(multi, easy);
-  }
-
-  // Signature version 4 of Amazon Web Services. libcurl 7.88 leaves the header with the payload's digest to us.
-  static void Sign(Transfer& transfer) {
-    const S3Access& access = *transfer.get.access;
-    curl_easy_setopt(transfer.easy, CURLOPT_AWS_SIGV4, fmt::format("aws:amz:{}:s3", access.region).c_str());
-    curl_easy_setopt(transfer.easy, CURLOPT_USERNAME, access.key.c_str());
-    curl_easy_setopt(transfer.easy, CURLOPT_PASSWORD, access.secret.c_str());
-    AddHeader(transfer, "x-amz-content-sha256: UNSIGNED-PAYLOAD");
-    if (!access.token.empty()) AddHeader(transfer, "x-amz-security-token: " + access.token);
-  }
-
-  static void AddHeader(Transfer& transfer, const std::string& line) {
-    transfer.headers.reset(curl_slist_append(transfer.headers.release(), line.c_str()));
-  }
-
-  static const std::string& UserAgent() {
-    static const std::string agent = fmt::format("slabstream/{}", Version());
-    return agent;
   }
 
   void End(CURL* easy, CURLcode code) {
@@ -355,25 +223,43 @@ struct HttpTransfers::Impl {
     const auto fail = [&](StatusCode kind, const std::string& why) { Fail(std::move(owned), kind, why); };
     if (transfer.stopped) return fail(transfer.stopped->code(), transfer.stopped->message());
     const long status = transfer.status();
+    if (code == CURLE_BAD_CONTENT_ENCODING && !transfer.as_sent) {
+      transfer.as_sent = true;
+      return Once(std::move(owned));
+    }
     if (code != CURLE_OK) {
       const std::string why = transfer.reason[0] != 0 ? transfer.reason : curl_easy_strerror(code);
       return MayPass(code) ? Again(std::move(owned), why) : fail(StatusCode::kUnavailable, why);
     }
-    const std::string http = fmt::format("HTTP {}", status);
+    const std::string http = Shown(transfer);
     if (status == 304 && !transfer.get.known.empty()) {
       return Answer(std::move(owned), HttpObject{.version = transfer.get.known, .unchanged = true});
+    }
+    if (const std::string region = OtherRegion(transfer, status); !region.empty()) {
+      regions[BeginOf(transfer.get.url)] = region;
+      return Once(std::move(owned));
     }
     if (status >= 300 && status < 400) return Redirect(std::move(owned), http);
     if (status == 404 || status == 410) return fail(StatusCode::kNotFound, "does not exist (" + http + ")");
     if (MayPass(status)) return Again(std::move(owned), http);
-    HttpObject object{.bytes = {}, .size = transfer.length(), .version = transfer.header("ETag")};
-    if (object.version.empty()) object.version = transfer.header("Last-Modified");
+    if (transfer.get.only_size && !transfer.reads_start) {
+      if (status == 200 && transfer.length() && !transfer.is_encoded() && !transfer.says_html()) {
+        return Answer(std::move(owned), HttpObject{.size = *transfer.length(), .version = VersionOf(transfer)});
+      }
+      if (status != 403 && (status != 200 || !transfer.length())) headless.insert(transfer.host);
+      transfer.ReadStart();
+      return Once(std::move(owned));
+    }
+    HttpObject object{.size = transfer.length().value_or(0), .version = VersionOf(transfer)};
     const std::string content_range = transfer.header("Content-Range");
     const std::string_view range = content_range;
     const std::size_t slash = range.find('/');
-    if (transfer.get.span && slash != std::string_view::npos) object.size = ParseNumber<std::uint64_t>(range.substr(slash + 1)).value_or(0);
+    const auto total = slash == std::string_view::npos ? std::nullopt : ParseNumber<std::uint64_t>(range.substr(slash + 1));
+    if (transfer.get.span && slash != std::string_view::npos) object.size = total.value_or(0);
     if (status == 416 && transfer.get.span) return Answer(std::move(owned), std::move(object));  // it ends before the part begins
+    if (status == 403 || status == 204) return Answer(std::move(owned), HttpObject{.instead = http});
     if (status != 200 && status != 206) return fail(StatusCode::kUnavailable, http);
+    if (IsPage(transfer)) return Answer(std::move(owned), HttpObject{.instead = "a page of HTML came"});
     if (transfer.get.span && status == 206) {
       const std::size_t space = range.find(' '), dash = range.find('-');
       const bool states = range.starts_with("bytes ") && dash != std::string_view::npos && dash > space && slash > dash;
@@ -382,11 +268,23 @@ struct HttpTransfers::Impl {
       if (!right) {
         return fail(StatusCode::kDataLoss, fmt::format("bytes from {} on were asked for, but '{}' came", transfer.get.span->begin, range));
       }
-    } else if (!transfer.get.only_size) {
+      if (transfer.reads_start && !total) return fail(StatusCode::kUnavailable, "the server does not say how long it is");
+    } else {
       object.size = transfer.body.size();
     }
-    object.bytes = Bytes(std::move(transfer.body));
+    if (!transfer.reads_start) object.bytes = Bytes(std::move(transfer.body));
     Answer(std::move(owned), std::move(object));
+  }
+
+  static std::string VersionOf(const Transfer& transfer) {
+    const std::string tag = transfer.header("ETag");
+    return tag.empty() ? transfer.header("Last-Modified") : tag;
+  }
+
+  // The same request in another way, which counts as the same try.
+  void Once(Owned owned) {
+    --owned->tries;
+    Wait(std::move(owned));
   }
 
   void Redirect(Owned owned, const std::string& http) {
@@ -394,16 +292,16 @@ struct HttpTransfers::Impl {
     const auto fail = [&](const std::string& why) { Fail(std::move(owned), StatusCode::kUnavailable, why); };
     const char* target = nullptr;
     curl_easy_getinfo(transfer.easy, CURLINFO_REDIRECT_URL, &target);
+    const std::string region = transfer.header("x-amz-bucket-region");
+    if (target == nullptr && !region.empty()) return fail(fmt::format("{}: the bucket is in the region '{}'", http, region));
     if (target == nullptr) return fail(http + ", which leads nowhere");
     const std::string url = target, scheme = PartOf(url, CURLUPART_SCHEME);
     if (scheme != "https" && (scheme != "http" || transfer.url.starts_with("https:"))) {
       return fail(fmt::format("leads to a {} address, which is not followed", scheme.empty() ? "strange" : scheme));
     }
     if (++transfer.redirects > kMostRedirects) return fail(fmt::format("leads on more than {} times", kMostRedirects));
-    transfer.url = url;
-    transfer.host = HostAndPort(url);
-    --transfer.tries;
-    Wait(std::move(owned));
+    transfer.Lead(url);
+    Once(std::move(owned));
   }
 
   void Again(Owned owned, const std::string& why) {
@@ -413,7 +311,7 @@ struct HttpTransfers::Impl {
     const std::string retry_after = transfer.header("Retry-After");
     const Duration asked_for = SecondsUntil(retry_after);
     const Time next = MonotonicNow() + std::max(pause, asked_for);
-    if (transfer.tries == timing.tries || asked_for > kLongestPause || next > transfer.begun + kPatience) {
+    if (transfer.tries == timing.tries || asked_for > kLongestPause || next > transfer.begun + timing.patience) {
       const std::string waits = asked_for > kLongestPause ? fmt::format("; the server says to come back in {} s", retry_after) : "";
       return Fail(std::move(owned), StatusCode::kUnavailable,
                   fmt::format("{}, {} {}{}", why, transfer.tries, transfer.tries == 1 ? "try" : "tries", waits));
@@ -482,11 +380,7 @@ HttpTransfers::HttpTransfers(const Timing& timing) : impl_(std::make_unique<Impl
 HttpTransfers::~HttpTransfers() = default;
 
 void HttpTransfers::Get(HttpGet get, Done done) {
-  auto transfer = std::make_unique<Transfer>();
-  transfer->url = get.url;
-  transfer->host = HostAndPort(get.url);
-  transfer->get = std::move(get);
-  transfer->askers.push_back({transfer->get.span, std::move(done)});
+  auto transfer = std::make_unique<Transfer>(std::move(get), std::move(done));
   {
     const std::lock_guard lock(impl_->mutex);
     impl_->asked.push_back(std::move(transfer));

@@ -5,6 +5,11 @@
 // double from kFirstPause on, and are drawn between half of that and all of it, so that clients that failed together do not come back
 // together. A server that says when to come back (Retry-After) is asked no sooner; if that is later than kLongestPause, the request fails.
 //
+// How long an object is, HEAD tells; if it does not, the answer to a request for the first bytes. What comes whole with a Content-Encoding
+// is decoded, although none is asked for; bytes that do not have the encoding that they are said to have are taken as they come.
+//
+// A bucket that is in another region than its address or its signatures say, as the server tells, is asked there from then on.
+//
 // Parts of one object that wait for their turn and lie side by side, such as the chunks of a shard, become one request.
 //
 // Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may not end at a loopback or
@@ -30,20 +35,30 @@
 
 namespace slabstream {
 
+// What goes along with the requests of a store, as long as no redirect leads to another server.
+struct HttpAccess {
+  std::string query;                 // of each address, encoded; empty: none
+  std::vector<std::string> headers;  // "NAME: VALUE"
+  std::optional<S3Access> s3;        // that signs them
+};
+
 struct HttpGet {
-  std::string url;                                   // absolute, encoded
-  std::optional<ByteSpan> span;                      // of the object, not empty; none: all of it
-  bool only_size = false;                            // HEAD: no bytes
-  std::uint64_t most = 0;                            // bytes of an answer
-  std::string known = {};                            // an ETag: if the object still has it, no bytes come
-  std::shared_ptr<const S3Access> access = nullptr;  // that signs it, as long as no redirect leads to another host; null: it is anonymous
+  std::string url;                                     // absolute, encoded, without a query
+  std::optional<ByteSpan> span;                        // of the object, not empty; none: all of it
+  bool only_size = false;                              // no bytes
+  std::uint64_t most = 0;                              // bytes of an answer
+  std::string known = {};                              // an ETag: if the object still has it, no bytes come
+  std::shared_ptr<const HttpAccess> access = nullptr;  // null: nothing goes along
 };
 
 struct HttpObject {
-  Bytes bytes;             // fewer than asked for if the object ends before
-  std::uint64_t size = 0;  // of the whole object
-  std::string version;     // ETag, or else when it was changed; empty: the server tells neither
-  bool unchanged = false;  // it is still the one that was known (HttpGet::known)
+  // Empty: it is the object. Else the server sent something instead, and this says what: HTTP 403 or 204, or a page of HTML. Many servers
+  // answer so for what is not there; others, for what one may not read.
+  std::string instead = {};
+  Bytes bytes = {};          // fewer than asked for if the object ends before
+  std::uint64_t size = 0;    // of the whole object
+  std::string version = {};  // ETag, or else when it was changed; empty: the server tells neither
+  bool unchanged = false;    // it is still the one that was known (HttpGet::known)
 };
 
 class HttpTransfers {
@@ -56,10 +71,11 @@ class HttpTransfers {
   static constexpr Duration kFirstPause = std::chrono::milliseconds(200), kLongestPause = std::chrono::seconds(30);
   static constexpr Duration kConnecting = std::chrono::seconds(10);  // for a connection to be there
   static constexpr Duration kStalled = std::chrono::seconds(20);     // without a byte
-  static constexpr Duration kPatience = std::chrono::seconds(60);    // nothing is tried again later than this after the first try
+  // So long after its first try a request fails, unless at least 1 KiB a second comes.
+  static constexpr Duration kPatience = std::chrono::seconds(60);
 
   struct Timing {
-    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled;
+    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled, patience = kPatience;
     int tries = kTries;  // at least 1
   };
 

@@ -47,7 +47,7 @@ Status OpenFailure(const std::string& what, int error) {
     case ENOENT:
     case ENOTDIR: return Status::NotFound(what + ": does not exist");
     case EXDEV:
-    case ELOOP: return Status::Unavailable(what + ": a link that leads out of the folder is not followed");
+    case ELOOP: return Status::Unavailable(what + ": a link that leads out of the folder is not followed without the option follow-links");
     default: return Status::Unavailable(fmt::format("{}: cannot be opened: {}", what, std::generic_category().message(error)));
   }
 }

@@ -19,8 +19,8 @@ std::future<Result<Bytes>> BeginRead(Store& store, const std::string& key, std::
 
 Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most) { return BeginRead(store, key, most).get(); }
 
-Result<std::shared_ptr<Store>> OpenStore(const std::string& path, KeptObjects kept) {
-  if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess(), ProcessObjectCache(), kept);
+Result<std::shared_ptr<Store>> OpenStore(const std::string& path, const WebOptions& options) {
+  if (IsUrl(path)) return HttpStore(path, HttpTransfers::OfProcess(), ProcessObjectCache(), options);
   std::error_code error;
   const std::filesystem::file_status about = std::filesystem::status(path, error);
   if (!std::filesystem::exists(about)) return Status::NotFound(path + ": does not exist");

@@ -55,22 +55,30 @@ std::future<Result<Bytes>> BeginRead(Store& store, const std::string& key, std::
 // Waits for it.
 Result<Bytes> ReadNow(Store& store, const std::string& key, std::uint64_t most = kMostMetadataBytes);
 
-// A folder of the file system; links that lead out of it are not followed. Does not check that it exists.
-std::shared_ptr<Store> FolderStore(const std::string& path);
+// A folder of the file system. Does not check that it exists.
+enum class Links : std::uint8_t { kStayInside, kMayLeadOut };  // those that lead out of the folder are not followed, or are
+std::shared_ptr<Store> FolderStore(const std::string& path, Links links = Links::kStayInside);
 // The objects in a zip archive that are stored or deflated. Reads its directory. NotFound, InvalidArgument, DataLoss, ResourceExhausted.
 Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;
 class ObjectCache;
-enum class KeptObjects : std::uint8_t { kAreChecked, kAreTaken };  // in the cache: the server is asked whether they are still right, or not
+struct WebOptions {
+  // Of objects in the cache: the server is asked whether they are still right, or not.
+  enum class Kept : std::uint8_t { kAreChecked, kAreTaken } kept = Kept::kAreChecked;
+  std::string query = {};                 // encoded, that goes with each address; empty: none
+  std::vector<std::string> headers = {};  // that go with each request: "NAME:VALUE" or "NAME:@FILE" with the value in a file
+};
 // The objects below an address (IsUrl, common/base/url.h), "http://HOST/PATH", "https://HOST/PATH" or that of a bucket (FindS3Place), read
-// by `transfers`, which must outlive it, and kept in `cache`, if any. Asks for nothing yet. It does not list. InvalidArgument: another
-// address, or one with a name, a password, a query or a fragment; as FindS3Place.
+// by `transfers`, which must outlive it, and kept in `cache`, if any. Asks for nothing yet. It does not list. Query and headers go to this
+// server alone. What a server says of an object with HTTP 403, or with a page of HTML, counts as "there is none" (NotFound) if the server
+// then sends another object that was read before; else it is Unavailable. InvalidArgument: another address, or one with a name, a password,
+// a query or a fragment; as FindS3Place; a file of a header that cannot be read or holds no text of one line.
 Result<std::shared_ptr<Store>> HttpStore(const std::string& address, HttpTransfers& transfers, const ObjectCache* cache = nullptr,
-                                         KeptObjects kept = KeptObjects::kAreChecked);
+                                         const WebOptions& options = {});
 // One file: its only object has the key "file". Does not check that it exists.
 std::shared_ptr<Store> FileStore(const std::string& path);
 
 // An address (IsUrl), folder, zip archive (.zip, .ozx) or file. NotFound: there is nothing. Errors of HttpStore and ZipStore.
-Result<std::shared_ptr<Store>> OpenStore(const std::string& path, KeptObjects kept = KeptObjects::kAreChecked);
+Result<std::shared_ptr<Store>> OpenStore(const std::string& path, const WebOptions& options = {});
 
 }  // namespace slabstream

@@ -22,26 +22,27 @@ ArrayShape ShapeOf(std::size_t pages, const RawHeader& picture, const TiffChunks
                    .fill = std::vector<std::byte>(BytesPerSample(picture.type))};
   if (picture.components > 1) {
     shape.size.push_back(std::uint64_t(picture.components));
-    shape.chunk.push_back(std::uint64_t(picture.components));
+    shape.chunk.push_back(chunks.separate ? 1 : std::uint64_t(picture.components));
   }
   return shape;
 }
 
 }  // namespace
 
-Result<TiffPool::Entry> TiffPool::Take(std::uint64_t directory) {
+Result<TiffPool::Entry> TiffPool::Take(const TiffPlace& place) {
   {
     const std::lock_guard lock(mutex_);
-    const auto found = std::ranges::find(entries_, directory, &Entry::directory);
+    const auto found = std::ranges::find_if(
+        entries_, [&](const Entry& entry) { return entry.directory == place.directory && entry.number == place.file; });
     if (found != entries_.end()) {
       Entry entry = std::move(*found);
       entries_.erase(found);
       return entry;
     }
   }
-  Result<std::unique_ptr<TiffFile>> file = file_->At(directory);
+  Result<std::unique_ptr<TiffFile>> file = TiffFile::Open(files_[place.file], place.directory);
   if (!file.ok()) return file.status();
-  return Entry{directory, *std::move(file)};
+  return Entry{place.file, place.directory, *std::move(file)};
 }
 
 void TiffPool::Return(Entry entry) {
@@ -51,18 +52,20 @@ void TiffPool::Return(Entry entry) {
   entries_.push_back(std::move(entry));
 }
 
-TiffPagesArray::TiffPagesArray(std::string name, std::shared_ptr<TiffPool> pool, std::vector<std::uint64_t> directories,
-                               const RawHeader& picture, const TiffChunks& chunks, SourceContext context)
+TiffPagesArray::TiffPagesArray(std::string name, std::shared_ptr<TiffPool> pool, std::vector<TiffPlace> places, const RawHeader& picture,
+                               const TiffChunks& chunks, SourceContext context)
     : state_(std::make_shared<const State>(
-          State{std::move(name), std::move(pool), directories, picture, chunks, ShapeOf(directories.size(), picture, chunks)})),
+          State{std::move(name), std::move(pool), places, picture, chunks, ShapeOf(places.size(), picture, chunks)})),
       context_(std::move(context)) {}
 
 void TiffPagesArray::ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) {
-  const TiffChunk chunk = {std::int32_t(index[2]), std::int32_t(index[1])};
-  context_->PostDecode([state = state_, page = std::size_t(index[0]), chunk, done = std::move(done)] {
+  const int component = state_->chunks.separate ? int(index[3]) : 0;
+  const auto slice = std::size_t(index[0]);
+  const TiffChunk chunk = {std::int32_t(index[2]), std::int32_t(index[1]), component, state_->places[slice].plane};
+  context_->PostDecode([state = state_, slice, chunk, done = std::move(done)] {
     const auto read = [&]() -> Result<std::optional<StoredChunk>> {
       try {
-        return state->Read(page, chunk);
+        return state->Read(slice, chunk);
       } catch (const std::exception& error) {
         return Status::ResourceExhausted(fmt::format("{}: a chunk cannot be read: {}", state->name, error.what()));
       }
@@ -85,13 +88,13 @@ Status TiffPagesArray::State::CheckPage(const std::string& page, TiffFile& file)
                                              its_chunks->width, its_chunks->height, chunks.width, chunks.height));
 }
 
-Result<std::optional<StoredChunk>> TiffPagesArray::State::Read(std::size_t page, const TiffChunk& chunk) const {
-  const std::string place = fmt::format("{}: slice {}", name, page);
+Result<std::optional<StoredChunk>> TiffPagesArray::State::Read(std::size_t slice, const TiffChunk& chunk) const {
+  const std::string place = fmt::format("{}: slice {}", name, slice);
   const auto failed = [&](const Status& status, const std::string& where) {
     return Status(status.code(), where + ": " + status.message());
   };
-  Result<TiffPool::Entry> entry = pool->Take(directories[page]);
-  if (!entry.ok()) return failed(entry.status(), fmt::format("slice {}", page));
+  Result<TiffPool::Entry> entry = pool->Take(places[slice]);
+  if (!entry.ok()) return failed(entry.status(), fmt::format("slice {}", slice));
   if (entry->is_new) {
     if (Status status = CheckPage(place, *entry->file); !status.ok()) return status;
   }
@@ -103,7 +106,7 @@ Result<std::optional<StoredChunk>> TiffPagesArray::State::Read(std::size_t page,
   UnwrittenVector<std::byte> elements(bytes, std::byte{0});  // whatever a decoder of libtiff leaves out
   const Result<std::uint64_t> stored = entry->file->ReadChunk(picture, chunks, chunk, elements);
   if (!stored.ok()) {
-    return failed(stored.status(), fmt::format("slice {}, {} {}, {}", page, chunks.tiled() ? "tile" : "strips", chunk.column, chunk.row));
+    return failed(stored.status(), fmt::format("slice {}, {} {}, {}", slice, chunks.tiled() ? "tile" : "strips", chunk.column, chunk.row));
   }
   pool->Return(*std::move(entry));
   return std::optional(StoredChunk{Bytes(std::move(elements)), *stored});

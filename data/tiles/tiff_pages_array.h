@@ -1,4 +1,4 @@
-// TiffPagesArray: pictures of one size in a TIFF file as an array of the axes z, y, x, and where a pixel has several components, these.
+// TiffPagesArray: pictures of one size in TIFF files as an array of the axes z, y, x, and where a pixel has several components, these.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,39 @@
 
 namespace slabstream {
 
+// Where a picture is.
+struct TiffPlace {
+  std::size_t file = 0;         // in the pool
+  std::uint64_t directory = 0;  // its place there
+  std::int64_t plane = 0;       // as of TiffChunk
+};
+
 // Open files at directories, which are used by one thread at a time: those that were used last.
 class TiffPool {
  public:
-  // `file`: whose directories they are.
-  explicit TiffPool(std::unique_ptr<TiffFile> file) : file_(std::move(file)) {}
+  // `files`: their paths.
+  explicit TiffPool(std::vector<std::string> files) : files_(std::move(files)) {}
 
   struct Entry {
+    std::size_t number = 0;  // of the file
     std::uint64_t directory = 0;
     std::unique_ptr<TiffFile> file;
     bool is_new = true;  // nobody has used it
   };
-  // Any thread. DataLoss: there is no such directory.
-  Result<Entry> Take(std::uint64_t directory);
+  // Any thread. Errors of TiffFile::Open.
+  Result<Entry> Take(const TiffPlace& place);
   void Return(Entry entry);
 
  private:
-  const std::unique_ptr<TiffFile> file_;  // only opens others
-  std::mutex mutex_;                      // guards what follows
-  std::vector<Entry> entries_;            // the last used one last
+  const std::vector<std::string> files_;
+  std::mutex mutex_;            // guards what follows
+  std::vector<Entry> entries_;  // the last used one last
 };
 
 class TiffPagesArray : public ChunkedArray {
  public:
-  // `directories`: of the pages, along z. `picture`: the header of each. `name`: for messages.
-  TiffPagesArray(std::string name, std::shared_ptr<TiffPool> pool, std::vector<std::uint64_t> directories, const RawHeader& picture,
+  // `places`: of the pictures, along z. `picture`: the header of each. `name`: for messages.
+  TiffPagesArray(std::string name, std::shared_ptr<TiffPool> pool, std::vector<TiffPlace> places, const RawHeader& picture,
                  const TiffChunks& chunks, SourceContext context);
 
   const ArrayShape& shape() const override { return state_->shape; }
@@ -48,12 +56,12 @@ class TiffPagesArray : public ChunkedArray {
   struct State {
     std::string name;
     std::shared_ptr<TiffPool> pool;
-    std::vector<std::uint64_t> directories;
+    std::vector<TiffPlace> places;
     RawHeader picture;
     TiffChunks chunks;
     ArrayShape shape;
 
-    Result<std::optional<StoredChunk>> Read(std::size_t page, const TiffChunk& chunk) const;
+    Result<std::optional<StoredChunk>> Read(std::size_t slice, const TiffChunk& chunk) const;
     Status CheckPage(const std::string& page, TiffFile& file) const;
   };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 #include <utility>
 
 #include "common/base/printable.h"
@@ -22,39 +23,37 @@ bool Recognises(const std::string& path, const ReadOptions&) {
   return format != nullptr && format->name == "TIFF";
 }
 
-// The pictures of one level, at the places of their directories; `picture`: the header of the first one.
+// The pictures of one level; `picture`: the header of the first one.
 struct Pictures {
-  std::vector<std::uint64_t> directories;
+  std::vector<TiffPlace> places;
   RawHeader picture;
   TiffChunks chunks;
 };
 
-Result<Pictures> ReadPictures(const TiffFile& file, std::vector<std::uint64_t> directories) {
-  const Result<std::unique_ptr<TiffFile>> first = file.At(directories.front());
+Result<Pictures> ReadPictures(const TiffStack& stack, std::vector<TiffPlace> places) {
+  const Result<std::unique_ptr<TiffFile>> first = TiffFile::Open(stack.files[places.front().file], places.front().directory);
   if (!first.ok()) return first.status();
   Result<RawHeader> picture = (*first)->ReadHeader();
   if (!picture.ok()) return picture.status();
   const Result<TiffChunks> chunks = (*first)->ReadChunks(*picture);
   if (!chunks.ok()) return chunks.status();
-  return Pictures{std::move(directories), *std::move(picture), *chunks};
+  return Pictures{std::move(places), *std::move(picture), *chunks};
 }
 
 // Of all levels that there are for each slice. What a file says besides, such as a thumbnail of one page, is left out: pictures that are
 // not smaller than those before, or of another kind.
 Result<std::vector<Pictures>> ReadLevels(const TiffStack& stack) {
-  std::vector<const TiffPage*> slices;
-  for (std::int64_t i = 0; i < stack.order.count; ++i) slices.push_back(&stack.pages[std::size_t(stack.order.PageOf(i))]);
-  std::vector<std::uint64_t> directories;
-  for (const TiffPage* slice : slices) directories.push_back(slice->offset);
-  Result<Pictures> finest = ReadPictures(*stack.file, std::move(directories));
+  std::vector<TiffPlace> places;
+  for (const TiffSlice& slice : stack.slices) places.push_back({slice.file, slice.directory, slice.plane});
+  Result<Pictures> finest = ReadPictures(stack, std::move(places));
   if (!finest.ok()) return finest.status();
   std::vector<Pictures> levels = {*std::move(finest)};
-  const std::size_t smaller =
-      (*std::ranges::min_element(slices, {}, [](const TiffPage* slice) { return slice->smaller.size(); }))->smaller.size();
+  const auto levels_of = [](const TiffSlice& slice) { return slice.plane > 0 ? 0 : slice.smaller.size(); };
+  const std::size_t smaller = levels_of(*std::ranges::min_element(stack.slices, {}, levels_of));
   for (std::size_t i = 0; i < smaller; ++i) {
-    std::vector<std::uint64_t> places;
-    for (const TiffPage* slice : slices) places.push_back(slice->smaller[i]);
-    Result<Pictures> level = ReadPictures(*stack.file, std::move(places));
+    std::vector<TiffPlace> of_level;
+    for (const TiffSlice& slice : stack.slices) of_level.push_back({slice.file, slice.smaller[i]});
+    Result<Pictures> level = ReadPictures(stack, std::move(of_level));
     if (!level.ok()) continue;
     const RawHeader &picture = level->picture, &before = levels.back().picture;
     const bool fits = picture.type == before.type && picture.components == before.components && picture.size != before.size &&
@@ -64,12 +63,22 @@ Result<std::vector<Pictures>> ReadLevels(const TiffStack& stack) {
   return levels;
 }
 
+// Those whose change makes another volume of it: `path`, and the files that slices are in.
+std::vector<std::string> WatchedFiles(const std::string& path, const TiffStack& stack) {
+  std::set<std::string> files;
+  for (const TiffSlice& slice : stack.slices) files.insert(stack.files[slice.file]);
+  files.erase(path);
+  std::vector<std::string> all = {path};
+  all.insert(all.end(), files.begin(), files.end());
+  return all;
+}
+
 Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const ReadOptions& options, const SourceContext& context) {
   if (Status status = CheckVolume(path, options); !status.ok()) return status;
   Result<TiffStack> stack = OpenTiffStack(path, options);
   if (!stack.ok()) return stack.status();
   const RawHeader& header = stack->header;
-  if (Status status = CheckChannel(path, header.components, stack->of_pages); !status.ok()) return status;
+  if (Status status = CheckChannel(path, header, stack->of_pages); !status.ok()) return status;
   if (stack->of_pages.channel == kLuminance) {
     return Status::InvalidArgument(path + ": cannot be read tile by tile: luminance needs several components of a voxel");
   }
@@ -81,10 +90,16 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
 
   Pyramid pyramid{.orientation = geometry.orientation,
                   .rescale = header.rescale,
-                  .info = {.format = "TIFF", .channels = stack->order.channels, .times = stack->order.times, .files = {path}}};
-  if (!stack->order.of_channel) pyramid.info.channels.resize(header.components > 1 ? std::size_t(header.components) : 0);
-  pyramid.info.channel = stack->order.of_channel ? stack->order.channel : stack->of_pages.channel.value_or(0);
-  const auto pool = std::make_shared<TiffPool>(std::move(stack->file));
+                  .info = {.format = "TIFF",
+                           .channels = header.channels,
+                           .channel = header.channels.empty() ? stack->of_pages.channel.value_or(0) : header.channel,
+                           .times = int(header.volumes),
+                           .time = int(header.number),
+                           .window = stack->window,
+                           .notes = header.notes,
+                           .files = WatchedFiles(path, *stack)}};
+  if (header.channels.empty()) pyramid.info.channels.resize(header.components > 1 ? std::size_t(header.components) : 0);
+  const auto pool = std::make_shared<TiffPool>(stack->files);
   for (Pictures& level : *levels) {
     const Vec3 size = ToVec3({level.picture.size.x, level.picture.size.y, geometry.size.z});
     const Vec3 spacing = geometry.spacing * ToVec3(geometry.size) / size;
@@ -94,7 +109,7 @@ Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const Re
     const Vec3 first = geometry.orientation.ToWorld(0.5 * (spacing - geometry.spacing));
     const std::string name = pyramid.levels.empty() ? path : path + ": level " + std::to_string(pyramid.levels.size());
     pyramid.levels.push_back(
-        {.array = std::make_shared<TiffPagesArray>(name, pool, std::move(level.directories), level.picture, level.chunks, context),
+        {.array = std::make_shared<TiffPagesArray>(name, pool, std::move(level.places), level.picture, level.chunks, context),
          .at = std::move(at),
          .spacing = spacing,
          .origin = geometry.orientation.origin + first});
@@ -110,6 +125,8 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 
 }  // namespace
 
-SourceFormat TiledTiff() { return {.name = "TIFF", .recognises = Recognises, .options = {"time", "channel", "spacing"}, .open = Open}; }
+SourceFormat TiledTiff() {
+  return {.name = "TIFF", .recognises = Recognises, .options = {"time", "channel", "series", "spacing"}, .open = Open};
+}
 
 }  // namespace slabstream

@@ -1,4 +1,5 @@
-// A compressed DICOM frame, as slabstream-dicom-decoder is told of it: by text, since that program is another process.
+// A compressed DICOM frame, as slabstream-dicom-decoder is told of it: by text, since that program is another process. It answers each
+// frame by the size of what the codec printed (uint32 in this machine's byte order, at most kMostCodecText), that text, and the pixels.
 #pragma once
 
 #include <algorithm>
@@ -16,12 +17,13 @@
 namespace slabstream {
 
 inline constexpr const char* kDicomDecoderProgram = "slabstream-dicom-decoder";
+inline constexpr std::uint32_t kMostCodecText = 4096;  // bytes for a frame; what a codec prints beyond is lost
 
 enum class DicomCodec { kJpeg, kJpegLs, kJpeg2000, kRle };
 
 // Of a transfer syntax (UID), if its frames can be decompressed.
 inline std::optional<DicomCodec> FindDicomCodec(std::string_view transfer_syntax) {
-  constexpr std::array<std::pair<std::string_view, DicomCodec>, 9> kCodecs = {{
+  constexpr std::array<std::pair<std::string_view, DicomCodec>, 12> kCodecs = {{
       {"1.2.840.10008.1.2.4.50", DicomCodec::kJpeg},
       {"1.2.840.10008.1.2.4.51", DicomCodec::kJpeg},
       {"1.2.840.10008.1.2.4.57", DicomCodec::kJpeg},
@@ -30,6 +32,9 @@ inline std::optional<DicomCodec> FindDicomCodec(std::string_view transfer_syntax
       {"1.2.840.10008.1.2.4.81", DicomCodec::kJpegLs},
       {"1.2.840.10008.1.2.4.90", DicomCodec::kJpeg2000},
       {"1.2.840.10008.1.2.4.91", DicomCodec::kJpeg2000},
+      {"1.2.840.10008.1.2.4.201", DicomCodec::kJpeg2000},  // this one and the next two: high throughput
+      {"1.2.840.10008.1.2.4.202", DicomCodec::kJpeg2000},
+      {"1.2.840.10008.1.2.4.203", DicomCodec::kJpeg2000},
       {"1.2.840.10008.1.2.5", DicomCodec::kRle},
   }};
   const auto* const found = std::ranges::find(kCodecs, transfer_syntax, &std::pair<std::string_view, DicomCodec>::first);

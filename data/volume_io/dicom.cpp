@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <span>
 
 #include "data/volume_io/dicom_frames.h"
+#include "data/volume_io/dicom_segments.h"
 #include "data/volume_io/dicom_series.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/slice_stack.h"
@@ -12,13 +14,14 @@
 namespace slabstream {
 namespace {
 
-// The frames of a series in the order of its stack.
-std::vector<DicomFrameNumber> StackedFrames(const DicomSeries& series) {
+// The frames of a volume of the series, in the order of its stack.
+std::vector<DicomFrameNumber> StackedFrames(const DicomSeries& series, std::int64_t volume) {
   std::vector<DicomFrameNumber> frames, stacked;
   for (const DicomImage& image : series.images) {
     for (std::size_t i = 0; i < image.frames.size(); ++i) frames.push_back({&image, i});
   }
-  for (const std::size_t i : series.stack.order) stacked.push_back(frames[i]);
+  const std::size_t count = std::size_t(series.stack.size.z), begin = std::size_t(volume) * count;
+  for (std::size_t i = begin; i < begin + count; ++i) stacked.push_back(frames[series.stack.order[i]]);
   return stacked;
 }
 
@@ -26,6 +29,24 @@ std::vector<DicomFrameNumber> StackedFrames(const DicomSeries& series) {
 bool Recognises(const std::string& path, const ReadOptions&) {
   std::error_code error;
   return std::filesystem::is_directory(path, error) ? !HasVolumeFiles(path) && HoldsDicom(path) : BeginsLikeDicom(path);
+}
+
+Result<RawVolume> ReadStack(const std::string& path, const DicomSeries& series, RawHeader header, const ReadOptions& options) {
+  const std::vector<DicomFrameNumber> frames = StackedFrames(series, header.number);
+  const DicomSamples samples = SamplesOf(frames);
+  header.type = samples.type;
+  header.rescale = samples.rescale;
+  if (samples.as_values) header.notes.emplace_back("slices differ in RescaleSlope, RescaleIntercept or their type: voxels are data values");
+  Result<RawVolume> raw = TakeMemory(path, header, options);
+  if (!raw.ok() || options.headers_only) return raw;
+  Result<DicomFrameReader> reader = DicomFrameReader::Start(frames, samples);
+  if (!reader.ok()) return reader.status();
+  const std::size_t slice_bytes = raw->bytes.size() / frames.size();
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (Status status = reader->Read(std::span(raw->bytes).subspan(i * slice_bytes, slice_bytes)); !status.ok()) return status;
+    if (options.progress != nullptr) options.progress->Add(std::int64_t(slice_bytes));
+  }
+  return raw;
 }
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
@@ -37,30 +58,43 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
   if (!series.trouble.ok()) {
     return Status(series.trouble.code(), fmt::format("{}: series {}: {}", path, series.number, series.trouble.message()));
   }
-  const std::vector<DicomFrameNumber> frames = StackedFrames(series);
-  const DicomSamples samples = SamplesOf(frames);
-  const RawHeader header{.size = series.stack.size,
-                         .world = World::kPatient,
-                         .steps = series.stack.steps,
-                         .origin = series.stack.origin,
-                         .matrix = "ImageOrientationPatient",
-                         .type = samples.type,
-                         .rescale = samples.rescale};
-  Result<RawVolume> raw = TakeMemory(path, header, options);
-  if (!raw.ok()) return raw;
+  const DicomImage& first = series.images.front();
+  RawHeader header{.size = series.stack.size,
+                   .volumes = series.stack.volumes,
+                   .world = World::kPatient,
+                   .steps = series.stack.steps,
+                   .origin = series.stack.origin,
+                   .matrix = "ImageOrientationPatient"};
+  const std::string& told_apart = series.stack.told_apart;
+  const Result<std::int64_t> volume = ChosenVolume(
+      told_apart.empty() ? path : fmt::format("{}: series {}, of {}", path, series.number, told_apart), header.volumes, options);
+  if (!volume.ok()) return volume.status();
+  header.number = *volume;
+  if (!told_apart.empty()) header.notes.push_back(fmt::format("times are told apart by {}", told_apart));
+  if (series.copies > 0) {
+    header.notes.push_back(
+        fmt::format("{} copies of its images, of the same SOPInstanceUID and the same pixels, are left out", series.copies));
+  }
+  if (first.photometric == "MONOCHROME1") {
+    header.notes.emplace_back("MONOCHROME1: low values are meant to be bright; values are not inverted");
+  }
+  Result<RawVolume> raw = first.is_segmentation() ? ReadSegments(path, series, std::move(header), options)
+                                                  : ReadStack(path, series, std::move(header), options);
   std::error_code error;
-  const bool elsewhere = frames.front().image->path != path && !std::filesystem::is_directory(path, error);
-  if (elsewhere) raw->samples_file = std::filesystem::absolute(path, error).parent_path();  // a DICOMDIR stands for its folder
-  if (options.headers_only) return raw;
-  if (Status status = ReadFrames(frames, samples, raw->bytes, options.progress); !status.ok()) return status;
+  const bool elsewhere = first.path != path && !std::filesystem::is_directory(path, error);
+  if (raw.ok() && elsewhere) raw->other_files = {std::filesystem::absolute(path, error).parent_path()};  // a DICOMDIR stands for its folder
   return raw;
 }
 
 }  // namespace
 
 VolumeFormat Dicom() {
-  return {
-      .name = "DICOM", .endings = {}, .also = "DICOM, a folder or a file", .recognises = Recognises, .options = {"series"}, .read = Read};
+  return {.name = "DICOM",
+          .endings = {},
+          .also = "DICOM, a folder or a file",
+          .recognises = Recognises,
+          .options = {"series", "time", "channel"},
+          .read = Read};
 }
 
 bool IsDicom(const std::string& path) {

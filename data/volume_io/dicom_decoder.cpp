@@ -53,6 +53,28 @@ FileDescriptor FileOf(const std::string& text) {
   return written ? std::move(file) : FileDescriptor();
 }
 
+// Fills `out`; false: the process has ended.
+bool ReadAll(int pipe, std::span<std::byte> out) {
+  while (!out.empty()) {
+    const ssize_t count = ::read(pipe, out.data(), out.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    out = out.subspan(std::size_t(count));
+  }
+  return true;
+}
+
+// The words of a text, in printable ASCII.
+std::string InOneLine(const std::string& text) {
+  std::istringstream words(text);
+  std::string line, word;
+  while (words >> word) line += (line.empty() ? "" : " ") + word;
+  std::ranges::replace_if(
+      line, [](char c) { return c < ' ' || c > '~'; }, '?');
+  constexpr std::size_t kMost = 200;
+  return line.size() <= kMost ? line : line.substr(0, kMost) + " ...";
+}
+
 }  // namespace
 
 bool CanDecompress(const std::string& transfer_syntax) { return FindDicomCodec(transfer_syntax).has_value(); }
@@ -90,20 +112,21 @@ DicomDecoder::~DicomDecoder() {
   }
 }
 
-Status DicomDecoder::Read(std::span<std::byte> out) {
+Result<std::string> DicomDecoder::Read(std::span<std::byte> out) {
   const CompressedFrame& frame = frames_[next_];
   const int pipe = processes_[next_ % processes_.size()].pipe;
   ++next_;
-  while (!out.empty()) {
-    const ssize_t count = ::read(pipe, out.data(), out.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) {
-      return Status::DataLoss(fmt::format("{}: truncated or damaged: its compressed pixels cannot be read (transfer syntax {})", frame.path,
-                                          frame.transfer_syntax));
-    }
-    out = out.subspan(std::size_t(count));
+  std::uint32_t text_bytes = 0;
+  std::string text;
+  bool whole = ReadAll(pipe, std::as_writable_bytes(std::span(&text_bytes, 1))) && text_bytes <= kMostCodecText;
+  if (whole) {
+    text.resize(text_bytes);
+    whole = ReadAll(pipe, std::as_writable_bytes(std::span(text))) && ReadAll(pipe, out);
+    text = InOneLine(text);
   }
-  return Status::Ok();
+  if (whole) return text;
+  return Status::DataLoss(fmt::format("{}: truncated or damaged: its compressed pixels cannot be read (transfer syntax {}){}", frame.path,
+                                      frame.transfer_syntax, text.empty() ? "" : "; the codec says: " + text));
 }
 
 }  // namespace slabstream

@@ -20,7 +20,7 @@ namespace slabstream {
 // Whether frames of this transfer syntax (UID) can be decompressed.
 bool CanDecompress(const std::string& transfer_syntax);
 // Their names, for messages.
-inline constexpr const char* kCompressions = "JPEG, JPEG Lossless, JPEG-LS, JPEG 2000 and RLE";
+inline constexpr const char* kCompressions = "JPEG, JPEG Lossless, JPEG-LS, JPEG 2000 (HTJ2K, too) and RLE";
 
 // Processes that decompress frames ahead of the caller. One thread at a time.
 class DicomDecoder {
@@ -31,8 +31,9 @@ class DicomDecoder {
   DicomDecoder& operator=(DicomDecoder&&) = delete;
   ~DicomDecoder();  // ends the processes
 
-  // The next frame: its pixels in this machine's byte order, bits_allocated each. DataLoss: damaged; the message names the file.
-  Status Read(std::span<std::byte> out);
+  // The next frame: its pixels in this machine's byte order, bits_allocated each. Returns what the codec printed about it, in one line of
+  // ASCII: "" if it is content; else the pixels may be damaged. DataLoss: damaged; the message names the file.
+  Result<std::string> Read(std::span<std::byte> out);
 
  private:
   struct Process {

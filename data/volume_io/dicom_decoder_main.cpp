@@ -1,5 +1,6 @@
 // slabstream-dicom-decoder: decompresses DICOM frames by GDCM for the program that starts it (dicom_decoder.h). It reads the frames from
-// stdin, writes their pixels to stdout, and ends early where a frame is damaged, takes too long or needs too much memory.
+// stdin, writes to stdout what the codec printed and the pixels of each, and ends early where a frame is damaged, takes too long or needs
+// too much memory.
 #include <fcntl.h>
 #include <gdcmDataElement.h>
 #include <gdcmJPEG2000Codec.h>
@@ -7,12 +8,16 @@
 #include <gdcmJPEGLSCodec.h>
 #include <gdcmRLECodec.h>
 #include <gdcmSequenceOfFragments.h>
+#include <gdcmTrace.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <iostream>
@@ -33,6 +38,7 @@ struct Stream {
   std::int64_t columns = 0, rows = 0;
   int components = 0, bits = 0;
   bool is_signed = false;
+  bool cosines = false;  // of JPEG: lossy, so that GDCM has a library for 8 bits and one for 12
 };
 
 int ByteAt(std::string_view bytes, std::size_t at) { return static_cast<unsigned char>(bytes[at]); }
@@ -53,7 +59,8 @@ std::optional<Stream> ReadJpegHeader(std::string_view bytes) {
       return Stream{.columns = ShortAt(bytes, at + 7),
                     .rows = ShortAt(bytes, at + 5),
                     .components = ByteAt(bytes, at + 9),
-                    .bits = ByteAt(bytes, at + 4)};
+                    .bits = ByteAt(bytes, at + 4),
+                    .cosines = (marker & 3) != 3};
     }
     at += 2 + std::size_t(ShortAt(bytes, at + 2));
   }
@@ -131,7 +138,8 @@ std::string Decompressed(const CompressedFrame& frame, const std::string& bytes)
   codec->SetNumberOfDimensions(2);
   codec->SetPlanarConfiguration(0);
   codec->SetPhotometricInterpretation(gdcm::PhotometricInterpretation::MONOCHROME2);
-  codec->SetPixelFormat(gdcm::PixelFormat(1, bits(8 * sample_bytes), bits(std::size_t(stream->bits)), bits(std::size_t(stream->bits) - 1),
+  const std::size_t allocated = codec_kind == DicomCodec::kJpeg && stream->cosines && stream->bits == 12 ? 12 : 8 * sample_bytes;
+  codec->SetPixelFormat(gdcm::PixelFormat(1, bits(allocated), bits(std::size_t(stream->bits)), bits(std::size_t(stream->bits) - 1),
                                           bits(stream->is_signed ? 1 : 0)));
   gdcm::Fragment fragment;
   fragment.SetByteValue(bytes.data(), gdcm::VL(std::uint32_t(bytes.size())));
@@ -149,6 +157,7 @@ std::string Decompressed(const CompressedFrame& frame, const std::string& bytes)
   return wanted == sample_bytes ? std::string(samples) : Widened(samples, sample_bytes, wanted, *stream);
 }
 
+// The stream of a frame; of JPEG 2000 without the boxes of a JP2 file that some writers leave around it.
 std::string ReadFragments(const CompressedFrame& frame) {
   std::string bytes;
   std::ifstream file(frame.path, std::ios::binary);
@@ -158,6 +167,9 @@ std::string ReadFragments(const CompressedFrame& frame) {
     file.seekg(offset);
     file.read(bytes.data() + begin, count);
     if (file.gcount() != count) return "";
+  }
+  if (FindDicomCodec(frame.transfer_syntax) == DicomCodec::kJpeg2000) {
+    bytes.erase(0, std::min(bytes.find("\xff\x4f\xff\x51"), bytes.size()));
   }
   return bytes;
 }
@@ -171,19 +183,33 @@ bool WriteAll(int pipe, std::string_view bytes) {
   return true;
 }
 
-constexpr int kPixels = 3;         // the descriptor that pixels are written to
-constexpr unsigned kSeconds = 60;  // for a frame
+constexpr int kPixels = 3;            // the descriptor of the pipe to whoever started this program
+constexpr int kText = STDERR_FILENO;  // a file in memory: whatever codecs print, to stdout or stderr
+constexpr unsigned kSeconds = 60;     // for a frame
 
-// Ends with whoever started it, and has no open files but kPixels: codecs may print what they like.
+// Ends with whoever started it, and has no open files but these two: nothing that a codec prints gets into the pipe.
 bool Seclude() {
   (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  const int nothing = ::open("/dev/null", O_RDWR);
-  if (nothing < 0 || ::dup2(STDOUT_FILENO, kPixels) < 0) return false;
-  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
-    if (::dup2(nothing, number) < 0) return false;
-  }
+  // Descriptors that are opened later are above kPixels, or replace one of the first three.
+  if (::dup2(STDOUT_FILENO, kPixels) < 0) return false;
+  const int nothing = ::open("/dev/null", O_RDWR), text = ::memfd_create("text", 0);
+  if (nothing < 0 || text < 0 || ::dup2(nothing, STDIN_FILENO) < 0) return false;
+  if (::dup2(text, STDOUT_FILENO) < 0 || ::dup2(text, kText) < 0) return false;
   (void)::close_range(kPixels + 1, ~0U, 0);
-  return true;
+  (void)std::signal(SIGXFSZ, SIG_IGN);  // so that a write beyond the limit fails, and no more
+  const rlimit most = {kMostCodecText, kMostCodecText};
+  return ::setrlimit(RLIMIT_FSIZE, &most) == 0;
+}
+
+// What was printed since the last call.
+std::string TakeText() {
+  (void)std::fflush(nullptr);
+  std::string text(kMostCodecText, '\0');
+  const ssize_t count = ::pread(kText, text.data(), text.size(), 0);
+  text.resize(std::size_t(std::max<ssize_t>(count, 0)));
+  (void)::ftruncate(kText, 0);
+  (void)::lseek(kText, 0, SEEK_SET);
+  return text;
 }
 
 void LimitMemory(std::int64_t frame_bytes) {
@@ -202,13 +228,18 @@ bool Decompress() {
   std::vector<CompressedFrame> frames;
   for (CompressedFrame frame; std::cin >> frame;) frames.push_back(std::move(frame));
   if (frames.empty() || !Seclude()) return false;
+  gdcm::Trace::WarningOff();  // its own texts name its sources; those of the codecs say what is wrong
+  gdcm::Trace::ErrorOff();
   LimitMemory(frames.front().bytes());
   for (const CompressedFrame& frame : frames) {
     const std::string bytes = ReadFragments(frame);
     ::alarm(kSeconds);
     const std::string pixels = bytes.empty() ? "" : Decompressed(frame, bytes);
     ::alarm(0);  // whoever reads may take its time
-    if (pixels.empty() || !WriteAll(kPixels, pixels)) return false;
+    const std::string text = TakeText();
+    const auto text_bytes = std::uint32_t(text.size());
+    const std::string_view size(reinterpret_cast<const char*>(&text_bytes), sizeof(text_bytes));
+    if (!WriteAll(kPixels, size) || !WriteAll(kPixels, text) || pixels.empty() || !WriteAll(kPixels, pixels)) return false;
   }
   return true;
 }

@@ -11,14 +11,12 @@
 
 #include "common/base/parse_number.h"
 #include "data/volume_io/binary_header.h"
+#include "data/volume_io/dicom_bytes.h"
 
 namespace slabstream {
 namespace {
 
-constexpr std::int64_t kPreambleBytes = 128;
-constexpr std::string_view kMagic = "DICM";
 constexpr std::uint32_t kUndefined = 0xffffffff;  // a length
-constexpr const char* kDeflatedLittleEndian = "1.2.840.10008.1.2.1.99";
 
 constexpr DicomTag kItem = 0xfffee000, kItemEnd = 0xfffee00d, kSequenceEnd = 0xfffee0dd;
 constexpr DicomTag kFloatPixelData = 0x7fe00008, kDoublePixelData = 0x7fe00009, kPixelData = 0x7fe00010;
@@ -47,40 +45,6 @@ std::string_view WithoutBlanks(std::string_view text) {
   return begin == std::string_view::npos ? std::string_view() : text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
 }
 
-// A file of which a stretch is in memory.
-class FileWindow {
- public:
-  explicit FileWindow(const std::string& path) : file_(path, std::ios::binary | std::ios::ate) {
-    if (file_) size_ = std::int64_t(file_.tellg());
-  }
-
-  bool is_open() const { return size_ >= 0; }
-  std::int64_t size() const { return size_; }
-
-  // `bytes` of the file; null: the file ends before them. Valid until the next call.
-  const std::byte* At(std::int64_t offset, std::int64_t bytes) {
-    if (offset < 0 || bytes > size_ - offset) return nullptr;
-    if (offset < begin_ || offset + bytes > begin_ + std::int64_t(window_.size())) {
-      constexpr std::int64_t kWindow = 1 << 15;
-      window_.resize(std::size_t(std::min(std::max(bytes, kWindow), size_ - offset)));
-      begin_ = offset;
-      file_.clear();
-      file_.seekg(offset);
-      file_.read(reinterpret_cast<char*>(window_.data()), std::streamsize(window_.size()));
-      if (std::size_t(file_.gcount()) != window_.size()) {
-        window_.clear();
-        return nullptr;
-      }
-    }
-    return window_.data() + (offset - begin_);
-  }
-
- private:
-  std::ifstream file_;
-  std::int64_t size_ = -1, begin_ = 0;
-  std::vector<std::byte> window_;
-};
-
 struct ElementHeader {
   DicomTag tag = 0;
   std::uint32_t length = 0;   // bytes of the value
@@ -94,7 +58,28 @@ struct ElementHeader {
 
 class DicomWalk {
  public:
-  DicomWalk(const std::string& path, FileWindow& file, std::span<const WantedElement> wanted) : path_(path), file_(file), wanted_(wanted) {}
+  DicomWalk(const std::string& path, DicomBytes& file, std::span<const WantedElement> wanted) : path_(path), file_(file), wanted_(wanted) {}
+
+  // How the elements from `at` on are written, by the first one. None: no data set begins there, as far as its first elements tell.
+  std::optional<Encoding> FindEncoding(std::int64_t at) {
+    constexpr std::int64_t kShort = 8;  // bytes
+    constexpr int kElements = 3;
+    const std::byte* const bytes = file_.At(at, kShort);
+    if (bytes == nullptr) return std::nullopt;
+    const std::string_view first(reinterpret_cast<const char*>(bytes), kShort), type = first.substr(4, 2);
+    const Encoding encoding{.explicit_types = HasShortLength(type) || HasLongLength(type), .big_endian = first.starts_with('\0')};
+    DicomTag last = 0;
+    for (int i = 0; i < kElements && (i == 0 || at < file_.size()); ++i) {
+      const Result<ElementHeader> header = ReadHeader(at, file_.size(), encoding);
+      const DicomTag group = header.ok() ? header->tag >> 16 : 0;
+      const bool sound = group >= 0x0002 && group <= (i == 0 ? 0x0008 : 0x7fe0) && header->tag > last;
+      if (!sound || (header->length != kUndefined && !CheckLength(*header, file_.size()).ok())) return std::nullopt;
+      if (header->length == kUndefined) break;
+      last = header->tag;
+      at = header->value + header->length;
+    }
+    return encoding;
+  }
 
   // Reads from `at` on, which moves behind what was read, until `end`.
   Status ReadFileMeta(std::int64_t& at, DicomElements& out) {
@@ -115,10 +100,11 @@ class DicomWalk {
       if (!header.ok()) return header.status();
       if (header->tag == kPixelData || header->tag == kFloatPixelData || header->tag == kDoublePixelData) {
         const std::int64_t left = file_.size() - header->value;
-        if (header->tag == kPixelData) {
-          out.pixels = {header->value, header->length == kUndefined ? left : std::min<std::int64_t>(header->length, left),
-                        header->length == kUndefined, header->words};
-        }
+        out.pixels.offset = header->value;
+        out.pixels.bytes = header->length == kUndefined ? left : std::min<std::int64_t>(header->length, left);
+        out.pixels.encapsulated = header->length == kUndefined;
+        out.pixels.words = header->words;
+        out.pixels.floats = header->tag != kPixelData;
         return Status::Ok();
       }
       if (Status status = ReadElement(*header, file_.size(), encoding, 0, at, out.elements); !status.ok()) return status;
@@ -230,6 +216,11 @@ class DicomWalk {
         return Damaged(at, fmt::format("an item of {} must begin there, found {}", TagText(header.tag), TagText(item->tag)));
       }
       if (++kept_ > kMaxDicomKept) return Damaged(at, fmt::format("more than {} elements", kMaxDicomKept));
+      if (!keep && item->length != kUndefined) {  // perhaps a fragment of compressed pixels, such as those of an icon
+        if (Status status = CheckLength(*item, sequence_end); !status.ok()) return status;
+        at = item->value + item->length;
+        continue;
+      }
       DicomElements elements;
       if (Status status = ReadItem(*item, sequence_end, encoding, depth + 1, at, elements); !status.ok()) return status;
       if (keep) items.push_back(std::move(elements));
@@ -259,7 +250,7 @@ class DicomWalk {
   }
 
   const std::string& path_;
-  FileWindow& file_;
+  DicomBytes& file_;
   std::span<const WantedElement> wanted_;
   int kept_ = 0;
 };
@@ -300,15 +291,26 @@ std::optional<double> DicomElements::Decimal(DicomTag tag) const {
 }
 
 template <class T>
-std::optional<T> DicomElements::Binary(DicomTag tag) const {
+std::vector<T> DicomElements::AllOf(DicomTag tag) const {
   const Element* const element = Find(tag);
-  if (element == nullptr || element->value.size() < sizeof(T)) return std::nullopt;
-  return BinaryHeader(std::as_bytes(std::span(element->value)), big_endian_).At<T>(0);
+  std::vector<T> values(element == nullptr ? 0 : element->value.size() / sizeof(T));
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    values[i] = BinaryHeader(std::as_bytes(std::span(element->value)), big_endian_).At<T>(i * sizeof(T));
+  }
+  return values;
 }
 
-std::optional<std::uint16_t> DicomElements::Short(DicomTag tag) const { return Binary<std::uint16_t>(tag); }
-std::optional<std::uint32_t> DicomElements::Long(DicomTag tag) const { return Binary<std::uint32_t>(tag); }
-std::optional<double> DicomElements::Double(DicomTag tag) const { return Binary<double>(tag); }
+template <class T>
+std::optional<T> DicomElements::FirstOf(DicomTag tag) const {
+  const std::vector<T> values = AllOf<T>(tag);
+  return values.empty() ? std::nullopt : std::optional(values.front());
+}
+
+std::vector<std::uint16_t> DicomElements::Shorts(DicomTag tag) const { return AllOf<std::uint16_t>(tag); }
+std::vector<std::uint32_t> DicomElements::Longs(DicomTag tag) const { return AllOf<std::uint32_t>(tag); }
+std::optional<std::uint16_t> DicomElements::Short(DicomTag tag) const { return FirstOf<std::uint16_t>(tag); }
+std::optional<std::uint32_t> DicomElements::Long(DicomTag tag) const { return FirstOf<std::uint32_t>(tag); }
+std::optional<double> DicomElements::Double(DicomTag tag) const { return FirstOf<double>(tag); }
 
 const std::vector<DicomElements>& DicomElements::Items(DicomTag tag) const {
   static const std::vector<DicomElements> none;
@@ -322,38 +324,66 @@ const DicomElements& DicomElements::FirstItem(DicomTag tag) const {
   return items.empty() ? none : items.front();
 }
 
+namespace {
+
+// Where the elements of a file begin: behind the preamble, if it has one.
+std::int64_t BeginOfElements(DicomBytes& file) {
+  constexpr std::int64_t kPreamble = 128;  // bytes
+  constexpr std::string_view kMagic = "DICM";
+  const std::byte* const magic = file.At(kPreamble, std::int64_t(kMagic.size()));
+  const bool found = magic != nullptr && std::string_view(reinterpret_cast<const char*>(magic), kMagic.size()) == kMagic;
+  return found ? kPreamble + std::int64_t(kMagic.size()) : 0;
+}
+
+bool BeginsLikeDicom(const std::string& path, DicomBytes& file) {
+  return BeginOfElements(file) > 0 || DicomWalk(path, file, {}).FindEncoding(0).has_value();
+}
+
+}  // namespace
+
 bool BeginsLikeDicom(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::array<char, kPreambleBytes + kMagic.size()> bytes{};
-  file.read(bytes.data(), bytes.size());
-  return file.gcount() == std::streamsize(bytes.size()) && std::string_view(bytes.data() + kPreambleBytes, kMagic.size()) == kMagic;
+  DicomBytes file(path);
+  return BeginsLikeDicom(path, file);
 }
 
 Result<DicomFile> ReadDicomFile(const std::string& path, std::span<const WantedElement> wanted) {
-  if (!BeginsLikeDicom(path)) return Status::InvalidArgument(path + ": not a DICOM file: there is no DICM at byte 128");
-  FileWindow file(path);
+  DicomBytes file(path);
   if (!file.is_open()) return Status::NotFound(path + ": cannot be opened for reading");
+  if (!BeginsLikeDicom(path, file))
+    return Status::InvalidArgument(path + ": not a DICOM file: neither DICM at byte 128 nor elements at byte 0");
   DicomFile out{.path = path};
-  std::int64_t at = kPreambleBytes + std::int64_t(kMagic.size());
+  std::int64_t at = BeginOfElements(file);
   constexpr std::array<WantedElement, 2> kOfFileMeta = {{{kMediaClass}, {kTransferSyntax}}};
   DicomElements meta;
-  if (Status status = DicomWalk(path, file, kOfFileMeta).ReadFileMeta(at, meta); !status.ok()) return status;
+  DicomWalk of_meta(path, file, kOfFileMeta);
+  if (Status status = of_meta.ReadFileMeta(at, meta); !status.ok()) return status;
   out.media_class = meta.Text(kMediaClass);
   out.transfer_syntax = meta.Text(kTransferSyntax);
-  if (out.transfer_syntax.empty())
-    return Status::InvalidArgument(path + ": not a DICOM file that can be read: no transfer syntax is stated");
+  std::optional<DicomBytes> inflated;
   if (out.transfer_syntax == kDeflatedLittleEndian) {
-    return Status::InvalidArgument(
-        fmt::format("{}: transfer syntax {} (deflated) is not supported; `dcmconv +te` converts it", path, out.transfer_syntax));
+    inflated.emplace(path, at);
+    if (inflated->size() >= kMaxInflated) {
+      return Status::InvalidArgument(fmt::format("{}: its deflated data set has {} bytes or more", path, kMaxInflated));
+    }
+    out.pixels.deflated_at = at;
+    at = 0;
   }
-  const Encoding encoding{.explicit_types = out.transfer_syntax != kImplicitLittleEndian,
-                          .big_endian = out.transfer_syntax == kExplicitBigEndian};
-  if (Status status = DicomWalk(path, file, wanted).ReadDataSet(at, encoding, out); !status.ok()) return status;
+  DicomWalk walk(path, inflated ? *inflated : file, wanted);
+  // Some writers state no transfer syntax, or leave types out although theirs has them.
+  Encoding encoding{.explicit_types = out.transfer_syntax != kImplicitLittleEndian,
+                    .big_endian = out.transfer_syntax == kExplicitBigEndian};
+  const std::optional<Encoding> found = walk.FindEncoding(at);
+  if (found) encoding.explicit_types = found->explicit_types;
+  if (found && out.transfer_syntax.empty()) encoding.big_endian = found->big_endian;
+  if (Status status = walk.ReadDataSet(at, encoding, out); !status.ok()) return status;
+  if (!out.transfer_syntax.empty()) return out;
+  if (out.pixels.encapsulated) return Status::InvalidArgument(path + ": has compressed pixels, and no transfer syntax is stated");
+  out.transfer_syntax = encoding.big_endian ? kExplicitBigEndian : encoding.explicit_types ? kExplicitLittleEndian : kImplicitLittleEndian;
   return out;
 }
 
 Result<std::vector<DicomFragment>> ListFragments(const std::string& path, const DicomPixelData& pixels) {
-  FileWindow file(path);
+  DicomBytes file(path);
   if (!file.is_open()) return Status::NotFound(path + ": cannot be opened for reading");
   return DicomWalk(path, file, {}).ReadFragments(pixels.offset);
 }

@@ -2,8 +2,9 @@
 // up to the pixels. The rest is passed over.
 //
 // A length is believed only if what holds the element has that many bytes, sequences nest at most kMaxDicomDepth deep, and values longer
-// than kMaxDicomValue are not kept: so damaged bytes lead to a Status and never to much memory. This is why GDCM does not do it:
-// its parser takes memory by the lengths that a file claims, and as Debian compiles it, it ends the process where a file is damaged.
+// than kMaxDicomValue are not kept: so damaged bytes lead to a Status and never to much memory. This is why neither GDCM nor DCMTK does it:
+// both overflow the stack where sequences nest deeply, and take far more memory than the file has bytes; GDCM, as Debian compiles it, also
+// ends the process where a file is damaged.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +41,9 @@ class DicomElements {
   std::vector<double> Decimals(DicomTag tag) const;    // DS, IS; one that is no number is NaN
   std::optional<double> Decimal(DicomTag tag) const;   // the first of them
   std::optional<std::uint16_t> Short(DicomTag tag) const;
+  std::vector<std::uint16_t> Shorts(DicomTag tag) const;
   std::optional<std::uint32_t> Long(DicomTag tag) const;
+  std::vector<std::uint32_t> Longs(DicomTag tag) const;
   std::optional<double> Double(DicomTag tag) const;
   const std::vector<DicomElements>& Items(DicomTag tag) const;
   // The first item of a sequence; an empty one if there is none.
@@ -50,7 +53,9 @@ class DicomElements {
   friend class DicomWalk;
   const Element* Find(DicomTag tag) const;
   template <class T>
-  std::optional<T> Binary(DicomTag tag) const;
+  std::vector<T> AllOf(DicomTag tag) const;
+  template <class T>
+  std::optional<T> FirstOf(DicomTag tag) const;
 
   std::vector<Element> elements_;
   bool big_endian_ = false;
@@ -58,16 +63,18 @@ class DicomElements {
 
 // Where the pixels of a file are.
 struct DicomPixelData {
-  std::int64_t offset = 0;    // of the first byte behind the element's header; 0: the file has no pixels
-  std::int64_t bytes = 0;     // as many as the element claims, or as the file has, if these are fewer
-  bool encapsulated = false;  // in fragments, which are items
-  bool words = false;         // of 16 bits, whose bytes big endian swaps, for any bits of a pixel
+  std::int64_t offset = 0;       // of the first byte behind the element's header; 0: the file has no pixels
+  std::int64_t bytes = 0;        // as many as the element claims, or as the file has, if these are fewer
+  bool encapsulated = false;     // in fragments, which are items
+  bool words = false;            // of 16 bits, whose bytes big endian swaps, for any bits of a pixel
+  bool floats = false;           // of 32 or 64 bits, instead of integers
+  std::int64_t deflated_at = 0;  // not 0: where the data set is deflated in the file; `offset` and `bytes` are of the decompressed one
 };
 
 struct DicomFile {
   std::string path;
   std::string media_class;      // MediaStorageSOPClassUID
-  std::string transfer_syntax;  // its UID
+  std::string transfer_syntax;  // its UID; if none is stated, that of the elements as they are
   DicomElements elements;
   DicomPixelData pixels;
 };
@@ -77,17 +84,20 @@ struct WantedElement {
   bool sequence = false;
 };
 
-// Whether a file begins like one of DICOM: with DICM at byte 128. False also if it cannot be read.
+// Whether a file begins like one of DICOM: with DICM at byte 128 or, as some are exported, with the first elements themselves. False also
+// if it cannot be read.
 bool BeginsLikeDicom(const std::string& path);
 
-// Keeps the elements `wanted`, wherever they are. NotFound: cannot be opened. InvalidArgument: no DICOM file, or its transfer syntax is
-// deflated or not stated. DataLoss: damaged. Messages name the path.
+// Keeps the elements `wanted`, wherever they are. NotFound: cannot be opened. InvalidArgument: no DICOM file, a deflated data set of
+// kMaxInflated bytes or more (dicom_bytes.h), or compressed pixels whose transfer syntax is not stated. DataLoss: damaged. Messages name
+// the path.
 Result<DicomFile> ReadDicomFile(const std::string& path, std::span<const WantedElement> wanted);
 
-// The transfer syntaxes whose pixels are not compressed, except the deflated one.
+// The transfer syntaxes whose pixels are not compressed.
 inline constexpr const char* kImplicitLittleEndian = "1.2.840.10008.1.2";
 inline constexpr const char* kExplicitLittleEndian = "1.2.840.10008.1.2.1";
 inline constexpr const char* kExplicitBigEndian = "1.2.840.10008.1.2.2";
+inline constexpr const char* kDeflatedLittleEndian = "1.2.840.10008.1.2.1.99";
 
 // The bytes of the fragments of encapsulated pixels, (offset, bytes) in the file. The first is the offset table. DataLoss: damaged.
 using DicomFragment = std::pair<std::int64_t, std::int64_t>;

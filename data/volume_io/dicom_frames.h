@@ -3,11 +3,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "common/base/status.h"
 #include "data/volume_io/dicom_image.h"
-#include "data/volume_io/read_progress.h"
 
 namespace slabstream {
 
@@ -28,11 +29,27 @@ struct DicomFrameNumber {
 struct DicomSamples {
   SampleType type = SampleType::kUint16;
   ValueMapping rescale;
+  bool as_values = false;  // data values, not stored pixels
 };
 DicomSamples SamplesOf(std::span<const DicomFrameNumber> frames);
 
-// Fills `out`, one frame after the other. All have passed CheckFrames, and are of the same size. DataLoss: damaged. Unavailable: no process
-// can be started.
-Status ReadFrames(std::span<const DicomFrameNumber> frames, const DicomSamples& samples, std::span<std::byte> out, ReadProgress* progress);
+// The frames of a volume, one after the other. One thread at a time.
+class DicomFrameReader {
+ public:
+  // All frames have passed CheckFrames, are of the same size, and their images outlive this. DataLoss: damaged. Unavailable: no process can
+  // be started.
+  static Result<DicomFrameReader> Start(std::vector<DicomFrameNumber> frames, const DicomSamples& samples);
+  DicomFrameReader(DicomFrameReader&&) noexcept;
+  ~DicomFrameReader();
+
+  // The samples of the next frame. What a codec says of it is logged as a warning that names file and frame. DataLoss: damaged.
+  // ResourceExhausted: deflated pixels do not fit the memory.
+  Status Read(std::span<std::byte> out);
+
+ private:
+  struct State;
+  explicit DicomFrameReader(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace slabstream

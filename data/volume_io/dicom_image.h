@@ -26,22 +26,36 @@ struct DicomFrame {
   std::optional<Vec3> position;                   // ImagePositionPatient: of the first pixel, in mm to left, posterior, superior
   std::optional<std::array<Vec3, 2>> directions;  // ImageOrientationPatient: along a row, and down a column
   std::optional<std::array<double, 2>> spacing;   // along a row and down a column, mm: the reverse of PixelSpacing
+  std::optional<double> slice_spacing;            // SpacingBetweenSlices, mm
   ValueMapping rescale;                           // RescaleSlope, RescaleIntercept
+  int segment = 0;                                // ReferencedSegmentNumber of a segmentation; 0: none
   std::vector<std::string> distinctions;          // values, "" if absent; DistinctionCount() of them
+
+  friend bool operator==(const DicomFrame&, const DicomFrame&) = default;
 };
 
 // How a pixel's bits are stored.
 struct DicomPixelFormat {
   int bits_allocated = 0, bits_stored = 0, high_bit = 0;
   bool is_signed = false;
+  bool is_float = false;  // of 32 or 64 bits; what is above then says nothing
 
-  // Of the pixels as they are in memory.
+  // Of the pixels as they are in memory, where a single bit takes a byte.
   SampleType type() const;
   friend bool operator==(const DicomPixelFormat&, const DicomPixelFormat&) = default;
 };
 
+// What the frames of a segmentation hold (PS3.3 C.8.20): bits of a segment each; shares of a segment each; or numbers of segments.
+enum class DicomSegmentation { kNone, kBinary, kFractional, kLabelMap };
+
+struct DicomSegment {
+  int number = 0;  // SegmentNumber
+  std::string label;
+};
+
 struct DicomImage {
   std::string path;
+  std::string instance_uid;  // SOPInstanceUID, which copies share
   std::string series_uid, modality, description;
   std::string number;                      // SeriesNumber, as it is written
   bool localizer = false, mosaic = false;  // ImageType
@@ -53,12 +67,19 @@ struct DicomImage {
   std::string transfer_syntax;
   DicomPixelData pixels;
   std::vector<DicomFrame> frames;  // one or more
-  bool media_directory = false;    // DICOMDIR: it has no image, its folder is meant
-  Status damage;                   // of the pixels: not ok if the file has fewer than it claims
+  DicomSegmentation segmentation = DicomSegmentation::kNone;
+  std::vector<DicomSegment> segments;  // in the order of the file
+  bool media_directory = false;        // DICOMDIR: it has no image, its folder is meant
+  Status trouble;                      // why its frames cannot be read: the file has fewer than it claims, or they are no slices
 
   std::int64_t frame_pixels() const { return std::int64_t{columns} * rows; }
-  std::int64_t frame_bytes() const { return frame_pixels() * (format.bits_allocated / 8); }
-  bool is_colour() const { return samples_per_pixel != 1 || photometric == "PALETTE COLOR"; }
+  // As they are stored; frames follow each other without a gap. Of 1 bit a pixel, the lowest bit of a byte is its first pixel.
+  std::int64_t frame_bits() const { return frame_pixels() * format.bits_allocated; }
+  bool is_segmentation() const { return segmentation != DicomSegmentation::kNone; }
+  // The colours of a label map's palette stand for its labels.
+  bool is_colour() const {
+    return samples_per_pixel != 1 || (photometric == "PALETTE COLOR" && segmentation != DicomSegmentation::kLabelMap);
+  }
 };
 
 // Errors as of ReadDicomFile.

@@ -10,6 +10,8 @@
 #include "common/base/parse_number.h"
 #include "common/base/printable.h"
 #include "data/volume_io/dicom_frames.h"
+#include "data/volume_io/dicom_segments.h"
+#include "data/volume_io/payload.h"
 
 namespace slabstream {
 namespace {
@@ -55,6 +57,73 @@ Result<std::vector<DicomImage>> ReadImages(const std::vector<std::string>& paths
   return images;
 }
 
+// Whether the files hold the same bytes of pixels.
+bool SameBytes(const DicomImage& a, const DicomImage& b) {
+  if (a.transfer_syntax != b.transfer_syntax || a.pixels.bytes != b.pixels.bytes || a.pixels.deflated_at != 0) return false;
+  constexpr std::int64_t kBlock = std::int64_t{1} << 20;
+  std::vector<std::byte> of_a, of_b;
+  for (std::int64_t done = 0; done < a.pixels.bytes; done += kBlock) {
+    of_a.resize(std::size_t(std::min(kBlock, a.pixels.bytes - done)));
+    of_b.resize(of_a.size());
+    const bool read = ReadPayload({.file = a.path, .offset = a.pixels.offset + done}, of_a).ok() &&
+                      ReadPayload({.file = b.path, .offset = b.pixels.offset + done}, of_b).ok();
+    if (!read || of_a != of_b) return false;
+  }
+  return true;
+}
+
+// Whether the frames have the same pixels, however they are encoded. Images that cannot be read both are refused for that, later.
+Result<bool> SamePixels(const DicomImage& a, const DicomImage& b) {
+  if (SameBytes(a, b)) return true;
+  if (!CheckFrames(a).ok() || !CheckFrames(b).ok()) return CheckFrames(a).ok() == CheckFrames(b).ok();
+  std::vector<std::vector<std::byte>> slices;
+  std::vector<DicomFrameReader> readers;
+  for (const DicomImage* image : {&a, &b}) {
+    std::vector<DicomFrameNumber> frames;
+    for (std::size_t i = 0; i < image->frames.size(); ++i) frames.push_back({image, i});
+    Result<DicomFrameReader> reader = DicomFrameReader::Start(frames, {});
+    if (!reader.ok()) return reader.status();
+    readers.push_back(*std::move(reader));
+    slices.emplace_back(std::size_t(a.frame_pixels()) * BytesPerSample(a.format.type()));
+  }
+  for (std::size_t i = 0; i < a.frames.size(); ++i) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      if (Status status = readers[k].Read(slices[k]); !status.ok()) return status;
+    }
+    if (slices[0] != slices[1]) return false;
+  }
+  return true;
+}
+
+// Keeps one of the images that are copies of each other: of the same SOPInstanceUID, place and pixels.
+Status LeaveOutCopies(DicomSeries& series) {
+  std::map<std::string, std::size_t> firsts;  // numbers of images
+  std::vector<bool> is_copy(series.images.size());
+  for (std::size_t i = 0; i < series.images.size(); ++i) {
+    const DicomImage& image = series.images[i];
+    const auto [found, is_new] = firsts.emplace(image.instance_uid, i);
+    if (is_new || image.instance_uid.empty()) continue;
+    const DicomImage& first = series.images[found->second];
+    const auto differ = [&](const char* what) {
+      return Status::InvalidArgument(fmt::format("{} and {} have the same SOPInstanceUID, but different {}", first.path, image.path, what));
+    };
+    if (first.columns != image.columns || first.rows != image.rows || first.frames != image.frames)
+      return differ("sizes, places or rescalings");
+    if (first.format != image.format) return differ("types of pixels");
+    const Result<bool> same = SamePixels(first, image);
+    if (!same.ok()) return same.status();
+    if (!*same) return differ("pixels");
+    is_copy[i] = true;
+  }
+  std::vector<DicomImage> kept;
+  for (std::size_t i = 0; i < series.images.size(); ++i) {
+    if (!is_copy[i]) kept.push_back(std::move(series.images[i]));
+  }
+  series.copies = series.images.size() - kept.size();
+  series.images = std::move(kept);
+  return Status::Ok();
+}
+
 std::vector<DicomSlice> SlicesOf(const DicomSeries& series) {
   std::vector<DicomSlice> slices;
   for (const DicomImage& image : series.images) {
@@ -79,7 +148,9 @@ std::string WhatElse(const DicomSeries& series) {
 
 // Judges a series whose images are complete.
 void Judge(DicomSeries& series) {
+  series.trouble = LeaveOutCopies(series);
   series.other = WhatElse(series);
+  if (!series.trouble.ok()) return;
   const DicomImage& first = series.images.front();
   if (series.other == "no images") {
     series.trouble = Status::InvalidArgument(fmt::format("no images: its modality is '{}'", series.modality));
@@ -99,7 +170,15 @@ void Judge(DicomSeries& series) {
         "a single slice, a volume has at least 2; the folder of a series is read as a whole: '{}'", folder.empty() ? "." : folder));
     return;
   }
-  Result<DicomStack> stack = ArrangeSlices(SlicesOf(series));
+  const bool of_segments = std::ranges::any_of(series.images, &DicomImage::is_segmentation);
+  if (of_segments && series.images.size() > 1) {
+    series.trouble = Status::InvalidArgument(fmt::format("{} segmentations, such as {} and {}; each file is a volume of its own",
+                                                         series.images.size(), first.path, series.images[1].path));
+    return;
+  }
+  if (of_segments) series.trouble = CheckSegments(first);
+  if (!series.trouble.ok()) return;
+  Result<DicomStack> stack = of_segments ? ArrangeSegments(SlicesOf(series)) : ArrangeSlices(SlicesOf(series));
   if (stack.ok()) {
     series.stack = *std::move(stack);
   } else {

@@ -19,6 +19,7 @@ struct DicomSeries {
   // As in the files; texts may hold anything.
   std::string uid, number, modality, description;
   std::vector<DicomImage> images;
+  std::size_t copies = 0;  // of these images, of the same SOPInstanceUID and pixels, that are left out
   // What it is instead of a volume, such as "a localizer"; empty: it is chosen if it is the only one.
   std::string other;
   Status trouble;    // not ok: why it cannot be read; Printable

@@ -1,4 +1,5 @@
-// From slices in any order to a stack: sorted by their positions along the normal of their plane, and checked to lie evenly. Pure.
+// From slices in any order to a stack: sorted by their positions along the normal of their plane, and checked to lie evenly. Several slices
+// at each position are several volumes, such as times or echoes, if an attribute or two tell them apart. Pure.
 //
 // Names of files and InstanceNumber do not matter. The step from slice to slice need not be along the normal: with a tilted gantry it is
 // not, and such stacks are straightened later (world_placement.h).
@@ -31,14 +32,22 @@ struct DicomSlice {
 };
 
 struct DicomStack {
-  Index3 size;
+  Index3 size;                // of each volume
+  int volumes = 1;            // in the order of the values that tell them apart
+  std::string told_apart;     // "EchoTime 4.6, 9.2"; "": one volume
   std::array<Vec3, 3> steps;  // from a voxel to the next one along a row, a column and the stack; mm to right, anterior, superior
   Vec3 origin;
-  std::vector<std::size_t> order;  // numbers of slices, by their position
+  std::vector<std::size_t> order;    // numbers of slices by their position, one volume after the other
+  std::vector<std::int32_t> places;  // of a segmentation: the slice that each frame is a part of
 };
 
-// InvalidArgument: fewer than two slices, slices without a place or of different sizes, planes or spacings, several at the same position,
-// missing ones, uneven distances. Messages name a slice, what is wrong and what to do.
+// InvalidArgument: fewer than two slices, slices without a place or of different sizes, planes or spacings, several at the same position
+// that are no volumes, missing ones, uneven distances. Messages name a slice, what is wrong and what to do.
 Result<DicomStack> ArrangeSlices(std::span<const DicomSlice> slices);
+
+// The frames of a segmentation, which has several at a place, one a segment, and leaves out those without any voxel: slices lie
+// SpacingBetweenSlices apart, or by the least distance between any two. `order` is left empty, `places` says where each frame is.
+// InvalidArgument: as above, and a segment with several frames at a place.
+Result<DicomStack> ArrangeSegments(std::span<const DicomSlice> frames);
 
 }  // namespace slabstream

@@ -11,6 +11,7 @@
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
@@ -20,10 +21,12 @@ using WriteProgress = std::function<void(std::int64_t done, std::int64_t all)>;
 
 class FileSamples {
  public:
-  // The volume must outlive what is made. Without `type`: the type that the samples were read from if that is known to hold the data
-  // values, else the smallest integer type that holds them, else float32. With it InvalidArgument, naming the value and the voxel: the type
-  // does not hold a data value (floats hold rounded ones), or is float16.
-  static Result<FileSamples> Of(const Volume& volume, std::optional<SampleType> type, WriteProgress progress = {});
+  // The volume and its exact samples, if any (else null), must outlive what is made. Without `type`: the type that the samples were read
+  // from if that is known to hold the data values, else the smallest integer type that holds them, else float32, or float64 of exact
+  // samples. With it InvalidArgument, naming the value and the voxel: the type does not hold a data value (floats hold rounded ones), or is
+  // float16.
+  static Result<FileSamples> Of(const Volume& volume, const ExactSamples* exact, std::optional<SampleType> type,
+                                WriteProgress progress = {});
 
   const VolumeGeometry& geometry() const { return volume_->description.geometry; }
   SampleType type() const { return type_; }
@@ -34,10 +37,11 @@ class FileSamples {
   static constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
 
  private:
-  FileSamples(const Volume& volume, SampleType type, WriteProgress progress)
-      : volume_(&volume), type_(type), progress_(std::move(progress)) {}
+  FileSamples(const Volume& volume, const ExactSamples* exact, SampleType type, WriteProgress progress)
+      : volume_(&volume), exact_(exact), type_(type), progress_(std::move(progress)) {}
 
   const Volume* volume_;
+  const ExactSamples* exact_;
   SampleType type_;
   WriteProgress progress_;
 };

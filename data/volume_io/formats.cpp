@@ -13,6 +13,7 @@ namespace slabstream {
 
 // Each in the file of its format.
 VolumeFormat Nifti();
+VolumeFormat Mgh();
 VolumeFormat Nrrd();
 VolumeFormat MetaImage();
 VolumeFormat Tiff();
@@ -20,15 +21,19 @@ VolumeFormat Dicom();
 VolumeFormat Mrc();
 VolumeFormat VtkLegacy();
 VolumeFormat VtkImage();
+VolumeFormat VtkRectilinear();
 VolumeFormat UnstructuredGrid();
 VolumeFormat Npy();
 VolumeFormat Png();
 VolumeFormat Jpeg();
+VolumeFormat Jpeg2000();
+VolumeFormat Bmp();
 VolumeFormat Raw();
 
 const std::vector<VolumeFormat>& VolumeFormats() {
-  static const std::vector<VolumeFormat> formats = {Nifti(),     Nrrd(),     MetaImage(), Tiff(), Dicom(), Mrc(), UnstructuredGrid(),
-                                                    VtkLegacy(), VtkImage(), Npy(),       Png(),  Jpeg(),  Raw()};
+  static const std::vector<VolumeFormat> formats = {
+      Nifti(),          Mgh(), Nrrd(), MetaImage(), Tiff(),     Dicom(), Mrc(), UnstructuredGrid(), VtkLegacy(), VtkImage(),
+      VtkRectilinear(), Npy(), Png(),  Jpeg(),      Jpeg2000(), Bmp(),   Raw()};
   return formats;
 }
 
@@ -57,6 +62,22 @@ const VolumeFormat* FindFormat(const std::string& path, const ReadOptions& optio
         formats, [&](const VolumeFormat& format) { return format.recognises != nullptr && format.recognises(path, options); });
   }
   return found == formats.end() ? nullptr : &*found;
+}
+
+std::string_view WhyUnread(const std::string& path) {
+  struct Unread {
+    std::vector<std::string_view> endings;
+    std::string_view why;
+  };
+  static const std::vector<Unread> files = {
+      {{".pvti", ".pvtr", ".pvtu", ".pvts", ".pvtp", ".pvtk", ".pvd", ".vtm", ".vtmb"},
+       "a list of VTK files, which is not read; ParaView writes what it holds into one .vti, .vtr or .vtu, or open a file of the list"},
+      {{".vts"},
+       "a curvilinear grid of VTK (StructuredGrid), which is not read; ParaView's filter Resample To Image makes an image of it, and "
+       "Tetrahedralize an unstructured grid"},
+      {{".vtp"}, "a surface of VTK (PolyData), which holds no volume"}};
+  const auto found = std::ranges::find_if(files, [&](const Unread& unread) { return EndsInOneOf(path, unread.endings); });
+  return found == files.end() ? "" : found->why;
 }
 
 const VolumeFormat* FindWritableFormat(const std::string& path) {

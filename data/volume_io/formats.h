@@ -56,6 +56,8 @@ const VolumeFormat* FindWritableFormat(const std::string& path);
 
 // "must end in .nii, .nii.gz, ... or be a folder of ..."
 std::string ReadableText();
+// What a file is that users may bring and that no format reads, and what helps; "": nothing is known of its ending.
+std::string_view WhyUnread(const std::string& path);
 // ".nrrd, .mha, ..."
 std::string WritableEndings();
 

@@ -2,44 +2,29 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
 #include "common/volume/memory_budget.h"
+#include "data/volume_io/raw_volume.h"
 
 namespace slabstream {
 
 MeshBuilder::MeshBuilder(std::string path, std::string format) : path_(std::move(path)) { result_.info.format = std::move(format); }
 
-void MeshBuilder::AddArray(const MeshArray& array, bool active) {
-  result_.info.arrays.push_back(array);
-  active_.push_back(active);
-}
-
-Result<std::size_t> MeshBuilder::ChooseArray(const MeshOptions& options) {
+Result<std::size_t> MeshBuilder::SetArrays(std::vector<GridArray> arrays, const MeshOptions& options) {
   MeshFileInfo& info = result_.info;
-  std::string names;
-  std::vector<std::size_t> scalars, active;
-  for (std::size_t i = 0; i < info.arrays.size(); ++i) {
-    const MeshArray& array = info.arrays[i];
-    if (!options.array.empty() && array.name == options.array) {
-      if (array.components == 1) return info.array = i;
-      return Wrong(fmt::format("array {} has {} components, must have 1", array.name, array.components));
-    }
-    if (array.components != 1) continue;
-    names.append(names.empty() ? "" : ", ").append(array.name);
-    scalars.push_back(i);
-    if (active_[i]) active.push_back(i);
-  }
-  if (scalars.empty()) return Wrong("has no array with one component, of points or cells");
-  if (!options.array.empty()) return Wrong(fmt::format("has no array '{}'; it has {}", options.array, names));
-  if (active.empty() && scalars.size() > 1) {
-    return Wrong(fmt::format("has several arrays and none is the active scalars; choose one by its name: {}", names));
-  }
-  if (active.empty()) return info.array = scalars.front();
-  const auto of_points = std::ranges::find_if(active, [&](std::size_t i) { return info.arrays[i].at == ValuesAt::kPoints; });
-  return info.array = of_points == active.end() ? active.front() : *of_points;
+  info.arrays = std::move(arrays);
+  const Result<std::size_t> chosen = ChooseArray(path_, info.arrays, options.array);
+  if (!chosen.ok()) return chosen.status();
+  info.array = *chosen;
+  info.channel = options.channel;
+  if (Status status = CheckChannel(path_, RawHeader{.components = info.arrays[*chosen].components}, {.channel = options.channel});
+      !status.ok())
+    return status;
+  return *chosen;
 }
 
 Status MeshBuilder::SetPoints(const AlignedVector<double>& places) {
@@ -70,7 +55,7 @@ Status MeshBuilder::SetPoints(const AlignedVector<double>& places) {
   return Status::Ok();
 }
 
-Result<std::int64_t> MeshBuilder::SetCells(const AlignedVector<std::int64_t>& kinds, const AlignedVector<std::int64_t>& ends) {
+Status MeshBuilder::SetCells(const AlignedVector<std::int64_t>& kinds, const AlignedVector<std::int64_t>& ends) {
   std::vector<std::int64_t> counts(CellKinds().size());
   std::int64_t end = 0;
   for (std::size_t cell = 0; cell < kinds.size(); ++cell) {
@@ -94,8 +79,7 @@ Result<std::int64_t> MeshBuilder::SetCells(const AlignedVector<std::int64_t>& ki
   for (std::size_t i = 0; i < counts.size(); ++i) {
     if (counts[i] > 0) info.kinds.push_back({&CellKinds()[i], counts[i]});
   }
-  if (Status status = ReserveTetrahedra(); !status.ok()) return status;
-  return end;
+  return ReserveTetrahedra();
 }
 
 Status MeshBuilder::ReserveTetrahedra() {
@@ -117,39 +101,45 @@ Status MeshBuilder::ReserveTetrahedra() {
   return Status::Ok();
 }
 
-Status MeshBuilder::SetCorners(const AlignedVector<std::int64_t>& corners) {
+Status MeshBuilder::AddCorners(const AlignedVector<std::int64_t>& corners, std::int64_t first, std::int64_t points) {
   std::vector<Tetrahedron>& tetrahedra = result_.mesh.tetrahedra;
-  std::vector<PointNumber> points;
-  const std::int64_t* corner = corners.data();
-  for (std::size_t cell = 0; cell < kinds_.size(); ++cell) {
-    points.clear();
-    for (const std::int64_t* const end = corner + kinds_[cell]->points; corner != end; ++corner) {
-      if (*corner < 0 || *corner >= result_.info.points) {
-        return Damaged(fmt::format("cell {} has point {}, must be in [0, {})", cell, *corner, result_.info.points));
+  std::vector<PointNumber> of_cell;
+  for (const std::int64_t* corner = corners.data(); corner != corners.data() + corners.size(); ++next_) {
+    of_cell.clear();
+    for (const std::int64_t* const end = corner + kinds_[next_]->points; corner != end; ++corner) {
+      if (*corner < 0 || *corner >= points) {
+        return Damaged(fmt::format("cell {} has point {}, must be in [0, {})", next_, *corner, points));
       }
-      points.push_back(PointNumber(*corner));
+      of_cell.push_back(PointNumber(first + *corner));
     }
-    const std::size_t first = tetrahedra.size();
-    SplitCell(*kinds_[cell], points, tetrahedra);
+    const std::size_t begin = tetrahedra.size();
+    SplitCell(*kinds_[next_], of_cell, tetrahedra);
     // A cell with a point twice, as some grids have at their poles, makes parts without a volume.
     const auto flat = [](const Tetrahedron& t) {
       return t[0] == t[1] || t[0] == t[2] || t[0] == t[3] || t[1] == t[2] || t[1] == t[3] || t[2] == t[3];
     };
-    tetrahedra.erase(std::remove_if(tetrahedra.begin() + std::ptrdiff_t(first), tetrahedra.end(), flat), tetrahedra.end());
-    cells_.resize(tetrahedra.size(), std::uint32_t(cell));
+    tetrahedra.erase(std::remove_if(tetrahedra.begin() + std::ptrdiff_t(begin), tetrahedra.end(), flat), tetrahedra.end());
+    cells_.resize(tetrahedra.size(), std::uint32_t(next_));
   }
-  return tetrahedra.empty() ? Wrong("has no cells with a volume") : Status::Ok();
+  return Status::Ok();
 }
 
-void MeshBuilder::SetValues(AlignedVector<float> values) {
+Status MeshBuilder::SetValues(const AlignedVector<float>& values) {
   Mesh& mesh = result_.mesh;
-  mesh.at = result_.info.arrays[result_.info.array].at;
+  if (mesh.tetrahedra.empty()) return Wrong("has no cells with a volume");
+  const GridArray& array = result_.info.arrays[result_.info.array];
+  const auto value = [&](std::size_t element) {
+    return TakenComponent(values.data() + element * std::size_t(array.components), result_.info.channel);
+  };
+  mesh.at = array.at;
   if (mesh.at == ValuesAt::kPoints) {
-    mesh.values = std::move(values);
-    return;
+    mesh.values.resize(mesh.points.size());
+    for (std::size_t i = 0; i < mesh.points.size(); ++i) mesh.values[i] = value(i);
+  } else {
+    mesh.values.resize(mesh.tetrahedra.size());
+    std::ranges::transform(cells_, mesh.values.begin(), value);
   }
-  mesh.values.resize(mesh.tetrahedra.size());
-  std::ranges::transform(cells_, mesh.values.begin(), [&](std::uint32_t cell) { return values[cell]; });
+  return Status::Ok();
 }
 
 }  // namespace slabstream

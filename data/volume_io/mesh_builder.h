@@ -2,10 +2,8 @@
 // order of their declarations; after an error there are no more. Errors name the path.
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,7 +11,6 @@
 #include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
 #include "data/volume_io/mesh_reader.h"
-#include "data/volume_io/sample_type.h"
 
 namespace slabstream {
 
@@ -22,19 +19,18 @@ class MeshBuilder {
   // `format`: for the user.
   MeshBuilder(std::string path, std::string format);
 
-  // An array of the file. `active`: the file says that it is the one to show.
-  void AddArray(const MeshArray& array, bool active);
-  // The one that is read, by its number: InvalidArgument: there is none, or it is not clear which.
-  Result<std::size_t> ChooseArray(const MeshOptions& options);
+  // What the file has. The number of the array that is read: errors of ChooseArray (grid_arrays.h) and CheckChannel (raw_volume.h).
+  Result<std::size_t> SetArrays(std::vector<GridArray> arrays, const MeshOptions& options);
   // x, y and z of each point, in the world. InvalidArgument: a place that is not finite, an extent that is too small or too large.
   Status SetPoints(const AlignedVector<double>& places);
-  // The cells' kinds by VTK's numbers, and for each cell where its points end among those of all cells, which follow each other. How many
-  // points that are. InvalidArgument: a kind that is not supported. DataLoss: ends that do not fit the kinds. ResourceExhausted: too many.
-  Result<std::int64_t> SetCells(const AlignedVector<std::int64_t>& kinds, const AlignedVector<std::int64_t>& ends);
-  // The points of all cells. DataLoss: numbers of points that there are not. InvalidArgument: no cell has a volume.
-  Status SetCorners(const AlignedVector<std::int64_t>& corners);
-  // The values of the chosen array, one for each point or cell of the file.
-  void SetValues(AlignedVector<float> values);
+  // The cells' kinds by VTK's numbers, and for each cell where its points end among those of all cells, which follow each other.
+  // InvalidArgument: a kind that is not supported. DataLoss: ends that do not fit the kinds. ResourceExhausted: too many.
+  Status SetCells(const AlignedVector<std::int64_t>& kinds, const AlignedVector<std::int64_t>& ends);
+  // The points of the next cells, whole ones: as many as the kinds have. They count from the point `first` and are below `points`.
+  // DataLoss: numbers of points that there are not.
+  Status AddCorners(const AlignedVector<std::int64_t>& corners, std::int64_t first, std::int64_t points);
+  // The values of the chosen array, all components of each point or cell of the file. InvalidArgument: no cell has a volume.
+  Status SetValues(const AlignedVector<float>& values);
   LoadedMesh Take() { return std::move(result_); }
 
  private:
@@ -45,20 +41,9 @@ class MeshBuilder {
 
   std::string path_;
   LoadedMesh result_;
-  std::vector<bool> active_;            // by array
   std::vector<const CellKind*> kinds_;  // by cell
+  std::size_t next_ = 0;                // the cell whose points come next
   std::vector<std::uint32_t> cells_;    // by tetrahedron: the cell that it is a part of
 };
-
-// Samples as numbers of another type.
-template <class T>
-AlignedVector<T> Converted(SampleType type, const AlignedVector<std::byte>& bytes) {
-  AlignedVector<T> out(bytes.size() / BytesPerSample(type));
-  VisitSampleType(type, [&]<class S>(const S*) {
-    const std::span samples(reinterpret_cast<const S*>(bytes.data()), out.size());
-    std::ranges::transform(samples, out.begin(), [](S sample) { return static_cast<T>(sample); });
-  });
-  return out;
-}
 
 }  // namespace slabstream

@@ -1,28 +1,23 @@
-// Files of unstructured grids to meshes: VTK's XML files (.vtu), of one piece; ASCII, base64 or appended, uncompressed or in blocks of
-// zlib; legacy VTK files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells
-// without a volume are counted and left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in
-// each part, not trilinear in the cell.
+// Files of unstructured grids to meshes: VTK's XML files (.vtu), whose pieces follow each other, in any encoding (vtk_xml.h); legacy VTK
+// files (.vtk) of versions 1 to 5, ASCII or binary. Tetrahedra, hexahedra, voxels, wedges and pyramids are read; cells without a volume are
+// counted and left out. Hexahedra, wedges and pyramids are split (common/mesh/cells.h), so that the value is linear in each part, not
+// trilinear in the cell.
 //
 // All functions may be called from any thread.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh.h"
-#include "data/volume_io/sample_type.h"
+#include "data/volume_io/grid_arrays.h"
+#include "data/volume_io/read_options.h"
 
 namespace slabstream {
-
-struct MeshArray {
-  std::string name;
-  ValuesAt at = ValuesAt::kPoints;
-  SampleType type = SampleType::kFloat32;
-  int components = 1;
-};
 
 struct MeshFileInfo {
   std::string format;  // "VTK unstructured grid", "VTK unstructured grid, legacy"
@@ -32,8 +27,9 @@ struct MeshFileInfo {
     std::int64_t count = 0;
   };
   std::vector<CellCount> kinds;   // that occur, in the order of CellKinds()
-  std::vector<MeshArray> arrays;  // in the file's order
+  std::vector<GridArray> arrays;  // in the file's order
   std::size_t array = 0;          // the one that is read, of `arrays`
+  std::optional<int> channel{};   // of its components: that of MeshOptions
 };
 
 struct LoadedMesh {
@@ -43,7 +39,10 @@ struct LoadedMesh {
 };
 
 struct MeshOptions {
-  std::string array;  // "": the active scalars, those of points first, else the only array with one component
+  // As in ReadOptions.
+  std::string array;
+  std::optional<TimeRange> time = {};
+  std::optional<int> channel = {};
   // Checks what can be checked without points, cells and values; the mesh has none then, and no bounds.
   bool headers_only = false;
 };

@@ -1,4 +1,4 @@
-// MetaImage with its samples in the same file or in one other (.mha, .mhd), raw or zlib-compressed, by the fields that MetaIO documents.
+// MetaImage with its samples in the same file or in others (.mha, .mhd), raw or zlib-compressed, by the fields that MetaIO documents.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -60,9 +60,10 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   const std::optional<SampleType> type = ToSampleType(*text.Find("ElementType"));
   if (!type) return text.NotAVolume("ElementType '" + *text.Find("ElementType") + "' is not supported");
 
+  // Of synonyms the one that MetaIO prefers comes first.
   const std::size_t count = sizes->size();
   const auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, {1, 1, 1});
-  const auto origin = text.Numbers({"Offset", "Origin", "Position"}, count, {0, 0, 0});
+  const auto origin = text.Numbers({"Origin", "Offset", "Position"}, count, {0, 0, 0});
   const auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, {});
   for (const auto* numbers : {&spacing, &origin, &directions}) {
     if (!numbers->ok()) return numbers->status();
@@ -72,10 +73,18 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   header.unit = LengthUnitNamed(text.Find("DistanceUnits").value_or(""));
   std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
   for (std::size_t i = 0; i < 3 && !directions->empty(); ++i) axes[i] = Triple(*directions, i * count);
-  // Only files about a patient name the directions of the axes; their space is left, posterior, superior. Others have no orientation
-  // unless they state a matrix or an origin.
-  const bool patient = text.Find("AnatomicalOrientation").value_or("???").find('?') == std::string::npos;
-  if (!patient && directions->empty() && Triple(*origin) == Vec3{}) return header;
+  // Without a matrix and an origin there is no orientation, unless letters name one.
+  const std::string letters = text.Find("AnatomicalOrientation").value_or("");
+  if (letters.find_first_not_of('?') == std::string::npos && directions->empty() && Triple(*origin) == Vec3{}) return header;
+  // ITK writes all of its images in a patient's space: left, posterior, superior. It knows the letters of three axes only. VTK, whose
+  // volumes have three axes, writes its own space, and question marks.
+  const bool patient = letters != "???" || count != 3;
+  if (!patient) {
+    header.notes.emplace_back("AnatomicalOrientation is ???: taken for a scene, as VTK writes it, and not for a patient");
+  } else if (letters.find_first_not_of('?') == std::string::npos) {
+    header.notes.push_back(fmt::format("AnatomicalOrientation is {}: taken for a patient's space (left, posterior, superior), as ITK does",
+                                       letters.empty() ? "not stated" : letters));
+  }
   header.world = patient ? World::kPatient : World::kScene;
   header.matrix = "TransformMatrix";
   const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
@@ -84,36 +93,38 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   return header;
 }
 
-Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
+Result<TextPayload> ReadPayload(const TextHeader& text) {
   if (text.Find("BinaryData") && !IsTrue(text, "BinaryData")) {
     return text.Refused("samples as text (BinaryData = False) are not supported");
   }
-  const std::string file = *text.Find("ElementDataFile");
-  const bool local = ToLower(file) == "local";
-  Result<Payload> payload = text.PayloadIn(local ? std::nullopt : std::optional(file));
-  if (!payload.ok()) return payload;
-  payload->compressed = IsTrue(text, "CompressedData");
-  payload->big_endian = IsTrue(text, "BinaryDataByteOrderMSB") || IsTrue(text, "ElementByteOrderMSB");
-  if (local) return payload;
-  const Result<std::int64_t> skip = text.BytesToSkip("HeaderSize", text.Find("HeaderSize").value_or("0"), *payload, sample_bytes);
-  if (!skip.ok()) return skip.status();
-  payload->offset = *skip;
+  const std::string file = *text.Find("ElementDataFile"), skipped = text.Find("HeaderSize").value_or("0");
+  TextPayload payload{
+      .file = file,
+      .slices = ParseNumber<std::int64_t>(text.Find("DimSize")->substr(text.Find("DimSize")->find_last_of(" \t") + 1)).value_or(1),
+      .compression = IsTrue(text, "CompressedData") ? Compression::kDeflate : Compression::kNone,
+      .big_endian = IsTrue(text, "BinaryDataByteOrderMSB") || IsTrue(text, "ElementByteOrderMSB"),
+      .bytes_key = "HeaderSize",
+      .bytes = skipped};
+  if (ToLower(file) != "local") return payload;
+  // Bytes of this file, too, if there is such a field.
+  payload.file = skipped == "0" ? std::nullopt : std::optional(std::filesystem::path(text.path).filename().string());
   return payload;
 }
 
 Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
   return LocateInTextVolume(path,
                             {.name = "MetaImage",
-                             .separator = '=',
-                             .last_key = "ElementDataFile",
+                             .separators = "=:",
+                             .data_keys = {"ElementDataFile"},
+                             .data_ends_header = true,
                              .required = {"NDims", "DimSize", "ElementType", "ElementDataFile"},
                              .read_header = ReadHeader,
-                             .find_payload = FindPayload},
+                             .read_payload = ReadPayload},
                             options);
 }
 
 // A patient's space is left, posterior, superior in MetaImage. Its letters say where each axis begins: left, posterior, inferior, since
-// axes lie near those of World.
+// axes lie near those of World. A scene has question marks, as VTK's.
 std::string SpaceLines(const VolumeGeometry& geometry) {
   const Orientation& orientation = geometry.orientation;
   const std::string unit = orientation.unit ? fmt::format("DistanceUnits = {}\n", FileNameOf(*orientation.unit)) : "";
@@ -121,8 +132,8 @@ std::string SpaceLines(const VolumeGeometry& geometry) {
   const bool patient = orientation.world == World::kPatient;
   const Vec3 signs = patient ? kRasFromLps : Vec3{1, 1, 1};
   const auto axis = [&](std::size_t i) { return Numbers(signs * orientation.axes[i]); };
-  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\n{}{}", axis(0), axis(1), axis(2), Numbers(signs * orientation.origin),
-                     patient ? "AnatomicalOrientation = LPI\n" : "", unit);
+  return fmt::format("TransformMatrix = {} {} {}\nOffset = {}\nAnatomicalOrientation = {}\n{}", axis(0), axis(1), axis(2),
+                     Numbers(signs * orientation.origin), patient ? "LPI" : "???", unit);
 }
 
 std::string HeaderOf(const FileSamples& samples, const std::string& data_file) {

@@ -1,5 +1,5 @@
-// MRC and CCP4 maps of electron microscopy and crystallography (.mrc, .map, .ccp4, .rec; or .gz of those). Fields and numbers are those of
-// the MRC2014 format (Cheng et al. 2015), which counts in words of four bytes from 1.
+// MRC and CCP4 maps of electron microscopy and crystallography (.mrc, .mrcs, .map, .ccp4, .rec, .st, .ali; .gz or .bz2 of .mrc and .map).
+// Fields and numbers are those of the MRC2014 format (Cheng et al. 2015), which counts in words of four bytes from 1.
 #include <fmt/format.h>
 
 #include <array>
@@ -19,8 +19,25 @@ constexpr std::size_t kHeaderBytes = 1024;
 
 constexpr std::size_t Word(int number) { return 4 * std::size_t(number - 1); }
 
-// Little endian unless the machine stamp says otherwise.
-bool IsBigEndian(std::span<const std::byte> bytes) { return bytes[Word(54)] == std::byte{0x11} && bytes[Word(54) + 1] == std::byte{0x11}; }
+// By the machine stamp; if that is neither of the two, by the mode, which is a small number.
+bool IsBigEndian(std::span<const std::byte> bytes) {
+  constexpr std::int32_t kMostMode = 255;
+  const auto stamp = std::to_integer<int>(bytes[Word(54)]);
+  if (stamp == 0x11 || stamp == 0x44) return stamp == 0x11;
+  const auto mode = BinaryHeader(bytes, false).At<std::int32_t>(Word(4));
+  return mode < 0 || mode > kMostMode;
+}
+
+// "101 (integers of 4 bits)"
+std::string ModeText(std::int32_t mode) {
+  switch (mode) {
+    case 3: return "3 (complex integers)";
+    case 4: return "4 (complex floats)";
+    case 16: return "16 (colours)";
+    case 101: return "101 (integers of 4 bits)";
+    default: return std::to_string(mode);
+  }
+}
 
 std::optional<SampleType> TypeOf(const BinaryHeader& fields) {
   constexpr std::int32_t kImodStamp = 1146047817, kSignedBytes = 1;
@@ -88,12 +105,15 @@ Result<RawHeader> HeaderOf(const BinaryHeader& fields, SampleType type, const st
     header.origin = header.origin + double(starts[i]) * header.steps[std::size_t(i)];
   }
   // A file may say where its volume lies in a second way, which counts if it is there.
-  if (const Vec3 origin = Floats(fields, 50); origin != Vec3{}) header.origin = origin;
+  if (const Vec3 origin = Floats(fields, 50); origin != Vec3{}) {
+    if (starts != Index3{0, 0, 0}) header.notes.emplace_back("placed by ORIGIN, not by NXSTART, NYSTART and NZSTART");
+    header.origin = origin;
+  }
   return header;
 }
 
 Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
-  Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
+  Payload payload{.file = path, .compression = CompressionOf(path)};
   std::array<std::byte, kHeaderBytes> bytes{};
   if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
   const bool big_endian = IsBigEndian(bytes);
@@ -106,14 +126,14 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   if (!type) {
     return Status::InvalidArgument(
         fmt::format("{}: MRC mode {} is not supported; supported: 0, 1, 2, 6 and 12 (integers of 8 and 16 bits, floats)", path,
-                    fields.At<std::int32_t>(Word(4))));
+                    ModeText(fields.At<std::int32_t>(Word(4)))));
   }
   Result<RawHeader> header = HeaderOf(fields, *type, path, options);
   if (!header.ok()) return header.status();
   const std::int32_t extension = fields.At<std::int32_t>(Word(24));
   if (extension < 0)
     return Status::InvalidArgument(fmt::format("{}: the extended header has {} bytes, must be at least 0", path, extension));
-  (payload.compressed ? payload.skip : payload.offset) = std::int64_t{kHeaderBytes} + extension;
+  payload.Skip(std::int64_t{kHeaderBytes} + extension);
   payload.big_endian = big_endian;
   return LocatedSamples{*std::move(header), std::move(payload)};
 }
@@ -121,7 +141,10 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
 }  // namespace
 
 VolumeFormat Mrc() {
-  return {.name = "MRC", .endings = {".mrc", ".map", ".ccp4", ".rec", ".mrc.gz", ".map.gz"}, .options = {"time"}, .locate = Locate};
+  return {.name = "MRC",
+          .endings = {".mrc", ".mrcs", ".map", ".ccp4", ".rec", ".st", ".ali", ".mrc.gz", ".map.gz", ".mrc.bz2", ".map.bz2"},
+          .options = {"time"},
+          .locate = Locate};
 }
 
 }  // namespace slabstream

@@ -1,159 +1,166 @@
-// NIfTI-1 in one file (.nii, .nii.gz). Fields, numbers and formulas are those of nifti1.h, the format's definition.
+// NIfTI-1 and NIfTI-2 in one file (.nii, .nii.gz, .nii.bz2) or in a pair (.hdr and .img, each perhaps packed), and Analyze 7.5 in such a
+// pair. NIfTI-1 in one file is written.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "data/volume_io/binary_header.h"
 #include "data/volume_io/formats.h"
+#include "data/volume_io/nifti_header.h"
 #include "data/volume_io/output.h"
+#include "data/volume_io/text_header.h"
 
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 348;
-constexpr std::int64_t kUsualOffset = 352;  // header and four bytes that announce extensions
+constexpr std::int64_t kUsualOffset = kNifti1Bytes + 4;  // header and four bytes that announce extensions
 
-// The header's bytes in the file's byte order.
-class NiftiHeader {
- public:
-  explicit NiftiHeader(const std::array<std::byte, kHeaderBytes>& bytes)
-      : bytes_(bytes),
-        big_endian_(BinaryHeader(bytes, false).At<std::int32_t>(0) != std::int32_t{kHeaderBytes}),
-        fields_(bytes, big_endian_) {}
+bool IsColour(int data_type) { return data_type == kNiftiRgb || data_type == kNiftiRgba; }
 
-  bool valid() const { return At<std::int32_t>(0) == std::int32_t{kHeaderBytes} && std::memcmp(bytes_.data() + 344, "n+1", 4) == 0; }
-  bool big_endian() const { return big_endian_; }
-  int dim(int i) const { return At<std::int16_t>(40 + 2 * std::size_t(i)); }
-  int intent_code() const { return At<std::int16_t>(68); }
-  int data_type() const { return At<std::int16_t>(70); }
-  double pixdim(int i) const { return At<float>(76 + 4 * std::size_t(i)); }
-  float vox_offset() const { return At<float>(108); }
-  float slope() const { return At<float>(112); }
-  float intercept() const { return At<float>(116); }
-  int space_unit() const { return std::to_integer<int>(bytes_[123]) & 7; }
-  int qform_code() const { return At<std::int16_t>(252); }
-  int sform_code() const { return At<std::int16_t>(254); }
-  double quatern(int i) const { return At<float>(256 + 4 * std::size_t(i)); }  // b, c, d
-  double qoffset(int i) const { return At<float>(268 + 4 * std::size_t(i)); }
-  double srow(int row, int column) const { return At<float>(280 + 16 * std::size_t(row) + 4 * std::size_t(column)); }
-
- private:
-  template <class T>
-  T At(std::size_t offset) const {
-    return fields_.At<T>(offset);
-  }
-
-  const std::array<std::byte, kHeaderBytes>& bytes_;
-  bool big_endian_;
-  BinaryHeader fields_;
-};
-
-constexpr int kRgb = 128, kRgba = 2304;  // NIFTI_TYPE_RGB24, NIFTI_TYPE_RGBA32
-
-// NIFTI_TYPE_... The first number of a type is the one that is written.
-constexpr std::array<std::pair<int, SampleType>, 12> kTypes = {{{2, SampleType::kUint8},
-                                                                {4, SampleType::kInt16},
-                                                                {8, SampleType::kInt32},
-                                                                {16, SampleType::kFloat32},
-                                                                {64, SampleType::kFloat64},
-                                                                {256, SampleType::kInt8},
-                                                                {512, SampleType::kUint16},
-                                                                {768, SampleType::kUint32},
-                                                                {1024, SampleType::kInt64},
-                                                                {1280, SampleType::kUint64},
-                                                                {kRgb, SampleType::kUint8},
-                                                                {kRgba, SampleType::kUint8}}};
-
-std::optional<SampleType> ToSampleType(int data_type) {
-  const auto* const found = std::ranges::find(kTypes, data_type, [](const auto& entry) { return entry.first; });
-  return found == kTypes.end() ? std::nullopt : std::optional(found->second);
+// "32 (complex64)"
+std::string TypeText(int data_type) {
+  constexpr std::array<std::pair<int, std::string_view>, 5> kOthers = {
+      {{1, "bits"}, {32, "complex64"}, {1536, "float128"}, {1792, "complex128"}, {2048, "complex256"}}};
+  const auto* const found = std::ranges::find(kOthers, data_type, [](const auto& entry) { return entry.first; });
+  return found == kOthers.end() ? std::to_string(data_type) : fmt::format("{} ({})", data_type, found->second);
 }
 
-// NIFTI_UNITS_...
-struct Unit {
-  int code;
-  LengthUnit unit;
-  double millimetres;
-};
-constexpr std::array<Unit, 3> kUnits = {
-    {{1, LengthUnit::kMetre, 1000}, {2, LengthUnit::kMillimetre, 1}, {3, LengthUnit::kMicrometre, 0.001}}};
-
-// Steps and origin in the patient's space, which is that of NIfTI. Like ITK, takes the affine matrix if it leads to the scanner's axes,
-// else the quaternion. Without either, only the spacing is known.
-void ReadOrientation(const NiftiHeader& fields, double millimetres, RawHeader& header) {
-  constexpr int kScanner = 1;  // NIFTI_XFORM_SCANNER_ANAT
-  const Vec3 spacing = millimetres * Vec3{fields.pixdim(1), fields.pixdim(2), fields.pixdim(3)};
-  header.steps = StepsOf(spacing);
-  if (fields.sform_code() == kScanner || (fields.sform_code() > 0 && fields.qform_code() <= 0)) {
-    header.world = World::kPatient;
-    header.matrix = "sform";
-    for (int i = 0; i < 3; ++i) header.steps[std::size_t(i)] = millimetres * Vec3{fields.srow(0, i), fields.srow(1, i), fields.srow(2, i)};
-    header.origin = millimetres * Vec3{fields.srow(0, 3), fields.srow(1, 3), fields.srow(2, 3)};
-  } else if (fields.qform_code() > 0) {
-    header.world = World::kPatient;
-    header.matrix = "qform";
-    double b = fields.quatern(0), c = fields.quatern(1), d = fields.quatern(2);
-    const double square = b * b + c * c + d * d;  // rounded, it may be above 1
-    const double a = std::sqrt(std::max(0.0, 1 - square)), scale = square > 1 ? 1 / std::sqrt(square) : 1;
-    b *= scale;
-    c *= scale;
-    d *= scale;
-    header.steps[0] = spacing.x * Vec3{a * a + b * b - c * c - d * d, 2 * (b * c + a * d), 2 * (b * d - a * c)};
-    header.steps[1] = spacing.y * Vec3{2 * (b * c - a * d), a * a + c * c - b * b - d * d, 2 * (c * d + a * b)};
-    header.steps[2] =
-        (fields.pixdim(0) < 0 ? -spacing.z : spacing.z) * Vec3{2 * (b * d + a * c), 2 * (c * d - a * b), a * a + d * d - b * b - c * c};
-    header.origin = millimetres * Vec3{fields.qoffset(0), fields.qoffset(1), fields.qoffset(2)};
+// Sizes are x, y, z, time and channel.
+Status SetSizes(const NiftiHeader& fields, const std::string& path, const ReadOptions& options, RawHeader& header) {
+  std::vector<double> sizes = fields.sizes;
+  while (sizes.size() > 4 && sizes.back() == 1) sizes.pop_back();
+  if (sizes.empty() || sizes.size() > 5) {
+    const std::int64_t count = sizes.empty() ? fields.dimensions : std::int64_t(sizes.size());
+    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3 to 5: x, y, z, time, channel", path, count));
   }
+  const double channels = sizes.size() == 5 ? sizes.back() : 1;
+  if (sizes.size() == 5) sizes.pop_back();
+  return SetSize(header, path, std::move(sizes), options, channels);
+}
+
+// From samples to data values. A slope of 0 or that is not finite means that there is none.
+Status SetRescale(const NiftiHeader& fields, const std::string& path, RawHeader& header) {
+  if (fields.slope == 0 || !std::isfinite(fields.slope) || IsColour(fields.data_type)) return Status::Ok();
+  if (!std::isfinite(fields.intercept)) {
+    return Status::InvalidArgument(
+        fmt::format("{}: scl_inter is {}, must be finite, since scl_slope is {}", path, fields.intercept, fields.slope));
+  }
+  header.rescale = {fields.slope, fields.intercept};
+  if (fields.analyze && fields.slope != 1)
+    header.notes.push_back(fmt::format("values are scaled by {:g}, where SPM has a scale factor", fields.slope));
+  return Status::Ok();
 }
 
 Result<RawHeader> ReadHeader(const NiftiHeader& fields, const std::string& path, const ReadOptions& options) {
-  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
-  const std::optional<SampleType> type = ToSampleType(fields.data_type());
-  if (!type) {
-    return wrong(fmt::format("NIfTI data type {} is not supported; supported: integers of 8 to 64 bits, floats of 32 and 64 bits, colours",
-                             fields.data_type()));
+  const auto* const type = std::ranges::find(kNiftiTypes, fields.data_type, [](const auto& entry) { return entry.first; });
+  if (type == kNiftiTypes.end()) {
+    return Status::InvalidArgument(
+        fmt::format("{}: {} data type {} is not supported; supported: integers of 8 to 64 bits, floats of 32 and 64 bits, colours", path,
+                    fields.version, TypeText(fields.data_type)));
   }
-  const int dimensions = fields.dim(0);
-  if (dimensions < 1 || dimensions > 7) return wrong(fmt::format("has {} dimensions, must have 3", dimensions));
-  std::vector<double> sizes;
-  for (int i = 1; i <= dimensions; ++i) sizes.push_back(fields.dim(i));
-  RawHeader header{.components = fields.data_type() == kRgb ? 3 : fields.data_type() == kRgba ? 4 : 1, .type = *type};
-  if (Status status = SetSize(header, path, std::move(sizes), options); !status.ok()) return status;
+  RawHeader header{.components = fields.data_type == kNiftiRgb ? 3 : fields.data_type == kNiftiRgba ? 4 : 1, .type = type->second};
+  if (Status status = SetSizes(fields, path, options, header); !status.ok()) return status;
   constexpr int kLabels = 1002;  // NIFTI_INTENT_LABEL
-  header.labels = fields.intent_code() == kLabels;
-  const auto* const unit = std::ranges::find(kUnits, fields.space_unit(), &Unit::code);
-  ReadOrientation(fields, unit == kUnits.end() ? 1 : unit->millimetres, header);
-  if (unit != kUnits.end()) header.unit = LengthUnit::kMillimetre;
-  // A slope of 0 means that there is none.
-  if (fields.slope() != 0 && std::isfinite(fields.slope()) && std::isfinite(fields.intercept())) {
-    header.rescale = {fields.slope(), fields.intercept()};
-  }
+  header.labels = fields.intent == kLabels;
+  if (Status status = PlaceNifti(fields, path, options.matrix, header); !status.ok()) return status;
+  if (Status status = SetRescale(fields, path, header); !status.ok()) return status;
   return header;
 }
 
-Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
-  Payload payload{.file = path, .compressed = BeginsLikeGzip(path)};
-  std::array<std::byte, kHeaderBytes> bytes{};
+// A path in its parts: "dir/HEAD", ".HDR", ".gz".
+struct PathParts {
+  std::string stem, ending, packing;
+};
+
+PathParts PartsOf(std::string path) {
+  PathParts parts;
+  for (const std::string_view packing : {".gz", ".bz2"}) {
+    if (!ToLower(path).ends_with(packing)) continue;
+    parts.packing = path.substr(path.size() - packing.size());
+    path.resize(path.size() - packing.size());
+  }
+  const std::size_t dot = std::min(path.rfind('.'), path.size());
+  parts.ending = path.substr(dot);
+  parts.stem = path.substr(0, dot);
+  return parts;
+}
+
+bool IsPairEnding(const std::string& ending) { return ToLower(ending) == ".hdr" || ToLower(ending) == ".img"; }
+
+// The other file of a pair of .hdr and .img, packed or not. None: it is not there.
+std::optional<std::string> OtherOfPair(const PathParts& parts) {
+  const bool upper = parts.ending == ".HDR" || parts.ending == ".IMG";
+  const std::string ending = ToLower(parts.ending) == ".hdr" ? (upper ? ".IMG" : ".img") : (upper ? ".HDR" : ".hdr");
+  for (const std::string& packing : {parts.packing, std::string(), std::string(".gz"), std::string(".bz2")}) {
+    std::error_code error;
+    if (std::string other = parts.stem + ending + packing; std::filesystem::is_regular_file(other, error)) return other;
+  }
+  return std::nullopt;
+}
+
+// The file that begins with the header: `path` unless that is an .img.
+std::string HeaderFile(const std::string& path) {
+  const PathParts parts = PartsOf(path);
+  return ToLower(parts.ending) == ".img" ? OtherOfPair(parts).value_or(path) : path;
+}
+
+// None: the file does not begin with the number of such a header.
+Result<std::vector<std::byte>> ReadHeaderBytes(const Payload& payload) {
+  std::array<std::byte, 4> first{};
+  if (Status status = ReadPayload(payload, first, Extent::kStart); !status.ok()) return status;
+  std::vector<std::byte> bytes(NiftiHeaderBytes(first));
   if (Status status = ReadPayload(payload, bytes, Extent::kStart); !status.ok()) return status;
-  const NiftiHeader fields(bytes);
-  if (!fields.valid()) return Status::InvalidArgument(path + ": not a NIfTI volume: the header is not that of NIfTI-1 in one file");
-  Result<RawHeader> header = ReadHeader(fields, path, options);
+  return bytes;
+}
+
+Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(path + ": " + why); };
+  Payload payload{.file = HeaderFile(path)};
+  payload.compression = CompressionOf(payload.file);
+  const auto bytes = ReadHeaderBytes(payload);
+  if (!bytes.ok()) return bytes.status();
+  const PathParts parts = PartsOf(payload.file.string());
+  const std::optional<NiftiHeader> fields = bytes->empty() ? std::nullopt : ParseNifti(*bytes, !IsPairEnding(parts.ending));
+  if (!fields) return wrong("not a NIfTI volume: the header is not that of NIfTI-1 or NIfTI-2");
+  Result<RawHeader> header = ReadHeader(*fields, path, options);
   if (!header.ok()) return header.status();
 
-  const float offset = fields.vox_offset();
-  // So far floats are exact enough, and extensions are smaller.
-  if (!(offset <= 0x1p30F)) return Status::InvalidArgument(fmt::format("{}: vox_offset is {}, must be at most 2^30", path, offset));
-  (payload.compressed ? payload.skip : payload.offset) = offset < float{kHeaderBytes} ? kUsualOffset : std::int64_t(offset);
-  payload.big_endian = fields.big_endian();
+  constexpr double kMostOffset = 0x1p53;
+  if (!(fields->vox_offset >= 0 && fields->vox_offset <= kMostOffset)) {
+    return wrong(fmt::format("vox_offset is {}, must be in [0, 2^53]", fields->vox_offset));
+  }
+  payload.big_endian = fields->big_endian;
+  auto offset = std::int64_t(fields->vox_offset);
+  if (fields->pair) {
+    const std::optional<std::string> samples = IsPairEnding(parts.ending) ? OtherOfPair(parts) : std::nullopt;
+    if (!samples)
+      return wrong(
+          fmt::format("its header, of {}, says that the samples are in an .img file beside an .hdr: no such file", fields->version));
+    payload.file = *samples;
+    payload.compression = CompressionOf(payload.file);
+  } else if (const auto header_bytes = std::int64_t(bytes->size()); offset < header_bytes) {
+    offset = header_bytes + 4;  // it announces extensions
+  }
+  payload.Skip(offset);
   return LocatedSamples{*std::move(header), std::move(payload)};
+}
+
+// A pair, by its header. Samples of a raw .img may have options.
+bool Recognises(const std::string& path, const ReadOptions& options) {
+  if (options.dims || !IsPairEnding(PartsOf(path).ending)) return false;
+  Payload payload{.file = HeaderFile(path)};
+  payload.compression = CompressionOf(payload.file);
+  std::array<std::byte, 4> first{};
+  return ReadPayload(payload, first, Extent::kStart).ok() && NiftiHeaderBytes(first) > 0;
 }
 
 // The rotation whose columns are the axes, as b, c and d of a quaternion a + bi + cj + dk with a >= 0.
@@ -179,21 +186,21 @@ std::string HeaderOf(const FileSamples& samples) {
   const auto& [size, spacing, orientation] = samples.geometry();
   std::string bytes(std::size_t{kUsualOffset}, '\0');
   const auto put = [&]<class T>(std::size_t offset, T value) { std::memcpy(bytes.data() + offset, &value, sizeof value); };
-  put(0, std::int32_t{kHeaderBytes});
+  put(0, kNifti1Bytes);
   put(40, std::int16_t{3});
   for (std::size_t i = 0; i < 7; ++i) {
     put(42 + 2 * i, std::int16_t(i < 3 ? size[int(i)] : 1));
     put(80 + 4 * i, i < 3 ? float(spacing[int(i)]) : 1.0F);
   }
-  put(70, std::int16_t(std::ranges::find(kTypes, samples.type(), [](const auto& entry) { return entry.second; })->first));
+  put(70, std::int16_t(std::ranges::find(kNiftiTypes, samples.type(), [](const auto& entry) { return entry.second; })->first));
   put(72, std::int16_t(8 * BytesPerSample(samples.type())));
   put(76, 1.0F);  // a right-handed quaternion
   put(108, float(kUsualOffset));
   put(112, 1.0F);
   const bool patient = orientation.world == World::kPatient;
   const std::optional<LengthUnit> length = patient && !orientation.unit ? LengthUnit::kMillimetre : orientation.unit;
-  const auto* const unit = std::ranges::find(kUnits, length, &Unit::unit);
-  if (unit != kUnits.end()) bytes[123] = char(unit->code);
+  const auto* const unit = std::ranges::find(kNiftiUnits, length, &NiftiUnit::unit);
+  if (unit != kNiftiUnits.end()) bytes[123] = char(unit->code);
   if (orientation.world != World::kVoxels) {
     constexpr std::int16_t kScannerAxes = 1, kOtherAxes = 2;
     for (const std::size_t code : {252, 254}) put(code, patient ? kScannerAxes : kOtherAxes);
@@ -235,8 +242,10 @@ Status Write(const FileSamples& samples, const std::string& path) {
 
 VolumeFormat Nifti() {
   return {.name = "NIfTI",
-          .endings = {".nii", ".nii.gz"},
-          .options = {"time", "channel"},
+          .endings = {".nii", ".nii.gz", ".nii.bz2"},
+          .also = "a pair of .hdr and .img files",
+          .recognises = Recognises,
+          .options = {"time", "channel", "matrix"},
           .locate = Locate,
           .written_endings = {".nii", ".nii.gz"},
           .write = Write,

@@ -1,4 +1,4 @@
-// NRRD with its samples in the same file or in one other (.nrrd, .nhdr), raw or gzip.
+// NRRD with its samples in the same file or in others (.nrrd, .nhdr), raw, gzip or bzip2.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,8 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/parse_number.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/length_names.h"
+#include "data/volume_io/nrrd_axes.h"
 #include "data/volume_io/output.h"
 #include "data/volume_io/text_header.h"
 
@@ -76,60 +78,53 @@ std::optional<LengthUnit> UnitOf(std::string_view text, std::size_t first) {
 Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options) {
   const std::optional<SampleType> type = ToSampleType(*text.Find("type"));
   if (!type) return text.NotAVolume("type '" + *text.Find("type") + "' is not supported");
-  const auto sizes = text.Sizes("dimension", "sizes");
-  if (!sizes.ok()) return sizes.status();
-  RawHeader header{.type = *type};
-  // Components lie along the first axis: as its kind says, or if there is none, where it is as short as a colour.
-  const std::string kinds =
-      ToLower(text.Find("kinds").value_or(sizes->size() == 4 && (sizes->front() == 3 || sizes->front() == 4) ? "color" : "domain"));
-  const bool components = !kinds.starts_with("domain") && !kinds.starts_with("space") && !kinds.starts_with("?");
-  const std::size_t first = components ? 1 : 0;
-  if (components) {
-    if (!(sizes->front() >= 1 && sizes->front() <= kMaxComponents)) {
-      return text.NotAVolume(fmt::format("sizes begin with {} components, must be in [1, {}]", sizes->front(), kMaxComponents));
-    }
-    header.components = int(sizes->front());
+  Result<NrrdAxes> axes = ReadNrrdAxes(text);
+  if (!axes.ok()) return axes.status();
+  if (!(axes->components >= 1 && axes->components <= kMaxComponents)) {
+    return text.NotAVolume(fmt::format("sizes begin with {} components, must be in [1, {}]", axes->components, kMaxComponents));
   }
-  if (Status status = SetSize(header, text.path, {sizes->begin() + std::ptrdiff_t(first), sizes->end()}, options); !status.ok())
-    return status;
-  header.labels = text.Find("segment0_id").has_value();  // as 3D Slicer writes segmentations
-  const auto spacings = text.Numbers({"spacings"}, sizes->size(), std::vector<double>(sizes->size(), 1));
-  const auto origin = text.Numbers({"space origin"}, 3, {0, 0, 0});
-  const auto directions = text.Numbers({"space directions"}, 9, {});
-  for (const auto* numbers : {&spacings, &origin, &directions}) {
+  RawHeader header{.components = int(axes->components), .type = *type, .notes = std::move(axes->notes)};
+  if (Status status = SetSize(header, text.path, axes->sizes, options, axes->channels); !status.ok()) return status;
+  header.labels = text.Find("segment0_id:=").has_value();  // as 3D Slicer writes segmentations
+  const auto count = std::size_t(ParseNumber<int>(*text.Find("dimension")).value_or(0));
+  const auto spacings = text.Numbers({"spacings"}, count, std::vector<double>(count, 1));
+  const auto origin = text.Numbers({"space origin"}, axes->space_numbers, std::vector<double>(axes->space_numbers, 0));
+  for (const auto* numbers : {&spacings, &origin}) {
     if (!numbers->ok()) return numbers->status();
   }
 
-  header.steps = StepsOf(Triple(*spacings, first));
+  header.steps = StepsOf(Triple(*spacings, axes->first));
   const auto of_space = text.Find("space units");
-  header.unit = of_space ? UnitOf(*of_space, 0) : UnitOf(text.Find("units").value_or(""), first);
+  header.unit = of_space ? UnitOf(*of_space, 0) : UnitOf(text.Find("units").value_or(""), axes->first);
   const std::string name = ToLower(text.Find("space").value_or(""));
-  if (directions->empty() && name.empty()) return header;
-  const Space space = SpaceNamed(name);
-  header.world = space.world;
-  header.matrix = directions->empty() ? "spacings" : "space directions";
-  for (std::size_t i = 0; i < 3; ++i) {
-    header.steps[i] = space.signs * (directions->empty() ? header.steps[i] : Triple(*directions, 3 * i));
+  if (!axes->directions && name.empty()) return header;
+  Space space = SpaceNamed(name);
+  if (name.empty() && axes->space_numbers == 4) {
+    space = {World::kPatient, kRasFromLps};
+    header.notes.emplace_back("a space of four dimensions without a name: taken for left, posterior, superior and time, as ITK writes it");
   }
+  header.world = space.world;
+  header.matrix = axes->directions ? "space directions" : "spacings";
+  for (std::size_t i = 0; i < 3; ++i) header.steps[i] = space.signs * (axes->directions ? (*axes->directions)[i] : header.steps[i]);
   header.origin = space.signs * Triple(*origin);
   return header;
 }
 
-Result<Payload> FindPayload(const TextHeader& text, std::int64_t sample_bytes) {
-  Result<Payload> payload = text.PayloadIn(text.Find({"data file", "datafile"}));
-  if (!payload.ok()) return payload;
+Result<TextPayload> ReadPayload(const TextHeader& text) {
   const std::string encoding = ToLower(*text.Find("encoding"));
-  payload->compressed = encoding == "gzip" || encoding == "gz";
-  if (!payload->compressed && encoding != "raw")
-    return text.Refused("encoding '" + encoding + "' is not supported; supported: raw and gzip");
-  payload->big_endian = ToLower(text.Find("endian").value_or("little")) == "big";
-
-  if (text.Find({"line skip", "lineskip"}).value_or("0") != "0") return text.Refused("line skip is not supported");
-  const std::string skip_text = text.Find({"byte skip", "byteskip"}).value_or("0");
-  if (payload->compressed && skip_text == "-1") return text.Refused("byte skip is -1, must be at least 0 for compressed samples");
-  const Result<std::int64_t> skip = text.BytesToSkip("byte skip", skip_text, *payload, sample_bytes);
-  if (!skip.ok()) return skip.status();
-  (payload->compressed ? payload->skip : payload->offset) += *skip;
+  TextPayload payload{.file = text.Find({"data file", "datafile"}),
+                      .big_endian = ToLower(text.Find("endian").value_or("little")) == "big",
+                      .lines_key = "line skip",
+                      .lines = text.Find({"line skip", "lineskip"}).value_or("0"),
+                      .bytes_key = "byte skip",
+                      .bytes = text.Find({"byte skip", "byteskip"}).value_or("0")};
+  if (encoding == "gzip" || encoding == "gz") {
+    payload.compression = Compression::kDeflate;
+  } else if (encoding == "bzip2" || encoding == "bz2") {
+    payload.compression = Compression::kBzip2;
+  } else if (encoding != "raw") {
+    return text.Refused("encoding '" + encoding + "' is not supported; supported: raw, gzip and bzip2");
+  }
   return payload;
 }
 
@@ -137,11 +132,13 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   return LocateInTextVolume(path,
                             {.name = "NRRD",
                              .first_line = "NRRD000",
-                             .separator = ':',
+                             .separators = ":",
+                             .key_value = ":=",
                              .ignores_case = true,
+                             .data_keys = {"data file", "datafile"},
                              .required = {"type", "dimension", "sizes", "encoding"},
                              .read_header = ReadHeader,
-                             .find_payload = FindPayload},
+                             .read_payload = ReadPayload},
                             options);
 }
 

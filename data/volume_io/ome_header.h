@@ -1,34 +1,41 @@
-// What an OME-TIFF says of its pages: the XML in the description of the first one.
+// The XML of OME: the description of the first page of an OME-TIFF, or a file beside it. The model is that of the OME schema 2016-06, and
+// what older ones call otherwise.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/status.h"
-#include "common/math/vec.h"
-#include "data/volume_io/read_options.h"
+#include "data/volume_io/xml_events.h"
 
 namespace slabstream {
 
-// The slices of a volume among the pages of a file: first, first + step, ...
-struct PageOrder {
-  std::int64_t first = 0, step = 1, count = 0;
-  bool of_channel = false;                 // these are the pages of one channel of several
-  std::optional<Vec3> spacing;             // micrometres
-  int channel = 0;                         // which one
-  std::vector<std::string> channels = {};  // names, "" where there is none; as many as there are channels if these have pages
-  int times = 1;                           // that the file holds
+// Which pages some planes of an image are, as a TiffData says.
+struct OmeTiffData {
+  std::int64_t slice = 0, channel = 0, time = 0;  // FirstZ, FirstC, FirstT
+  std::int64_t page = 0;                          // IFD
+  std::int64_t count = 0;                         // PlaneCount; 0: all pages of the file
+  std::string file_name = {};                     // "": not stated
+  std::string uuid = {};                          // of the file
+};
 
-  std::int64_t PageOf(std::int64_t slice) const { return first + slice * step; }
+struct OmeHeader {
+  std::string uuid;                        // of the file that has it
+  std::string metadata_file;               // BinaryOnly: the file that has the rest; "": this one
+  std::vector<std::string> images = {};    // names of all
+  XmlTag pixels = {};                      // of the chosen image
+  std::vector<std::string> channels = {};  // names, "" where there is none
+  std::vector<OmeTiffData> tiff_data = {};
+  bool modulo = false;  // an axis stands for two, such as slices for phases of each
 };
 
 // Whether a description is OME's.
 bool IsOmeHeader(const std::string& description);
 
-// InvalidArgument, naming `path`: several times, of which the options do not take one; a channel that is not there; sizes that do not fit
-// the number of pages; several images; or no XML.
-Result<PageOrder> ReadOmeHeader(const std::string& path, const std::string& description, std::int64_t pages, const ReadOptions& options);
+// `image`: which one to read, from 0. InvalidArgument, naming `path`: no XML, or a number in it that is none.
+Result<OmeHeader> ReadOmeHeader(const std::string& path, const std::string& description, std::size_t image);
 
 }  // namespace slabstream

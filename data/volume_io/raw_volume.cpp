@@ -12,22 +12,14 @@
 #include <utility>
 
 #include "common/volume/memory_budget.h"
+#include "data/volume_io/chosen_channel.h"
 
 namespace slabstream {
-namespace {
 
-template <class T>
-T Luminance(const T* rgb) {  // of ITU-R BT.709
-  const double value = 0.2126 * double(rgb[0]) + 0.7152 * double(rgb[1]) + 0.0722 * double(rgb[2]);
-  return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
-}
-
-}  // namespace
-
-Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options) {
+Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options, double channels) {
   while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
   if (sizes.size() != 3 && sizes.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3", path, sizes.size()));
+    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3, or 4 with time", path, sizes.size()));
   }
   for (const Axis axis : kAxes) {
     const double side = sizes[std::size_t(Number(axis))];
@@ -45,6 +37,18 @@ Status SetSize(RawHeader& header, const std::string& path, std::vector<double> s
   if (!number.ok()) return number.status();
   header.volumes = std::int64_t(count);
   header.number = *number;
+  if (channels == 1) return Status::Ok();
+  if (!(channels >= 1 && channels <= double(kMostChannels) && channels == std::floor(channels))) {
+    return Status::InvalidArgument(fmt::format("{}: has {} channels, must be a whole number in [1, {}]", path, channels, kMostChannels));
+  }
+  if (header.components > 1) {
+    return Status::InvalidArgument(
+        fmt::format("{}: has {} channels of {} components a voxel, which is not supported", path, channels, header.components));
+  }
+  header.channels.resize(std::size_t(channels));
+  const Result<int> channel = ChosenChannel(path, header.channels, options);
+  if (!channel.ok()) return channel.status();
+  header.channel = *channel;
   return Status::Ok();
 }
 
@@ -62,10 +66,11 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
   return std::int64_t{options.time.value_or(TimeRange{}).first};
 }
 
-Status CheckChannel(const std::string& path, int components, const ReadOptions& options) {
+Status CheckChannel(const std::string& path, const RawHeader& header, const ReadOptions& options) {
+  const int components = header.components;
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
   const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
-  if (components == 1 && options.channel.value_or(0) == 0) return Status::Ok();
+  if (components == 1 && (options.channel.value_or(0) == 0 || !header.channels.empty())) return Status::Ok();
   if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
   const std::string which = fmt::format("0 to {}{}", components - 1, colour ? ", or luminance, of red, green and blue" : "");
   if (!options.channel) return wrong(fmt::format("has {} components a voxel, of which --channel takes one: {}", components, which));
@@ -74,7 +79,7 @@ Status CheckChannel(const std::string& path, int components, const ReadOptions& 
 }
 
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options) {
-  if (Status status = CheckChannel(path, header.components, options); !status.ok()) return status;
+  if (Status status = CheckChannel(path, header, options); !status.ok()) return status;
   if (Status status = CheckFitsMemory(header.sample_bytes(), path); !status.ok()) return status;
   if (options.progress != nullptr) options.progress->Begin(header.sample_bytes());
   return RawVolume{header, AlignedVector<std::byte>(options.headers_only ? 0 : std::size_t(header.sample_bytes())), {}};
@@ -92,9 +97,10 @@ Status OfSamples(const std::string& path, const Payload& payload, const Status& 
 Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& located) {
   const RawHeader& header = located.header;
   constexpr std::int64_t kMost = std::int64_t{1} << 61;  // longer than any file
-  if (header.number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
+  const std::int64_t number = header.channel * header.volumes + header.number;
+  if (number > kMost / header.sample_bytes()) return Status::DataLoss(path + ": truncated: the volume lies behind the file's end");
   Payload payload = located.payload;
-  (payload.compressed ? payload.skip : payload.offset) += header.number * header.sample_bytes();
+  payload.Pass(number * header.sample_bytes());
   const Status holds = OfSamples(path, payload, CheckHolds(payload, header.sample_bytes()));
   return holds.ok() ? Result<Payload>(std::move(payload)) : holds;
 }
@@ -104,7 +110,7 @@ Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& loc
   if (!payload.ok()) return payload.status();
   Result<RawVolume> raw = TakeMemory(path, located.header, options);
   if (!raw.ok()) return raw;
-  if (payload->file != path) raw->samples_file = payload->file;
+  raw->other_files = payload->FilesBeside(path);
   if (!options.headers_only) {
     const Status read = ReadPayload(*payload, raw->bytes, Extent::kWholeStream, options.progress);
     if (!read.ok()) return OfSamples(path, *payload, read);
@@ -120,10 +126,7 @@ void TakeChannel(RawVolume& raw, const ReadOptions& options) {
   const std::size_t count = CountIn(raw.header.size);
   VisitSampleType(raw.header.type, [&]<class T>(const T*) {
     T* const samples = reinterpret_cast<T*>(raw.bytes.data());
-    for (std::size_t i = 0; i < count; ++i) {
-      const T* const voxel = samples + i * components;
-      samples[i] = options.channel == kLuminance ? Luminance(voxel) : voxel[options.channel.value_or(0)];
-    }
+    for (std::size_t i = 0; i < count; ++i) samples[i] = TakenComponent(samples + i * components, options.channel);
   });
   raw.header.components = 1;
   raw.bytes.resize(std::size_t(raw.header.sample_bytes()));

@@ -1,13 +1,16 @@
 // What a reader of one format makes of a file: a description of the volume, and the samples in the type that the file has.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "common/base/aligned_buffer.h"
@@ -25,9 +28,10 @@ inline constexpr int kMaxComponents = 1024;  // of a voxel
 struct RawHeader {
   Index3 size;
   // Samples of one voxel, which lie together; above 1 only where options.channel takes one of them.
-  int components = 1;        // in [1, kMaxComponents]
-  std::int64_t volumes = 1;  // in [1, kMaxVolumes], one after the other in the payload
-  std::int64_t number = 0;   // which of them: in [0, volumes)
+  int components = 1;  // in [1, kMaxComponents]
+  // In [1, kMaxVolumes], one after the other in the payload; of an image with channels: of each channel, one behind the other.
+  std::int64_t volumes = 1;
+  std::int64_t number = 0;  // which of them: in [0, volumes)
   World world = World::kVoxels;
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
@@ -47,9 +51,15 @@ struct RawHeader {
   std::int64_t sample_bytes() const {
     return VolumeGeometry{size}.bounds().voxel_count() * std::int64_t(BytesPerSample(type)) * components;
   }
+  // Of all volumes, or more than any file has.
+  std::int64_t all_bytes() const {
+    constexpr std::int64_t kMost = std::int64_t{1} << 61;
+    const std::int64_t count = volumes * std::max<std::int64_t>(1, std::int64_t(channels.size()));
+    return count > kMost / sample_bytes() ? kMost : count * sample_bytes();
+  }
 };
 
-// What a header says: the volume, and where its samples lie in one piece.
+// What a header says: the volume, and where its samples lie.
 struct LocatedSamples {
   RawHeader header;
   Payload payload;  // of all volumes
@@ -57,9 +67,9 @@ struct LocatedSamples {
 
 struct RawVolume {
   RawHeader header;
-  AlignedVector<std::byte> bytes;      // this machine's byte order; none if only headers were read
-  std::shared_ptr<const Mesh> cells;   // of an unstructured grid, in data space of the volume, which is not turned or straightened
-  std::filesystem::path samples_file;  // or the folder of several; if that is not the header's file
+  AlignedVector<std::byte> bytes;     // this machine's byte order; none if only headers were read
+  std::shared_ptr<const Mesh> cells;  // of an unstructured grid, in data space of the volume, which is not turned or straightened
+  std::vector<std::filesystem::path> other_files;  // beside the path that is read, or the folder of many
 };
 
 // Steps along the axes themselves.
@@ -69,15 +79,17 @@ inline std::array<Vec3, 3> StepsOf(const Vec3& spacing) { return {Vec3{spacing.x
 inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 
 // Sets the size and the number of the volume by what a file says of its dimensions; those of 1 behind the third are left out.
-// InvalidArgument naming `path`: there are fewer than three or more than four, one of three is no whole number in [1, kMaxVolumeSide], or
-// there are several volumes and options.time does not take one.
-Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options);
+// `channels`: of an image, each with all of its volumes behind the one before; options.channel takes one. InvalidArgument naming `path`:
+// there are fewer than three or more than four dimensions, one of three is no whole number in [1, kMaxVolumeSide], there are several
+// volumes and options.time does not take one, there is no such channel, or voxels of channels have several components.
+Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options, double channels = 1);
 // Which of `count` volumes options.time takes; the first one if options.describe. InvalidArgument: none, although there are several, or one
 // that there is not.
 Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, const ReadOptions& options);
 
-// InvalidArgument, naming `path`: of several components a voxel options.channel takes none, or one that there is not.
-Status CheckChannel(const std::string& path, int components, const ReadOptions& options);
+// InvalidArgument, naming `path`: of several components a voxel options.channel takes none, or one that there is not; or there is one, and
+// no channel of an image was chosen by it.
+Status CheckChannel(const std::string& path, const RawHeader& header, const ReadOptions& options);
 
 // Takes memory for the samples, unless only headers are read. Errors of CheckChannel. ResourceExhausted: too large.
 Result<RawVolume> TakeMemory(const std::string& path, const RawHeader& header, const ReadOptions& options);
@@ -88,6 +100,14 @@ Result<Payload> PayloadOfVolume(const std::string& path, const LocatedSamples& l
 
 // Checks that the file and the memory are large enough, then takes memory for the samples and reads them, unless only headers are read.
 Result<RawVolume> ReadSamples(const std::string& path, const LocatedSamples& located, const ReadOptions& options);
+
+// Of the components of a voxel the one that `channel` takes (ReadOptions::channel), or the luminance of the first three by ITU-R BT.709.
+template <class T>
+T TakenComponent(const T* voxel, std::optional<int> channel) {
+  if (channel != kLuminance) return voxel[channel.value_or(0)];
+  const double value = 0.2126 * double(voxel[0]) + 0.7152 * double(voxel[1]) + 0.0722 * double(voxel[2]);
+  return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
+}
 
 // Of several components the one that options.channel takes, or their luminance, in place.
 void TakeChannel(RawVolume& raw, const ReadOptions& options);

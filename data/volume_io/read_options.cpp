@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
-#include <filesystem>
 
-#include "common/base/find_named.h"
 #include "common/base/parse_number.h"
-#include "common/base/url.h"
 #include "common/mesh/lattice.h"
 
 namespace slabstream {
@@ -65,6 +64,11 @@ Status SetSpacing(ReadOptions& options, std::string_view option, std::string_vie
   return Wrong(option, text, "three numbers above 0, such as 0.5,0.5,1.25");
 }
 
+Status SetMatrix(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.matrix = text;
+  return text == "sform" || text == "qform" ? Status::Ok() : Wrong(option, text, "sform or qform");
+}
+
 Status SetType(ReadOptions& options, std::string_view option, std::string_view text) {
   options.type = SampleTypeNamed(text);
   return options.type ? Status::Ok() : Wrong(option, text, "one of " + SampleTypeNames());
@@ -101,28 +105,26 @@ Status SetDataset(ReadOptions& options, std::string_view option, std::string_vie
   return Status::Ok();
 }
 
-// The end of the option that begins at `begin`: a comma with a name and = behind it, since values may hold commas too.
-std::size_t OptionEnd(const std::string& source, std::size_t begin) {
-  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; };
-  for (std::size_t comma = source.find(',', begin); comma != std::string::npos; comma = source.find(',', comma + 1)) {
-    std::size_t behind = comma + 1;
-    while (behind < source.size() && in_name(source[behind])) ++behind;
-    if (behind > comma + 1 && behind < source.size() && source[behind] == '=') return comma;
-  }
-  return source.size();
+Status SetFollowLinks(ReadOptions& options, std::string_view option, std::string_view text) {
+  options.follow_links = text == "yes" || text == "true";
+  return options.follow_links || text == "no" || text == "false" ? Status::Ok() : Wrong(option, text, "yes or no");
 }
 
-// Where the options of `source` begin, behind the question mark; npos: it has none.
-std::size_t OptionsBegin(const std::string& source) {
-  const std::size_t mark = source.rfind('?');
-  std::error_code error;
-  const bool has_options =
-      mark != std::string::npos && source.find('=', mark) != std::string::npos && !std::filesystem::exists(source, error);
-  if (!has_options) return std::string::npos;
-  // The endpoint of a bucket (data/stores/s3.h) is part of its address.
-  if (!source.starts_with(kBucketScheme) || source.compare(mark, kEndpointMark.size(), kEndpointMark) != 0) return mark + 1;
-  const std::size_t end = OptionEnd(source, mark + 1);
-  return end < source.size() ? end + 1 : std::string::npos;
+Status SetHeader(ReadOptions& options, std::string_view option, std::string_view text) {
+  // What a request for bytes has of its own.
+  constexpr std::array<std::string_view, 7> kOurs = {"accept-encoding", "connection", "content-length",   "host",
+                                                     "if-none-match",   "range",      "transfer-encoding"};
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  std::string name(text.substr(0, colon));
+  const auto in_name = [](unsigned char c) { return std::isalnum(c) != 0 || c == '-' || c == '_'; };
+  const bool printable = std::ranges::none_of(text, [](unsigned char c) { return c < ' ' || c == 0x7F; });
+  if (name.empty() || colon + 1 >= text.size() || !printable || !std::ranges::all_of(name, in_name)) {
+    return Status::InvalidArgument(fmt::format("{} must be NAME:VALUE, or NAME:@FILE with the value in a file", option));
+  }
+  options.headers.emplace_back(text);
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  if (std::ranges::find(kOurs, name) == kOurs.end()) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{}: '{}' is a header that requests have of their own", option, name));
 }
 
 template <auto kMember>
@@ -151,76 +153,27 @@ const std::vector<ReadOption>& ReadOptionList() {
       {"time", "T", "Which volume of a file with several, such as a time series; counted from 0", SetTime, IsGiven<&ReadOptions::time>},
       {"channel", "N|luminance", "Which channel of an image (default: 0) or component of a voxel; or the luminance of red, green and blue",
        SetChannel, IsGiven<&ReadOptions::channel>},
+      {"matrix", "sform|qform", "Which matrix places a NIfTI volume that states both (default: the sform)", SetMatrix,
+       IsGiven<&ReadOptions::matrix>},
       {"spacing", "X,Y,Z", "Voxel spacing, for files that state none: raw, NumPy, pictures", SetSpacing, IsGiven<&ReadOptions::spacing>},
       {"dims", "X,Y,Z", "Voxels along each axis of raw samples, the fastest axis first", SetDims, IsGiven<&ReadOptions::dims>},
       {"type", "TYPE", "Type of raw samples: uint8, int8, uint16, int16, uint32, int32, uint64, int64, float32, float64 or float16",
        SetType, IsGiven<&ReadOptions::type>},
       {"endian", "little|big", "Byte order of raw samples (default: little)", SetEndian, IsGiven<&ReadOptions::big_endian>},
       {"offset", "BYTES", "Bytes of the file before raw samples (default: 0)", SetOffset, IsGiven<&ReadOptions::offset>},
-      {"series", "NUMBER|UID", "Which series of a DICOM folder; `slabstream info` lists them", SetSeries, IsGiven<&ReadOptions::series>},
-      {"array", "NAME", "Which array of an unstructured grid, or which array or group of a Zarr hierarchy", SetArray,
+      {"series", "NUMBER|UID", "Which series of a DICOM folder, or which image of an OME-TIFF, from 0; `slabstream info` lists them",
+       SetSeries, IsGiven<&ReadOptions::series>},
+      {"array", "NAME", "Which array of a VTK file, or which array or group of a Zarr or N5 hierarchy", SetArray,
        IsGiven<&ReadOptions::array>},
       {"lattice", "VOXELS", "Voxels along the longest side of the lattice on which an unstructured grid is sampled", SetLattice,
        IsGiven<&ReadOptions::lattice>},
       {"dataset", "PATH", "Which dataset of an HDF5 file; without it, the error lists them", SetDataset, IsGiven<&ReadOptions::dataset>},
+      {"follow-links", "", "Follow links that lead out of a folder of Zarr, N5 or precomputed, such as those of git-annex and DataLad",
+       SetFollowLinks, IsGiven<&ReadOptions::follow_links>},
+      {"header", "NAME:@FILE", "A header of each request to a web server, with its value in a file; may be given several times", SetHeader,
+       IsGiven<&ReadOptions::headers>, true},
   };
   return options;
-}
-
-namespace {
-
-struct OptionText {
-  std::string name, value;
-};
-
-// The options behind the question mark, which is at begin - 1.
-std::vector<OptionText> OptionsFrom(const std::string& text, std::size_t begin) {
-  std::vector<OptionText> options;
-  while (begin <= text.size()) {
-    const std::size_t end = OptionEnd(text, begin), equals = std::min(text.find('=', begin), end);
-    options.push_back({text.substr(begin, equals - begin), equals < end ? text.substr(equals + 1, end - equals - 1) : ""});
-    begin = end + 1;
-  }
-  return options;
-}
-
-}  // namespace
-
-Result<SourceText> ParseSourceText(const std::string& text) {
-  SourceText source{text, {}};
-  const std::size_t begin = OptionsBegin(text);
-  if (begin == std::string::npos) return source;
-  source.path = text.substr(0, begin - 1);
-  for (const auto& [name, value] : OptionsFrom(text, begin)) {
-    const ReadOption* const option = FindNamed(ReadOptionList(), name);
-    if (option == nullptr) {
-      return Status::InvalidArgument(
-          fmt::format("'{}': '{}' is no option for reading a file, which are {}", text, name, NamesOf(ReadOptionList())));
-    }
-    if (option->given(source.options)) return Status::InvalidArgument(fmt::format("'{}': {} is given twice", text, name));
-    if (Status status = option->set(source.options, fmt::format("'{}': {}", text, name), value); !status.ok()) return status;
-  }
-  return source;
-}
-
-bool MayBeThere(const SourceText& source) {
-  std::error_code error;
-  return IsUrl(source.path) || std::filesystem::exists(source.path, error);
-}
-
-std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value) {
-  const bool has_some = OptionsBegin(source) != std::string::npos || source.find(kEndpointMark) != std::string::npos;
-  return fmt::format("{}{}{}={}", source, has_some ? ',' : '?', name, value);
-}
-
-std::string AtTime(const std::string& source, int time) {
-  const std::size_t begin = OptionsBegin(source);
-  if (begin == std::string::npos) return WithReadOption(source, "time", std::to_string(time));
-  std::string others;
-  for (const auto& [name, value] : OptionsFrom(source, begin)) {
-    if (name != "time") others += fmt::format("{}={},", name, value);
-  }
-  return fmt::format("{}{}time={}", source.substr(0, begin), others, time);
 }
 
 }  // namespace slabstream

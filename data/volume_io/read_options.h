@@ -10,6 +10,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -21,6 +22,8 @@
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {
+
+class Store;
 
 inline constexpr std::int64_t kMaxVolumes = 1 << 20;  // in one file
 inline constexpr int kLuminance = -1;
@@ -36,11 +39,12 @@ struct TimeRange {
 Result<TimeRange> ParseTimeRange(std::string_view option, std::string_view text);
 
 struct ReadOptions {
-  std::string series;             // which of the series of a DICOM folder: its number or UID; "": the only one
+  std::string series;             // of a DICOM folder: number or UID; "": the only one. Of an OME-TIFF: an image; "": the first
   std::optional<TimeRange> time;  // which of the volumes of a file that holds several. Readers take one, a catalogue takes several
   std::optional<int> channel;     // which of the components of a voxel, from 0; or kLuminance
   std::optional<Vec3> spacing;    // each > 0, finite
-  // Of unstructured grids. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
+  std::string matrix;             // which of the matrices of a NIfTI file that states both: "sform" or "qform"; "": by its codes
+  // Of VTK files. In a Zarr hierarchy `array` is the path of an array or a group, "" its root.
   std::string array;                    // which of the arrays; "": the active scalars, else the only one with one component
   std::optional<std::int32_t> lattice;  // voxels along the longest side of the lattice, in [1, kMaxLatticeSide]
   // Of HDF5 files.
@@ -50,29 +54,39 @@ struct ReadOptions {
   std::optional<SampleType> type;
   std::optional<bool> big_endian;
   std::optional<std::int64_t> offset;  // bytes of the file before the samples, >= 0
+  bool follow_links = false;           // of folders of objects: links that lead out of the folder, such as those of git-annex, are followed
+  // Of addresses.
+  std::vector<std::string> headers;  // that go with each request: "NAME:VALUE", or "NAME:@FILE" with the value in a file
+  std::string query;                 // that stands in the address itself, such as a signature: goes with each request. Not to be shown
   // What users cannot say.
+  std::shared_ptr<Store> store;      // that lies at the address, opened with these options; null: the path tells
   bool describe = false;             // without `time`, a source of several volumes opens the first one
+  bool labels = false;               // samples are numbers of structures, even if the file does not say so
   bool headers_only = false;         // check everything that can be checked without the samples, and take no memory for them
   ReadProgress* progress = nullptr;  // counts what is read of the samples; null: nobody asks. Few formats count nothing
 };
 
 struct ReadOption {
   std::string_view name;     // "time"
-  std::string_view value;    // how its values are written, for help texts: "T"
+  std::string_view value;    // how its values are written, for help texts: "T"; "": yes or no, and of commands a flag without a value
   std::string_view purpose;  // for help texts
   // InvalidArgument: the message begins with `option` and names the text.
   Status (*set)(ReadOptions& options, std::string_view option, std::string_view text);
   bool (*given)(const ReadOptions& options);
+  bool of_addresses = false;  // every volume behind an address takes it, and no other; it may be given several times
 };
 const std::vector<ReadOption>& ReadOptionList();
 
 struct SourceText {
-  std::string path;
+  std::string path;  // of a file, or an address (IsUrl, common/base/url.h) without a query, but for the endpoint of a bucket
   ReadOptions options;
+  std::string options_text;  // "?time=3,channel=1": those that say which volume it is, as they are written; empty: there are none
 };
 
 // PATH or PATH?NAME=VALUE,NAME=VALUE... A text that is a file's name as a whole is its path. Does not check that the file exists.
-// InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take.
+// What begins with a scheme, such as "https://", may have a query of its own, with the options behind it after a comma or another question
+// mark; and may be spelled as other programs spell it (other_spellings.h).
+// InvalidArgument, naming `text`: no such option, one that is given twice, or a value that it does not take; another scheme.
 Result<SourceText> ParseSourceText(const std::string& text);
 
 // Whether something is at its path. What an address holds is not known before it is asked: true.
@@ -82,5 +96,8 @@ bool MayBeThere(const SourceText& source);
 std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value);
 // The source at one time; times that it names are replaced. `source` is right (ParseSourceText).
 std::string AtTime(const std::string& source, int time);
+
+// The source for a user to see: without the query of its own, and without the values of headers.
+std::string ShownSource(const std::string& source);
 
 }  // namespace slabstream

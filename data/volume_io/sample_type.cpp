@@ -10,6 +10,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "data/volume_io/exact_samples.h"
+
 namespace slabstream {
 namespace {
 
@@ -34,7 +36,7 @@ KeptSamples ShiftSign(AlignedVector<std::byte> bytes, ScalarType type) {
 template <class T>
 bool ExactAsFloat(T value) {
   const auto rounded = float(value);
-  if constexpr (std::is_floating_point_v<T>) {
+  if constexpr (!std::is_integral_v<T>) {
     return double(rounded) == value || std::isnan(value);
   } else {
     // Rounding up may lead out of the integer's range, where converting back is undefined.
@@ -53,7 +55,7 @@ bool IsInteger(T value) {
 
 // Narrows samples of 32 and 64 bits: to uint16 if all are integers within a stretch of 65536, else to float.
 template <class T>
-KeptSamples Narrow(AlignedVector<std::byte> bytes) {
+KeptSamples Narrow(AlignedVector<std::byte>& bytes) {
   constexpr T kSpan = 65535;
   const std::span<T> samples = SamplesOf<T>(bytes);
   T low = std::numeric_limits<T>::max(), high = std::numeric_limits<T>::lowest();
@@ -68,7 +70,9 @@ KeptSamples Narrow(AlignedVector<std::byte> bytes) {
   const bool fits = integers && (low >= std::numeric_limits<T>::max() - kSpan || high <= low + kSpan);
   if (fits) {
     const T shift = low >= 0 && high <= kSpan ? T{0} : low;
-    kept = {ScalarType::kUint16, double(shift), ExactAsFloat(shift) || std::abs(double(shift)) <= 0x1p53, {}};
+    // shift + sample is computed as double.
+    const bool exact = std::is_floating_point_v<T> || std::max(std::abs(double(low)), std::abs(double(high))) <= 0x1p53;
+    kept = {ScalarType::kUint16, double(shift), exact, {}};
     kept.bytes.resize(samples.size() * sizeof(std::uint16_t));
     const std::span<std::uint16_t> out = SamplesOf<std::uint16_t>(kept.bytes);
     for (std::size_t i = 0; i < samples.size(); ++i) out[i] = std::uint16_t(samples[i] - shift);
@@ -120,21 +124,29 @@ void SwapByteOrder(SampleType type, std::span<std::byte> bytes) {
   });
 }
 
-KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) {
+bool AllFitFloat(SampleType type, std::span<const std::byte> samples) {
+  return VisitSampleType(type, [&]<class T>(const T*) {
+    return std::ranges::all_of(std::span(reinterpret_cast<const T*>(samples.data()), samples.size() / sizeof(T)), ExactAsFloat<T>);
+  });
+}
+
+KeptSamples Keep(SampleType type, AlignedVector<std::byte> bytes) { return KeepBeside(type, bytes); }
+
+KeptSamples KeepBeside(SampleType type, AlignedVector<std::byte>& bytes) {
   switch (type) {
     case SampleType::kUint8: return {ScalarType::kUint8, 0, true, std::move(bytes)};
     case SampleType::kUint16: return {ScalarType::kUint16, 0, true, std::move(bytes)};
     case SampleType::kFloat32: return {ScalarType::kFloat32, 0, true, std::move(bytes)};
     case SampleType::kInt8: return ShiftSign<std::int8_t, std::uint8_t>(std::move(bytes), ScalarType::kUint8);
     case SampleType::kInt16: return ShiftSign<std::int16_t, std::uint16_t>(std::move(bytes), ScalarType::kUint16);
-    case SampleType::kInt32: return Narrow<std::int32_t>(std::move(bytes));
-    case SampleType::kUint32: return Narrow<std::uint32_t>(std::move(bytes));
-    case SampleType::kInt64: return Narrow<std::int64_t>(std::move(bytes));
-    case SampleType::kUint64: return Narrow<std::uint64_t>(std::move(bytes));
+    case SampleType::kInt32: return Narrow<std::int32_t>(bytes);
+    case SampleType::kUint32: return Narrow<std::uint32_t>(bytes);
+    case SampleType::kInt64: return Narrow<std::int64_t>(bytes);
+    case SampleType::kUint64: return Narrow<std::uint64_t>(bytes);
     case SampleType::kFloat16: return Widen(std::move(bytes));
     case SampleType::kFloat64: break;
   }
-  return Narrow<double>(std::move(bytes));
+  return Narrow<double>(bytes);
 }
 
 }  // namespace slabstream

@@ -6,6 +6,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 #include "common/base/parse_number.h"
@@ -15,6 +16,17 @@ namespace slabstream {
 namespace {
 
 constexpr std::size_t kMaxHeader = std::size_t{1} << 20;  // bytes
+constexpr std::string_view kList = "LIST";
+
+// Without blanks around them and empty ones.
+std::vector<std::string> LinesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    if (std::string trimmed(Trimmed(line)); !trimmed.empty()) lines.push_back(std::move(trimmed));
+  }
+  return lines;
+}
 
 Result<TextHeader> ReadTextHeader(const std::string& path, const TextFormat& format) {
   std::ifstream file(path, std::ios::binary);
@@ -36,11 +48,18 @@ Result<TextHeader> ReadTextHeader(const std::string& path, const TextFormat& for
     if (header.end == 0) header.first_line = line;
     header.end = std::int64_t(begin);
     if (line.empty()) break;
-    const std::size_t at = line.find(format.separator);
+    const std::size_t at = line.find_first_of(format.separators);
     if (line.front() == '#' || at == std::string::npos) continue;
-    const std::string written(Trimmed(line.substr(0, at))), key = format.ignores_case ? ToLower(written) : written;
-    header.fields.emplace(key, Trimmed(line.substr(at + 1)));
-    if (key == format.last_key) break;
+    const std::string written(Trimmed(line.substr(0, at)));
+    std::string key = format.ignores_case ? ToLower(written) : written, value(Trimmed(line.substr(at + 1)));
+    if (!format.key_value.empty() && line.compare(at, format.key_value.size(), format.key_value) == 0) key += format.key_value;
+    const bool names_data = std::ranges::find(format.data_keys, key) != format.data_keys.end();
+    if (names_data && value.starts_with(kList)) {
+      header.list = LinesOf(text.substr(begin));
+      begin = text.size();
+    }
+    header.fields.emplace(std::move(key), std::move(value));
+    if (names_data && format.data_ends_header) break;
   }
   if (!header.first_line.starts_with(format.first_line))
     return header.NotAVolume("the first line does not begin with " + format.first_line);
@@ -70,7 +89,6 @@ Result<std::vector<double>> TextHeader::Numbers(std::initializer_list<const char
   std::vector<double> numbers;
   bool all = true;
   for (std::string word; words >> word;) {
-    if (word == "none") continue;
     const std::optional<double> number = ParseNumber<double>(std::string_view(word).substr(word.size() > 1 && word[0] == '+' ? 1 : 0));
     all = all && number;
     numbers.push_back(number.value_or(0));
@@ -87,32 +105,127 @@ Result<std::vector<double>> TextHeader::Sizes(const char* dimension, const char*
   return Numbers({sizes}, count, {});
 }
 
-Result<Payload> TextHeader::PayloadIn(const std::optional<std::string>& name) const {
-  if (!name) return Payload{.file = path, .offset = end};
-  if (name->starts_with("LIST") || name->find('%') != std::string::npos) {
-    return Refused("data file '" + *name + "': samples in several files are not supported");
+namespace {
+
+// The names that a pattern such as "slice%03d.raw 0 99 1" stands for. InvalidArgument: it has another form, or stands for too many.
+Result<std::vector<std::string>> NamesOfPattern(const TextHeader& text, const std::string& value, std::int64_t slices) {
+  constexpr std::int64_t kMostFiles = 1 << 16;
+  const auto wrong = [&] {
+    return text.Refused(fmt::format(
+        "data file '{}' must be NAME FIRST LAST STEP with one %d, such as %03d, in NAME, and stand for 1 to {} files", value, kMostFiles));
+  };
+  const std::size_t percent = value.find('%'), end = std::min(value.find_first_of(" \t", percent), value.size());
+  const std::string name = value.substr(0, end);
+  const std::size_t letter = name.find_first_not_of("0123456789", percent + 1);
+  if (letter == std::string::npos || std::string_view("diu").find(name[letter]) == std::string_view::npos ||
+      name.find('%', letter) != std::string::npos) {
+    return wrong();
   }
-  return Payload{.file = std::filesystem::path(path).parent_path() / *name};  // an absolute name stays as it is
+  const std::string digits = name.substr(percent + 1, letter - percent - 1);
+  const int width = digits.empty() ? 0 : ParseNumber<int>(digits).value_or(-1);
+  std::vector<std::int64_t> numbers;
+  std::istringstream words(value.substr(end));
+  for (std::string word; words >> word && numbers.size() < 3;) {
+    const std::optional<std::int32_t> number = ParseNumber<std::int32_t>(word);
+    if (!number || *number < 0) return wrong();
+    numbers.push_back(*number);
+  }
+  const std::int64_t first = numbers.empty() ? 1 : numbers[0], last = numbers.size() < 2 ? first + slices - 1 : numbers[1],
+                     step = numbers.size() < 3 ? 1 : numbers[2];
+  const std::int64_t count = step == 0 ? 0 : (last - first) / step + 1;
+  if (width < 0 || width > 32 || count < 1 || count > kMostFiles || (last < first) != (step < 0)) return wrong();
+  std::vector<std::string> names;
+  for (std::int64_t i = 0; i < count; ++i) {
+    const std::string number =
+        digits.starts_with('0') ? fmt::format("{:0{}}", first + i * step, width) : fmt::format("{:{}}", first + i * step, width);
+    names.push_back(name.substr(0, percent) + number + name.substr(letter + 1));
+  }
+  return names;
 }
 
-Result<std::int64_t> TextHeader::BytesToSkip(const char* key, const std::string& value, const Payload& payload,
-                                             std::int64_t sample_bytes) const {
-  constexpr std::int64_t kMost = std::int64_t{1} << 62;  // longer than any file
-  const std::optional<std::int64_t> bytes = ParseNumber<std::int64_t>(value);
-  if (!bytes || *bytes < -1) return Refused(fmt::format("{} is '{}', must be at least -1", key, value));
-  if (*bytes >= 0) return std::min(*bytes, kMost);
-  std::error_code error;
-  const auto file_bytes = std::filesystem::file_size(payload.file, error);
-  if (error) return Status::NotFound(fmt::format("{}: samples in {}: {}", path, payload.file.string(), error.message()));
-  return std::max<std::int64_t>(std::int64_t(file_bytes) - payload.offset - sample_bytes, 0);
+// Where the samples begin in each of their files, before anything is skipped.
+Result<std::vector<PayloadPlace>> PlacesOf(const TextHeader& text, const TextPayload& payload) {
+  if (!payload.file) return std::vector<PayloadPlace>{{text.path, text.end}};
+  std::vector<std::string> names = {*payload.file};
+  if (payload.file->starts_with(kList)) {
+    names = text.list;
+    if (names.empty()) return text.Refused("data file LIST: no names of files follow");
+  } else if (payload.file->find('%') != std::string::npos) {
+    Result<std::vector<std::string>> of_pattern = NamesOfPattern(text, *payload.file, payload.slices);
+    if (!of_pattern.ok()) return of_pattern.status();
+    names = *std::move(of_pattern);
+  }
+  std::vector<PayloadPlace> places;
+  for (const std::string& name : names) places.push_back({std::filesystem::path(text.path).parent_path() / name});
+  return places;
 }
+
+// Goes behind so many lines of the file. DataLoss: it has fewer. NotFound: no such file.
+Status SkipLines(const TextHeader& text, std::int64_t lines, PayloadPlace& place) {
+  std::ifstream file(place.file, std::ios::binary);
+  if (!file) return Status::NotFound(fmt::format("{}: samples in {}: cannot be opened for reading", text.path, place.file.string()));
+  file.seekg(place.offset);
+  for (; lines > 0 && file; --lines) file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  if (!file || file.eof())
+    return Status::DataLoss(fmt::format("{}: samples in {}: has no more lines to skip", text.path, place.file.string()));
+  place.offset = std::int64_t(file.tellg());
+  return Status::Ok();
+}
+
+// The offset of the last `bytes` of a file. NotFound: no such file.
+Result<std::int64_t> OffsetOfLast(const TextHeader& text, const std::filesystem::path& file, std::int64_t bytes) {
+  std::error_code error;
+  const auto file_bytes = std::filesystem::file_size(file, error);
+  if (error) return Status::NotFound(fmt::format("{}: samples in {}: {}", text.path, file.string(), error.message()));
+  return std::max<std::int64_t>(std::int64_t(file_bytes) - bytes, 0);
+}
+
+Result<Payload> PayloadOf(const TextHeader& text, const TextPayload& fields, std::int64_t all_bytes) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 62;  // longer than any file
+  Result<std::vector<PayloadPlace>> places = PlacesOf(text, fields);
+  if (!places.ok()) return places.status();
+  const auto files = std::int64_t(places->size());
+  if (all_bytes % files != 0) return text.Refused(fmt::format("{} bytes of samples do not divide into {} files", all_bytes, files));
+  const std::optional<std::int64_t> lines = ParseNumber<std::int64_t>(fields.lines), bytes = ParseNumber<std::int64_t>(fields.bytes);
+  if (!lines || *lines < 0) return text.Refused(fmt::format("{} is '{}', must be at least 0", fields.lines_key, fields.lines));
+  const int least = fields.compression == Compression::kNone ? -1 : 0;
+  if (!bytes || *bytes < least) {
+    return text.Refused(fmt::format("{} is '{}', must be at least {}{}", fields.bytes_key, fields.bytes, least,
+                                    least < 0 ? "" : " for compressed samples"));
+  }
+  for (PayloadPlace& place : *places) {
+    if (*lines > 0) {
+      if (Status status = SkipLines(text, *lines, place); !status.ok()) return status;
+    }
+    if (*bytes < 0) {
+      const Result<std::int64_t> offset = OffsetOfLast(text, place.file, all_bytes / files);
+      if (!offset.ok()) return offset.status();
+      place.offset = *offset;
+    } else {
+      (fields.compression == Compression::kNone ? place.offset : place.skip) += std::min(*bytes, kMost);
+    }
+  }
+  PayloadPlace& first = places->front();
+  Payload payload{.file = std::move(first.file),
+                  .offset = first.offset,
+                  .skip = first.skip,
+                  .compression = fields.compression,
+                  .big_endian = fields.big_endian};
+  payload.more.assign(places->begin() + 1, places->end());
+  if (files > 1) payload.part_bytes = all_bytes / files;
+  return payload;
+}
+
+}  // namespace
 
 Result<LocatedSamples> LocateInTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options) {
   const Result<TextHeader> text = ReadTextHeader(path, format);
   if (!text.ok()) return text.status();
   Result<RawHeader> header = format.read_header(*text, options);
   if (!header.ok()) return header.status();
-  Result<Payload> payload = format.find_payload(*text, header->sample_bytes());
+  const Result<TextPayload> fields = format.read_payload(*text);
+  if (!fields.ok()) return fields.status();
+  Result<Payload> payload = PayloadOf(*text, *fields, header->all_bytes());
   if (!payload.ok()) return payload.status();
   return LocatedSamples{*std::move(header), *std::move(payload)};
 }

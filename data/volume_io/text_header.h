@@ -17,22 +17,16 @@ struct TextHeader {
   std::string first_line;
   std::map<std::string, std::string> fields;  // both sides without blanks around them
   std::int64_t end = 0;                       // bytes of the file up to and including the line that ends the header
+  std::vector<std::string> list;              // the names of the samples' files that follow a field of one of the data_keys with LIST
 
   // The value of the first of these keys that the header has.
   std::optional<std::string> Find(std::initializer_list<const char*> keys) const;
   std::optional<std::string> Find(const char* key) const { return Find({key}); }
-  // Its numbers; `if_absent` if the header has none of the keys. Numbers may be nan, and grouped as "(1,0,0) (0,1,0) none".
+  // Its numbers; `if_absent` if the header has none of the keys. Numbers may be nan, and grouped as "(1,0,0) (0,1,0)".
   // InvalidArgument unless the value is exactly `count` numbers.
   Result<std::vector<double>> Numbers(std::initializer_list<const char*> keys, std::size_t count, std::vector<double> if_absent) const;
   // The numbers of the field `sizes`. InvalidArgument unless there are as many as the field `dimension` says.
   Result<std::vector<double>> Sizes(const char* dimension, const char* sizes) const;
-
-  // Where the samples are. A relative `name` of their file begins at the header's folder; without a name they are behind the header.
-  // InvalidArgument: the name stands for several files.
-  Result<Payload> PayloadIn(const std::optional<std::string>& name) const;
-  // How many bytes to skip in front of the samples: the value of the field `key`, where -1 means that the samples are the last
-  // `sample_bytes` of the payload's file. InvalidArgument: no number of at least -1. NotFound: no such file.
-  Result<std::int64_t> BytesToSkip(const char* key, const std::string& value, const Payload& payload, std::int64_t sample_bytes) const;
 
   // InvalidArgument. The message names the path, and that of NotAVolume also the format.
   Status Refused(const std::string& why) const { return Status::InvalidArgument(path + ": " + why); }
@@ -44,15 +38,34 @@ inline Vec3 Triple(const std::vector<double>& numbers, std::size_t first = 0) {
   return {numbers[first], numbers[first + 1], numbers[first + 2]};
 }
 
+// What the header's fields say of the samples.
+struct TextPayload {
+  // The value of a data key: a file's name, where a relative one begins at the header's folder; LIST, and behind it anything; or a pattern
+  // with %d for the numbers FIRST to LAST, as in "slice%03d.raw FIRST LAST STEP". Without numbers they begin with 1, and there are as many
+  // as `slices`. None: the samples are behind the header.
+  std::optional<std::string> file;
+  std::int64_t slices = 1;
+  Compression compression = Compression::kNone;
+  bool big_endian = false;
+  // Fields that say how much to skip in front of the samples in each file. Lines come first, in compressed files, too; then bytes, those of
+  // the decompressed stream. -1: all but the bytes of the samples at the end of the file.
+  const char* lines_key = "";
+  std::string lines = "0";
+  const char* bytes_key = "";
+  std::string bytes = "0";
+};
+
 struct TextFormat {
   std::string name;
-  std::string first_line;  // how it begins
-  char separator;
-  bool ignores_case;                  // of keys: they are found by their lower case
-  std::string last_key;               // ends the header, like an empty line; "": none does
-  std::vector<const char*> required;  // keys of fields that must not be empty
+  std::string first_line;              // how it begins
+  const char* separators;              // each may stand between key and value
+  std::string key_value;               // separates what is no field: it is found by its key with this behind it; "": all are fields
+  bool ignores_case;                   // of keys: they are found by their lower case
+  std::vector<const char*> data_keys;  // fields that name the samples' files
+  bool data_ends_header;               // such a field is the last one; else an empty line ends the header
+  std::vector<const char*> required;   // keys of fields that must not be empty
   Result<RawHeader> (*read_header)(const TextHeader& text, const ReadOptions& options);
-  Result<Payload> (*find_payload)(const TextHeader& text, std::int64_t sample_bytes);
+  Result<TextPayload> (*read_payload)(const TextHeader& text);
 };
 
 // Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.

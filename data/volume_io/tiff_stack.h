@@ -1,23 +1,42 @@
-// TiffStack: the pages of a TIFF file that are the slices of a volume.
+// TiffStack: the pages of a TIFF file, or of the files of an OME-TIFF, that are the slices of a volume.
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "common/volume/summary.h"
 #include "data/volume_io/tiff_file.h"
 
 namespace slabstream {
 
-struct TiffStack {
-  std::unique_ptr<TiffFile> file;
-  std::vector<TiffPage> pages;  // of the file, all of them
-  PageOrder order;              // which of them are the slices
-  RawHeader header;             // of the volume, as the first page says
-  ReadOptions of_pages;         // what the options say of a page's components
+struct TiffSlice {
+  std::size_t file = 0;                     // in TiffStack::files
+  std::uint64_t directory = 0;              // its place there
+  std::int64_t page = 0;                    // its number among all directories there
+  std::int64_t plane = 0;                   // as of TiffChunk
+  std::vector<std::uint64_t> smaller = {};  // places of its pictures at lower resolutions
 };
 
-// InvalidArgument: there is one slice only, or errors of TiffFile::ReadHeader, ReadOmeHeader and HeaderOfSlices. DataLoss, NotFound.
+struct TiffStack {
+  std::vector<std::string> files;  // paths of those that are used
+  std::vector<TiffSlice> slices;
+  RawHeader header;                  // of the volume, as the first slice says
+  ReadOptions of_pages;              // what the options say of a page's components
+  std::optional<ValueRange> window;  // as of SourceInfo
+
+  // "a.tif: page 8", counted from 1, for messages.
+  std::string NameOf(const TiffSlice& slice) const;
+};
+
+// Reads the directories of all pages. `path` may also be the metadata of an OME-TIFF (.companion.ome).
+// InvalidArgument: there is one slice only, several times of which the options take none, a channel that is not there, pages that do not
+// fit what the file says of them; errors of TiffFile::ReadHeader, ReadOmeLayout and HeaderOfSlices. NotFound: a file of a set is missing.
+// DataLoss.
 Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& options);
+
+// Of the OME-TIFF that `path` is one file of; 1 if it stands alone or cannot be read.
+std::size_t FilesOf(const std::string& path);
 
 }  // namespace slabstream

@@ -10,7 +10,8 @@ namespace slabstream {
 namespace {
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  Result<LoadedMesh> loaded = ReadMesh(path, {.array = options.array, .headers_only = options.headers_only});
+  Result<LoadedMesh> loaded =
+      ReadMesh(path, {.array = options.array, .time = options.time, .channel = options.channel, .headers_only = options.headers_only});
   if (!loaded.ok()) return loaded.status();
   if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}};
   const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);
@@ -32,8 +33,11 @@ Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
 }  // namespace
 
 VolumeFormat UnstructuredGrid() {
-  return {
-      .name = "VTK unstructured grid", .endings = {".vtu", ".vtk"}, .claims = LooksLikeMesh, .options = {"array", "lattice"}, .read = Read};
+  return {.name = "VTK unstructured grid",
+          .endings = {".vtu", ".vtk"},
+          .claims = LooksLikeMesh,
+          .options = {"time", "channel", "array", "lattice"},
+          .read = Read};
 }
 
 }  // namespace slabstream

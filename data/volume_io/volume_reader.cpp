@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <new>
 #include <span>
 
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/world_placement.h"
@@ -16,30 +18,58 @@
 namespace slabstream {
 namespace {
 
-// The stored sample of the lowest data value that there is: what lies outside a volume.
-double LowestSample(const VoxelBlock& block, const ValueMapping& mapping) {
-  return VisitScalarType(block.type, [&]<class T>(const T*) {
+// The sample of the lowest data value that there is: what lies outside a volume.
+double LowestSample(const RawVolume& raw) {
+  return VisitSampleType(raw.header.type, [&]<class T>(const T*) {
     double least = 0, greatest = 0;
     bool any = false;
-    for (const T sample : std::span(block.samples<T>(), std::size_t(block.box.voxel_count()))) {
+    for (const T sample : std::span(reinterpret_cast<const T*>(raw.bytes.data()), raw.bytes.size() / sizeof(T))) {
       if (!std::isfinite(double(sample))) continue;
       least = any ? std::min(least, double(sample)) : double(sample);
       greatest = any ? std::max(greatest, double(sample)) : double(sample);
       any = true;
     }
-    return mapping.scale < 0 ? greatest : least;
+    return raw.header.rescale.scale < 0 ? greatest : least;
   });
 }
 
-Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path) {
-  if (raw.header.type == SampleType::kFloat16) {  // the type that grows
-    if (Status status = CheckFitsMemory(2 * std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
-  }
-  KeptSamples kept = Keep(raw.header.type, std::move(raw.bytes));
-  if (!kept.exact) LogWarning(path + ": values of type " + std::string(ToString(raw.header.type)) + " are rounded to " + "float32");
+// The sample of label 0, or the nearest one that there is: what lies outside a label volume.
+double SampleOfNoLabel(const RawHeader& header) {
+  return VisitSampleType(header.type, [&]<class T>(const T*) {
+    const double sample = -header.rescale.offset / header.rescale.scale;
+    return std::clamp(sample, double(std::numeric_limits<T>::lowest()), double(std::numeric_limits<T>::max()));
+  });
+}
 
+// Turns and straightens the samples.
+Status Place(RawVolume& raw, const WorldPlacement& placed, const std::string& path) {
+  const SampleType type = raw.header.type;
+  if (placed.turn != AxisTurn{}) {
+    if (Status status = CheckFitsMemory(std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
+    raw.bytes = TurnVoxels(type, raw.bytes, raw.header.size, placed.turn);
+  }
+  if (placed.slant) {
+    const std::int64_t bytes = placed.geometry.bounds().voxel_count() * std::int64_t(BytesPerSample(type));
+    if (Status status = CheckFitsMemory(bytes, path); !status.ok()) return status;
+    const auto& from = placed.turn.from;
+    const Index3 slanted = {raw.header.size[from[0]], raw.header.size[from[1]], raw.header.size[from[2]]};
+    raw.bytes = StraightenVoxels(type, raw.bytes, slanted, *placed.slant, placed.geometry.size,
+                                 raw.header.labels ? SampleOfNoLabel(raw.header) : LowestSample(raw),
+                                 raw.header.labels ? Sampling::kNearest : Sampling::kLinear);
+  }
+  return Status::Ok();
+}
+
+Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
+  raw.header.labels = raw.header.labels || options.labels;
   const Result<WorldPlacement> placed = PlaceInWorld(raw.header, path);
   if (!placed.ok()) return placed.status();
+  if (Status status = Place(raw, *placed, path); !status.ok()) return status;
+  const ExactType stored = {raw.header.type, raw.header.rescale};
+  if (stored.type == SampleType::kFloat16) {  // the type that grows
+    if (Status status = CheckFitsMemory(2 * std::int64_t(raw.bytes.size()), path); !status.ok()) return status;
+  }
+  KeptSamples kept = KeepBeside(stored.type, raw.bytes);
   LoadedVolume loaded;
   VolumeFileInfo& info = loaded.info;
   info.file_type = ToString(raw.header.type);
@@ -53,7 +83,7 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
   info.times = int(raw.header.volumes);
   info.time = int(raw.header.number);
   info.notes = std::move(raw.header.notes);
-  info.samples_file = std::move(raw.samples_file);
+  info.other_files = std::move(raw.other_files);
   VolumeDescription& description = info.description;
   description.geometry = placed->geometry;
   description.type = kept.type;
@@ -63,17 +93,10 @@ Result<LoadedVolume> Finish(RawVolume raw, const VolumeFormat& format, const std
 
   auto volume = std::make_shared<Volume>();
   volume->description = description;
-  volume->block = {{{0, 0, 0}, raw.header.size}, kept.type, std::move(kept.bytes)};
+  volume->block = {description.geometry.bounds(), kept.type, std::move(kept.bytes)};
   volume->cells = std::move(raw.cells);
-  if (placed->turn != AxisTurn{}) {
-    if (Status status = CheckFitsMemory(std::int64_t(volume->block.bytes.size()), path); !status.ok()) return status;
-    volume->block = TurnVoxels(volume->block, placed->turn);
-  }
-  if (placed->slant) {
-    if (Status status = CheckFitsMemory(description.voxel_bytes(), path); !status.ok()) return status;
-    volume->block =
-        StraightenVoxels(volume->block, *placed->slant, description.geometry.size, LowestSample(volume->block, description.mapping));
-  }
+  if (MayBeRounded(stored.type)) loaded.exact = std::make_shared<const ExactSamples>(ExactSamples{stored, std::move(raw.bytes)});
+  loaded.rounded = !kept.exact;
   loaded.volume = std::move(volume);
   return loaded;
 }
@@ -114,7 +137,7 @@ Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& opti
     Result<ReadFile> file = ReadRaw(path, options);
     if (!file.ok()) return file.status();
     TakeChannel(file->raw, options);
-    return Finish(std::move(file->raw), *file->format, path);
+    return Finish(std::move(file->raw), *file->format, path, options);
   });
 }
 
@@ -126,7 +149,7 @@ Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, con
     if (!file.ok()) return file.status();
     if (const auto placed = PlaceInWorld(file->raw.header, path); !placed.ok()) return placed.status();
     std::vector<std::string> files = {path};
-    if (!file->raw.samples_file.empty()) files.push_back(file->raw.samples_file.string());
+    for (const std::filesystem::path& other : file->raw.other_files) files.push_back(other.string());
     return files;
   });
 }
@@ -139,7 +162,10 @@ Status CheckVolume(const std::string& path, const ReadOptions& options) {
     return Printable(Status::InvalidArgument(path + ": not a file that can be read"));
   }
   const VolumeFormat* const format = FindFormat(path, options);
-  if (format == nullptr) return Printable(Status::InvalidArgument(path + ": not a volume, which " + ReadableText()));
+  if (format == nullptr) {
+    const std::string_view why = WhyUnread(path);
+    return Printable(Status::InvalidArgument(path + ": " + (why.empty() ? "not a volume, which " + ReadableText() : std::string(why))));
+  }
   return Printable(CheckOptions(*format, path, options));
 }
 

@@ -4,15 +4,15 @@
 //
 // Samples are kept as uint8, uint16 or float32, without losing what was in the file: int8 and int16 are shifted into the unsigned type
 // (ValueMapping.offset); uint32, int32, uint64, int64 and float64 become uint16 if all their values are integers that fit after a shift,
-// else float32. If float32 cannot hold a value exactly, the reader logs a warning. A rescale slope and intercept (NIfTI scl_slope,
+// else float32. LoadedVolume::exact has what float32 may round. A rescale slope and intercept (NIfTI scl_slope,
 // scl_inter) goes into ValueMapping.
 //
 // Axes: if the file has an orientation (NIfTI sform or qform, NRRD space, MetaImage TransformMatrix), the voxels are turned to the nearest
 // axes of its world, so that x runs to the patient's right (or along the world's x), y to anterior, z to superior, however they are stored.
-// Slanted slices (a tilted gantry) are straightened. A matrix that is not finite or has no inverse is an error. Without an orientation x,
-// y, z are the file's own index axes, first index fastest; spacing is its absolute value, where 0 and NaN become 1, with a warning. TIFF
-// states no distance of slices: spacing is 1 along x and z, and along y the ratio of the two resolutions. Turning and straightening take
-// memory for the kept bytes once more.
+// Slanted slices (a tilted gantry) are straightened; labels keep their values. A matrix that is not finite or has no inverse is an error.
+// Without an orientation x, y, z are the file's own index axes, first index fastest; spacing is its absolute value, where 0 and NaN become
+// 1, with a warning. A TIFF that neither OME nor ImageJ describes has spacing 1 along x and z, and along y the ratio of the two
+// resolutions. Turning and straightening take memory for the samples once more.
 //
 // All functions may be called from any thread.
 #pragma once
@@ -25,8 +25,10 @@
 
 #include "common/base/status.h"
 #include "common/volume/volume.h"
+#include "data/volume_io/exact_samples.h"
 #include "data/volume_io/file_samples.h"
 #include "data/volume_io/read_options.h"
+#include "data/volume_io/stated_label.h"
 
 namespace slabstream {
 
@@ -39,17 +41,21 @@ struct VolumeFileInfo {
   std::array<Vec3, 3> steps;
   bool straightened = false;               // the stored axes are not at right angles
   bool labels = false;                     // samples are numbers of structures, not measurements
+  std::vector<StatedLabel> looks = {};     // of labels, by ascending values, as far as the file says it
   std::vector<std::string> channels = {};  // of an image: names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it is
   int times = 1, time = 0;                 // how many volumes the file holds, and which of them it is
   // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
   std::vector<std::string> notes = {};
-  std::filesystem::path samples_file;  // if the samples are in a file of their own
+  std::vector<std::filesystem::path> other_files;  // that are read beside the path, or the folder of many
 };
 
 struct LoadedVolume {
   VolumeFileInfo info;
   std::shared_ptr<const Volume> volume;
+  // As they are in the file, turned as the volume's, if their type is one that float32 may round; null: those of the volume are exact.
+  std::shared_ptr<const ExactSamples> exact = {};
+  bool rounded = false;  // float32 has rounded some of them in the volume
 };
 
 // NotFound (no such file), InvalidArgument (not a volume, an option that its format does not take, more than three dimensions, several
@@ -68,6 +74,7 @@ bool LooksLikeVolume(const std::string& path);
 struct WriteOptions {
   std::optional<SampleType> type;  // of the samples in the file; none: see FileSamples
   WriteProgress progress;
+  const ExactSamples* exact = nullptr;  // of the volume, which are written; null: there are none
 };
 
 // Writes the format that the ending names (formats.h; .mhd: with a .raw beside it). Files have no value mapping, but the data values

@@ -1,100 +1,230 @@
-// VTK image data in XML (.vti): one piece (vtk_xml.h).
+// Structured grids in VTK's XML files (vtk_xml.h): image data (.vti), and rectilinear grids whose coordinates are even (.vtr). Values
+// belong to points or cells; pieces are put together.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "data/volume_io/formats.h"
 #include "data/volume_io/output.h"
+#include "data/volume_io/structured_grid.h"
 #include "data/volume_io/vtk_xml.h"
 
 namespace slabstream {
 namespace {
 
-Result<RawHeader> HeaderOf(const VtkXmlFile& file, const std::string& path, const ReadOptions& options) {
-  if (file.pieces() != 1) return file.Wrong(fmt::format("has {} pieces, must have 1", file.pieces()));
-  const auto whole = file.Numbers(file.dataset(), "WholeExtent", 6, {}), extent = file.Numbers(file.piece(), "Extent", 6, {});
-  const auto origin = file.Numbers(file.dataset(), "Origin", 3, {0, 0, 0}), spacing = file.Numbers(file.dataset(), "Spacing", 3, {1, 1, 1});
-  const auto direction = file.Numbers(file.dataset(), "Direction", 9, {1, 0, 0, 0, 1, 0, 0, 0, 1});
-  for (const auto* numbers : {&whole, &extent, &origin, &spacing, &direction}) {
-    if (!numbers->ok()) return numbers->status();
-  }
-  if (*whole != *extent) {
-    return file.Wrong(fmt::format("its piece has the extent {}, must have all of it: {}", file.piece().Attribute("Extent"),
-                                  file.dataset().Attribute("WholeExtent")));
-  }
-  const auto& e = *extent;
-  RawHeader header;
-  if (Status status = SetSize(header, path, {e[1] - e[0] + 1, e[3] - e[2] + 1, e[5] - e[4] + 1}, options); !status.ok()) return status;
-  header.world = World::kScene;
-  header.matrix = "Direction";
-  header.origin = {(*origin)[0], (*origin)[1], (*origin)[2]};
-  for (std::size_t i = 0; i < 3; ++i) {
-    header.steps[i] = (*spacing)[i] * Vec3{(*direction)[i], (*direction)[3 + i], (*direction)[6 + i]};
-    header.origin = header.origin + e[2 * i] * header.steps[i];
-  }
-  return header;
-}
+constexpr std::string_view kImage = "ImageData", kRectilinear = "RectilinearGrid";
 
-Result<VtkArray> ChooseArray(const VtkXmlFile& file) {
-  std::vector<const VtkArray*> arrays;
-  for (const VtkArray& array : file.arrays()) {
-    if (array.section == "PointData") arrays.push_back(&array);
-  }
-  if (arrays.size() == 1) return *arrays.front();
-  const std::string& scalars = file.ActiveScalars("PointData");
-  const auto active = std::ranges::find_if(arrays, [&](const VtkArray* array) { return array->name() == scalars; });
-  if (active != arrays.end() && !scalars.empty()) return **active;
-  std::string names;
-  for (const VtkArray* array : arrays) names.append(names.empty() ? "" : ", ").append(array->name());
-  if (!names.empty()) return file.Wrong("has several arrays and none is the active scalars, must have one: " + names);
-  const bool of_cells = std::ranges::any_of(file.arrays(), [](const VtkArray& array) { return array.section == "CellData"; });
-  return file.Wrong(of_cells ? "its samples belong to cells (CellData), must belong to points; ParaView's filter Cell Data to Point "
-                               "Data makes them so"
-                             : "has no samples of points (PointData)");
-}
+// Points of a grid, from `begin` to `end` along each axis, both included.
+struct Extent {
+  std::array<std::int64_t, 3> begin{}, end{};
 
-struct ImageFile {
-  VtkXmlFile file;
-  VtkArray array;
-  RawHeader header;
-
-  std::int64_t samples() const { return header.sample_bytes() / std::int64_t(BytesPerSample(header.type)); }
+  bool empty() const { return end[0] < begin[0] || end[1] < begin[1] || end[2] < begin[2]; }
+  std::int64_t Points(std::size_t axis) const { return end[axis] - begin[axis] + 1; }
 };
 
-Result<ImageFile> OpenImage(const std::string& path, const ReadOptions& options) {
-  Result<VtkXmlFile> file = VtkXmlFile::Open(path, "ImageData");
-  if (!file.ok()) return file.status();
-  Result<RawHeader> header = HeaderOf(*file, path, options);
-  if (!header.ok()) return header.status();
-  Result<VtkArray> array = ChooseArray(*file);
-  if (!array.ok()) return array.status();
-  const Result<VtkArrayType> type = file->TypeOf(*array, kMaxComponents);
-  if (!type.ok()) return type.status();
-  header->type = type->type;
-  header->components = type->components;
-  return ImageFile{*std::move(file), *std::move(array), *std::move(header)};
+Result<Extent> ExtentOf(const VtkXmlFile& file, const XmlTag& tag, const std::string& key) {
+  const Result<std::vector<double>> numbers = file.Numbers(tag, key, 6, {});
+  if (!numbers.ok()) return numbers.status();
+  Extent extent;
+  for (std::size_t i = 0; i < 6; ++i) {
+    constexpr double kMost = 1 << 30;
+    const double number = (*numbers)[i];
+    if (!(std::abs(number) <= kMost) || number != std::floor(number)) {
+      return file.Wrong(fmt::format("{} of {} is '{}', must be 6 whole numbers", key, tag.name, tag.Attribute(key)));
+    }
+    (i % 2 == 0 ? extent.begin : extent.end)[i / 2] = std::int64_t(number);
+  }
+  return extent;
 }
 
+struct Piece {
+  std::size_t number = 0;  // in the file
+  Extent extent;
+};
+
+// The pieces that hold anything.
+Result<std::vector<Piece>> PiecesOf(const VtkXmlFile& file) {
+  std::vector<Piece> pieces;
+  for (std::size_t i = 0; i < file.pieces().size(); ++i) {
+    const Result<Extent> extent = ExtentOf(file, file.pieces()[i], "Extent");
+    if (!extent.ok()) return extent.status();
+    if (!extent->empty()) pieces.push_back({i, *extent});
+  }
+  return pieces.empty() ? file.Wrong("has no piece with a point in it") : Result(std::move(pieces));
+}
+
+// The smallest that holds all pieces.
+Extent BoundsOf(const std::vector<Piece>& pieces) {
+  Extent bounds = pieces.front().extent;
+  for (const Piece& piece : pieces) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      bounds.begin[axis] = std::min(bounds.begin[axis], piece.extent.begin[axis]);
+      bounds.end[axis] = std::max(bounds.end[axis], piece.extent.end[axis]);
+    }
+  }
+  return bounds;
+}
+
+Result<PointGrid> ImageGrid(const VtkXmlFile& file, const Extent& bounds) {
+  const auto origin = file.Numbers(file.dataset(), "Origin", 3, {0, 0, 0}), spacing = file.Numbers(file.dataset(), "Spacing", 3, {1, 1, 1});
+  const auto direction = file.Numbers(file.dataset(), "Direction", 9, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+  for (const auto* numbers : {&origin, &spacing, &direction}) {
+    if (!numbers->ok()) return numbers->status();
+  }
+  PointGrid grid{.origin = {(*origin)[0], (*origin)[1], (*origin)[2]}, .matrix = "Direction"};
+  for (std::size_t i = 0; i < 3; ++i) {
+    grid.points[i] = double(bounds.Points(i));
+    grid.steps[i] = (*spacing)[i] * Vec3{(*direction)[i], (*direction)[3 + i], (*direction)[6 + i]};
+    grid.origin = grid.origin + double(bounds.begin[i]) * grid.steps[i];
+  }
+  return grid;
+}
+
+// The coordinates of the points along each axis, in the order of x, y and z, stand in each piece.
+Result<PointGrid> RectilinearGrid(const VtkXmlFile& file, const std::string& path, const std::vector<Piece>& pieces, const Extent& bounds) {
+  std::array<std::vector<double>, 3> coordinates;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    constexpr std::int64_t kMost = kMaxVolumeSide + 1;  // around kMaxVolumeSide cells
+    if (const std::int64_t points = bounds.Points(axis); points > kMost) {
+      return file.Wrong(fmt::format("has {} points along an axis, must have at most {}", points, kMost));
+    }
+    coordinates[axis].resize(std::size_t(bounds.Points(axis)), std::numeric_limits<double>::quiet_NaN());
+  }
+  for (const Piece& piece : pieces) {
+    std::size_t axis = 0;
+    for (const VtkArray& array : file.arrays()) {
+      if (array.piece != piece.number || array.section != "Coordinates" || axis == 3) continue;
+      const Result<VtkArrayType> type = file.TypeOf(array, 1);
+      if (!type.ok()) return type.status();
+      const auto numbers = file.ReadNumbers<double>(array, type->type, piece.extent.Points(axis));
+      if (!numbers.ok()) return numbers.status();
+      std::ranges::copy(*numbers, coordinates[axis].begin() + (piece.extent.begin[axis] - bounds.begin[axis]));
+      ++axis;
+    }
+    if (axis < 3) return file.Wrong(fmt::format("has coordinates along {} axes, must have 3", axis));
+  }
+  return EvenGrid(path, coordinates);
+}
+
+// An array of each piece: that of pieces[i] is arrays[i].
+struct ImageFile {
+  VtkXmlFile file;
+  std::vector<Piece> pieces;
+  Extent bounds;
+  std::vector<const VtkArray*> arrays;
+  ValuesAt at = ValuesAt::kPoints;
+  RawHeader header;
+
+  // How many voxels of a piece lie along each axis. A piece that is flat where others are not has no cells.
+  std::array<std::int64_t, 3> Voxels(const Piece& piece) const {
+    std::array<std::int64_t, 3> voxels{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      voxels[axis] = piece.extent.Points(axis) - (at == ValuesAt::kCells && bounds.Points(axis) > 1 ? 1 : 0);
+    }
+    return voxels;
+  }
+  std::int64_t Samples(const Piece& piece) const {
+    const auto [x, y, z] = Voxels(piece);
+    return x * y * z * header.components;
+  }
+};
+
+Status FindArrays(ImageFile& image, const std::string& path, const ReadOptions& options) {
+  const VtkXmlFile& file = image.file;
+  const OfferedArrays offered = file.Offered();
+  const Result<std::size_t> chosen = ChooseArray(path, offered.arrays, options.array);
+  if (!chosen.ok()) return chosen.status();
+  const VtkArray& first = file.arrays()[offered.numbers[*chosen]];
+  const Result<VtkArrayType> type = file.TypeOf(first, kMaxComponents);
+  if (!type.ok()) return type.status();
+  image.at = offered.arrays[*chosen].at;
+  image.header.notes = NotesOf(offered.arrays, *chosen);
+  image.header.type = type->type;
+  image.header.components = type->components;
+  for (const Piece& piece : image.pieces) {
+    const Result<const VtkArray*> array = file.FindLike(piece.number, first);
+    if (!array.ok()) return array.status();
+    image.arrays.push_back(*array);
+  }
+  return Status::Ok();
+}
+
+Result<std::shared_ptr<ImageFile>> OpenImage(const std::string& path, std::string_view kind, const ReadOptions& options) {
+  Result<VtkXmlFile> file = VtkXmlFile::Open(path, kind, options);
+  if (!file.ok()) return file.status();
+  Result<std::vector<Piece>> pieces = PiecesOf(*file);
+  if (!pieces.ok()) return pieces.status();
+  const auto image = std::make_shared<ImageFile>(ImageFile{*std::move(file), *std::move(pieces)});  // which arrays are part of
+  image->bounds = BoundsOf(image->pieces);
+  const Result<PointGrid> grid =
+      kind == kImage ? ImageGrid(image->file, image->bounds) : RectilinearGrid(image->file, path, image->pieces, image->bounds);
+  if (!grid.ok()) return grid.status();
+  if (Status status = FindArrays(*image, path, options); !status.ok()) return status;
+  if (Status status = SetGrid(image->header, path, *grid, image->at); !status.ok()) return status;
+  image->header.volumes = image->file.times();
+  image->header.number = image->file.time();
+  return image;
+}
+
+// The voxels of pieces that meet at their points are the same ones.
+Status ReadPieces(const ImageFile& image, const std::string& path, AlignedVector<std::byte>& out) {
+  const RawHeader& header = image.header;
+  const std::size_t voxel_bytes = BytesPerSample(header.type) * std::size_t(header.components);
+  std::vector<bool> read(CountIn(header.size));
+  for (std::size_t i = 0; i < image.pieces.size(); ++i) {
+    const Extent& extent = image.pieces[i].extent;
+    if (image.Samples(image.pieces[i]) == 0) continue;
+    const std::size_t piece_bytes = std::size_t(image.Samples(image.pieces[i])) * BytesPerSample(header.type);
+    if (Status status = CheckFitsMemory(std::int64_t(piece_bytes), path + ": a piece of it"); !status.ok()) return status;
+    AlignedVector<std::byte> bytes(piece_bytes);
+    if (Status status = image.file.ReadSamples(*image.arrays[i], header.type, bytes); !status.ok()) return status;
+    const auto [row, columns, slices] = image.Voxels(image.pieces[i]);
+    for (std::int64_t j = 0; j < columns * slices; ++j) {
+      const std::int64_t x = extent.begin[0] - image.bounds.begin[0], y = extent.begin[1] - image.bounds.begin[1] + j % columns,
+                         z = extent.begin[2] - image.bounds.begin[2] + j / columns;
+      const std::int64_t to = (z * header.size.y + y) * header.size.x + x;
+      std::memcpy(out.data() + std::size_t(to) * voxel_bytes, bytes.data() + std::size_t(j * row) * voxel_bytes,
+                  std::size_t(row) * voxel_bytes);
+      std::fill_n(read.begin() + to, row, true);
+    }
+  }
+  const auto there = std::ranges::count(read, true);
+  if (std::size_t(there) == read.size()) return Status::Ok();
+  return image.file.Wrong(fmt::format("its pieces hold {} of the {} voxels between them", there, read.size()));
+}
+
+template <const std::string_view& kKind>
 Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& options) {
-  Result<ImageFile> image = OpenImage(path, options);
+  const auto image = OpenImage(path, kKind, options);
   if (!image.ok()) return image.status();
-  const auto plain = image->file.FindPlainSamples(image->array, image->header.type, image->samples());
+  const auto& [file, pieces, bounds, arrays, at, header] = **image;
+  if (pieces.size() > 1 || file.times() > 1) return file.Wrong("its samples lie in several pieces, or are of several times");
+  const auto plain = file.FindPlainSamples(*arrays[0], header.type, (*image)->Samples(pieces[0]));
   if (!plain.ok()) return plain.status();
-  return LocatedSamples{std::move(image->header), {.file = path, .offset = plain->begin, .big_endian = plain->big_endian}};
+  return LocatedSamples{header, {.file = path, .offset = plain->begin, .big_endian = plain->big_endian}};
 }
 
 // Samples of any encoding, also those that `Locate` finds.
+template <const std::string_view& kKind>
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  const Result<ImageFile> image = OpenImage(path, options);
+  const auto image = OpenImage(path, kKind, options);
   if (!image.ok()) return image.status();
-  const auto& [file, array, header] = *image;
-  if (Status status = file.CheckHolds(array, header.type, image->samples()); !status.ok()) return status;
+  const auto& [file, pieces, bounds, arrays, at, header] = **image;
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (Status status = file.CheckHolds(*arrays[i], header.type, (*image)->Samples(pieces[i])); !status.ok()) return status;
+  }
   Result<RawVolume> raw = TakeMemory(path, header, options);
   if (!raw.ok() || options.headers_only) return raw;
-  if (Status status = file.ReadSamples(array, header.type, raw->bytes); !status.ok()) return status;
-  return raw;
+  const Status status = pieces.size() == 1 ? file.ReadSamples(*arrays[0], header.type, raw->bytes) : ReadPieces(**image, path, raw->bytes);
+  return status.ok() ? std::move(raw) : status;
 }
 
 // Appended raw and not compressed: what every reader takes, and the quickest to write.
@@ -132,12 +262,20 @@ Status Write(const FileSamples& samples, const std::string& path) {
 VolumeFormat VtkImage() {
   return {.name = "VTK image",
           .endings = {".vti"},
-          .options = {"channel"},
-          .locate = Locate,
-          .read = Read,
+          .options = {"time", "channel", "array"},
+          .locate = Locate<kImage>,
+          .read = Read<kImage>,
           .written_endings = {".vti"},
           .write = Write,
           .keeps = {.patient = false, .units = {}}};
+}
+
+VolumeFormat VtkRectilinear() {
+  return {.name = "VTK rectilinear grid",
+          .endings = {".vtr"},
+          .options = {"time", "channel", "array"},
+          .locate = Locate<kRectilinear>,
+          .read = Read<kRectilinear>};
 }
 
 }  // namespace slabstream

@@ -1,59 +1,70 @@
-// Legacy VTK files of structured points (.vtk). Their samples are the first scalars of the points, or the only array of a field there.
+// Legacy VTK files of structured points, and of rectilinear grids whose coordinates are even (.vtk).
 #include <fmt/format.h>
 
-#include <algorithm>
+#include <array>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "data/volume_io/formats.h"
+#include "data/volume_io/structured_grid.h"
 #include "data/volume_io/vtk_legacy_file.h"
 
 namespace slabstream {
 namespace {
 
-// The one array that is read, or an error that names what there is.
-Result<VtkLegacyArray> ChosenArray(const VtkLegacyFile& file) {
-  std::vector<const VtkLegacyArray*> of_points;
-  for (const VtkLegacyArray& array : file.arrays()) {
-    if (array.section == "POINT_DATA") of_points.push_back(&array);
+constexpr std::string_view kImage = "STRUCTURED_POINTS", kRectilinear = "RECTILINEAR_GRID";
+
+Result<PointGrid> GridOf(VtkLegacyFile& file, const std::string& path) {
+  const Vec3 points = file.Three("DIMENSIONS", {});
+  if (file.kind() == kImage) {
+    return PointGrid{.points = {points.x, points.y, points.z},
+                     .steps = StepsOf(file.Three("SPACING", {1, 1, 1})),
+                     .origin = file.Three("ORIGIN", {}),
+                     .matrix = "SPACING"};
   }
-  const auto scalars = std::ranges::find_if(of_points, [](const VtkLegacyArray* array) { return array->scalars; });
-  if (scalars != of_points.end()) return **scalars;
-  if (of_points.size() == 1) return *of_points.front();
-  std::string names;
-  for (const VtkLegacyArray* array : of_points) names.append(names.empty() ? "" : ", ").append(array->name);
-  if (!names.empty()) return file.Wrong("has no scalars, and several arrays, must have one: " + names);
-  const bool of_cells = std::ranges::any_of(file.arrays(), [](const VtkLegacyArray& array) { return array.section == "CELL_DATA"; });
-  return file.Wrong(of_cells ? "its samples belong to cells (CELL_DATA), must belong to points; ParaView's filter Cell Data to Point Data "
-                               "makes them so"
-                             : "has no samples of points (POINT_DATA)");
+  std::array<std::vector<double>, 3> coordinates;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::string name = std::string(1, "XYZ"[axis]) + "_COORDINATES";
+    const Result<VtkLegacyArray> array = file.Own(name);
+    if (!array.ok()) return array.status();
+    if (double(array->tuples) != points[int(axis)] || array->tuples < 1) {
+      return file.Wrong(fmt::format("{} has {} coordinates, DIMENSIONS {}", name, array->tuples, points[int(axis)]));
+    }
+    const auto numbers = file.ReadNumbers<double>(*array);
+    if (!numbers.ok()) return numbers.status();
+    coordinates[axis].assign(numbers->begin(), numbers->end());
+  }
+  return EvenGrid(path, coordinates);
 }
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
-  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, "STRUCTURED_POINTS", VtkLegacyFile::Until::kScalarsOfPoints);
+  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, {kImage, kRectilinear});
   if (!file.ok()) return file.status();
-  const Result<VtkLegacyArray> array = ChosenArray(*file);
-  if (!array.ok()) return array.status();
+  const OfferedArrays offered = file->Offered();
+  const Result<std::size_t> chosen = ChooseArray(path, offered.arrays, options.array);
+  if (!chosen.ok()) return chosen.status();
+  const VtkLegacyArray& array = file->arrays()[offered.numbers[*chosen]];
+  const Result<PointGrid> grid = GridOf(*file, path);
+  if (!grid.ok()) return grid.status();
   RawHeader header;
-  const Vec3 size = file->Three("DIMENSIONS", {});
-  if (Status status = SetSize(header, path, {size.x, size.y, size.z}, options); !status.ok()) return status;
+  if (Status status = SetGrid(header, path, *grid, offered.arrays[*chosen].at); !status.ok()) return status;
   const std::int64_t voxels = VolumeGeometry{header.size}.bounds().voxel_count();
-  if (array->tuples != voxels) return file->Wrong(fmt::format("POINT_DATA has {} points, DIMENSIONS {}", array->tuples, voxels));
-  header.type = array->type;
-  header.components = array->components;
-  header.world = World::kScene;
-  header.matrix = "SPACING";
-  header.steps = StepsOf(file->Three("SPACING", {1, 1, 1}));
-  header.origin = file->Three("ORIGIN", {});
-  if (Status status = file->CheckHolds(*array); !status.ok()) return status;
+  if (array.tuples != voxels) {
+    return file->Wrong(fmt::format("{} has {} elements, the grid of its DIMENSIONS {}", array.section, array.tuples, voxels));
+  }
+  header.notes = NotesOf(offered.arrays, *chosen);
+  header.type = array.type;
+  header.components = array.components;
+  if (Status status = file->CheckHolds(array); !status.ok()) return status;
   Result<RawVolume> raw = TakeMemory(path, header, options);
   if (!raw.ok() || options.headers_only) return raw;
-  if (Status status = file->ReadSamples(*array, raw->bytes); !status.ok()) return status;
+  if (Status status = file->ReadSamples(array, raw->bytes); !status.ok()) return status;
   return raw;
 }
 
 }  // namespace
 
-VolumeFormat VtkLegacy() { return {.name = "VTK", .endings = {".vtk"}, .options = {"channel"}, .read = Read}; }
+VolumeFormat VtkLegacy() { return {.name = "VTK", .endings = {".vtk"}, .options = {"channel", "array"}, .read = Read}; }
 
 }  // namespace slabstream

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
+#include <cmath>
 #include <utility>
 
 #include "common/base/parse_number.h"
@@ -43,6 +45,13 @@ std::optional<SampleType> ToSampleType(std::string_view name) {
   return found == kTypeNames.end() ? std::nullopt : std::optional(found->second);
 }
 
+constexpr std::string_view kBits = "bit", kTexts = "string";
+
+// Of binary numbers.
+std::int64_t BytesOf(const VtkLegacyArray& array) {
+  return array.type_name == kBits ? (array.samples() + 7) / 8 : array.samples() * std::int64_t(BytesPerSample(array.type));
+}
+
 // VTK writes letters that would end a name as a per cent sign and two hexadecimal digits.
 std::string DecodedName(const std::string& text) {
   std::string name;
@@ -69,23 +78,30 @@ int ComponentsOf(std::string_view keyword) {
 
 }  // namespace
 
-Result<VtkLegacyFile> VtkLegacyFile::Open(const std::string& path, std::string_view kind, Until until) {
-  VtkLegacyFile file(path, until);
+Result<VtkLegacyFile> VtkLegacyFile::Open(const std::string& path, const std::vector<std::string_view>& kinds) {
+  VtkLegacyFile file(path);
   if (!file.cursor_.is_open()) return Status::NotFound(path + ": cannot be opened for reading");
-  const Result<std::string> found = file.ReadStart();
-  if (!found.ok()) return found.status();
-  if (*found != kind) return file.Wrong(fmt::format("a VTK dataset of type {}, must be {}", *found, kind));
+  if (Status status = file.ReadStart(); !status.ok()) return status;
+  if (std::ranges::find(kinds, file.kind_) == kinds.end()) {
+    return file.Wrong(
+        fmt::format("a VTK dataset of type {}, must be STRUCTURED_POINTS, RECTILINEAR_GRID or UNSTRUCTURED_GRID", file.kind_));
+  }
   if (Status status = file.ReadKeywords(); !status.ok()) return status;
   return file;
 }
 
 std::optional<std::string> VtkLegacyFile::KindOf(const std::string& path) {
-  VtkLegacyFile file(path, Until::kEnd);
-  const Result<std::string> kind = file.ReadStart();
-  return kind.ok() ? std::optional(*kind) : std::nullopt;
+  VtkLegacyFile file(path);
+  return file.ReadStart().ok() ? std::optional(file.kind_) : std::nullopt;
 }
 
-Result<std::string> VtkLegacyFile::ReadStart() {
+std::optional<std::string> VtkLegacyFile::Keyword() {
+  std::optional<std::string> word = cursor_.Word();
+  if (word) std::ranges::transform(*word, word->begin(), [](unsigned char c) { return char(std::toupper(c)); });
+  return word;
+}
+
+Status VtkLegacyFile::ReadStart() {
   const std::optional<std::string> first = cursor_.Line();
   if (!first || !first->starts_with(kFirstLine)) {
     return Wrong(fmt::format("not a VTK dataset: the first line does not begin with {}", kFirstLine));
@@ -94,22 +110,21 @@ Result<std::string> VtkLegacyFile::ReadStart() {
   const std::size_t digit = std::min(version.find_first_not_of(' '), version.size());
   version_ = ParseNumber<int>(version.substr(digit, version.find('.') - digit)).value_or(0);
   if (!cursor_.Line()) return Ended();  // the title
-  const std::optional<std::string> encoding = cursor_.Word();
+  const std::optional<std::string> encoding = Keyword();
   if (!encoding) return Ended();
   binary_ = *encoding == "BINARY";
   if (!binary_ && *encoding != "ASCII") {
     return Wrong(fmt::format("not a VTK dataset: the third line is '{}', must be ASCII or BINARY", *encoding));
   }
-  const std::optional<std::string> dataset = cursor_.Word(), kind = cursor_.Word();
+  const std::optional<std::string> dataset = Keyword(), kind = Keyword();
   if (!kind) return Ended();
   if (*dataset != "DATASET") return Wrong(fmt::format("not a VTK dataset: has '{}', must have DATASET", *dataset));
-  return *kind;
+  kind_ = *kind;
+  return Status::Ok();
 }
 
 Status VtkLegacyFile::ReadKeywords() {
-  while (!ended_) {
-    const std::optional<std::string> keyword = cursor_.Word();
-    if (!keyword) break;
+  while (const std::optional<std::string> keyword = Keyword()) {
     if (Status status = OnKeyword(*keyword); !status.ok()) return status;
   }
   return Status::Ok();
@@ -118,7 +133,8 @@ Status VtkLegacyFile::ReadKeywords() {
 Status VtkLegacyFile::OnKeyword(const std::string& keyword) {
   if (keyword == "DIMENSIONS" || keyword == "SPACING" || keyword == "ASPECT_RATIO" || keyword == "ORIGIN") return ReadThree(keyword);
   if (keyword == "POINT_DATA" || keyword == "CELL_DATA") return ReadSection(keyword);
-  if (keyword == "POINTS") return ReadPoints();
+  if (keyword == "POINTS") return ReadPlaces(keyword, 3);
+  if (keyword.ends_with("_COORDINATES") && keyword.size() == std::string_view("X_COORDINATES").size()) return ReadPlaces(keyword, 1);
   if (keyword == "CELLS") return ReadCells();
   if (keyword == "CELL_TYPES") {
     const Result<std::int64_t> count = ReadCount(keyword, kMostTuples);
@@ -151,12 +167,12 @@ Status VtkLegacyFile::ReadSection(const std::string& keyword) {
   return Status::Ok();
 }
 
-Status VtkLegacyFile::ReadPoints() {
-  const Result<std::int64_t> count = ReadCount("POINTS", kMostTuples);
+Status VtkLegacyFile::ReadPlaces(const std::string& keyword, int components) {
+  const Result<std::int64_t> count = ReadCount(keyword, kMostTuples);
   if (!count.ok()) return count.status();
-  const Result<SampleType> type = ReadType("POINTS");
-  if (!type.ok()) return type.status();
-  return Add({.name = "POINTS", .type = *type, .components = 3, .tuples = *count});
+  VtkLegacyArray array{.name = keyword, .components = components, .tuples = *count};
+  if (Status status = ReadType(array, keyword); !status.ok()) return status;
+  return Add(std::move(array));
 }
 
 // Before version 5, each cell's number of points stands in front of them. Since then, there are the places where the cells begin and end
@@ -175,19 +191,17 @@ Status VtkLegacyFile::ReadCells() {
 }
 
 Status VtkLegacyFile::ReadPartOfCells(const std::string& name, std::int64_t tuples) {
-  const std::optional<std::string> keyword = cursor_.Word();
+  const std::optional<std::string> keyword = Keyword();
   if (!keyword) return Ended();
   if (*keyword != name) return Wrong(fmt::format("CELLS: has '{}', must have {}", *keyword, name));
-  const Result<SampleType> type = ReadType(name);
-  if (!type.ok()) return type.status();
-  return Add({.name = name, .type = *type, .tuples = tuples});
+  VtkLegacyArray array{.name = name, .tuples = tuples};
+  if (Status status = ReadType(array, name); !status.ok()) return status;
+  return Add(std::move(array));
 }
 
 Status VtkLegacyFile::ReadScalars() {
   VtkLegacyArray array{.section = section_, .name = DecodedName(cursor_.Word().value_or("")), .tuples = elements_, .scalars = true};
-  const Result<SampleType> type = ReadType("SCALARS " + array.name);
-  if (!type.ok()) return type.status();
-  array.type = *type;
+  if (Status status = ReadType(array, "SCALARS " + array.name); !status.ok()) return status;
   const std::string components = cursor_.Line().value_or("");
   if (const std::size_t digit = components.find_first_not_of(" \t"); digit != std::string::npos) {
     array.components =
@@ -196,7 +210,7 @@ Status VtkLegacyFile::ReadScalars() {
       return Wrong(fmt::format("SCALARS {} has '{}' components, must be in [1, 4]", array.name, components.substr(digit)));
     }
   }
-  if (cursor_.Word() != "LOOKUP_TABLE" || !cursor_.Word()) return Wrong(fmt::format("SCALARS {}: LOOKUP_TABLE is missing", array.name));
+  if (Keyword() != "LOOKUP_TABLE" || !cursor_.Word()) return Wrong(fmt::format("SCALARS {}: LOOKUP_TABLE is missing", array.name));
   return Add(std::move(array));
 }
 
@@ -211,14 +225,13 @@ Status VtkLegacyFile::ReadField() {
       if (Status status = SkipMetadata(); !status.ok()) return status;
       name = cursor_.Word();
     }
-    VtkLegacyArray array{.section = section_, .name = DecodedName(name.value_or(""))};
+    // Fields in front of the sections belong to the whole dataset.
+    VtkLegacyArray array{.section = section_.empty() ? "FIELD" : section_, .name = DecodedName(name.value_or(""))};
     const Result<std::int64_t> components = ReadCount("FIELD", kMaxComponents), tuples = ReadCount("FIELD", kMostTuples);
     for (const auto* number : {&components, &tuples}) {
       if (!number->ok()) return number->status();
     }
-    const Result<SampleType> type = ReadType(fmt::format("array {} of a FIELD", array.name));
-    if (!type.ok()) return type.status();
-    array.type = *type;
+    if (Status status = ReadType(array, fmt::format("array {} of a FIELD", array.name)); !status.ok()) return status;
     array.components = int(*components);
     array.tuples = *tuples;
     if (Status status = Add(std::move(array)); !status.ok()) return status;
@@ -239,12 +252,10 @@ Status VtkLegacyFile::ReadAttribute(const std::string& keyword) {
     if (!components.ok()) return components.status();
     array.components = int(*components);
   }
-  if (colors) {
-    array.type = binary_ ? SampleType::kUint8 : SampleType::kFloat32;
-  } else {
-    const Result<SampleType> type = ReadType(fmt::format("{} {}", keyword, array.name));
-    if (!type.ok()) return type.status();
-    array.type = *type;
+  array.colors = colors;
+  array.scalars = colors && array.components == 1;  // so does VTK write scalars of bytes
+  if (!colors) {
+    if (Status status = ReadType(array, fmt::format("{} {}", keyword, array.name)); !status.ok()) return status;
   }
   return Add(std::move(array));
 }
@@ -273,20 +284,19 @@ Result<std::int64_t> VtkLegacyFile::ReadCount(const std::string& keyword, std::i
   return count;
 }
 
-Result<SampleType> VtkLegacyFile::ReadType(const std::string& what) {
-  const std::string type = cursor_.Word().value_or("");
-  const std::optional<SampleType> known = ToSampleType(ToLower(type));
-  if (!known) return Wrong(fmt::format("{}: type '{}' is not supported", what, type));
-  return *known;
+Status VtkLegacyFile::ReadType(VtkLegacyArray& array, const std::string& what) {
+  array.type_name = ToLower(cursor_.Word().value_or(""));
+  const std::optional<SampleType> known = ToSampleType(array.type_name);
+  array.supported = known.has_value();
+  if (known) array.type = *known;
+  if (known || (!array.section.empty() && (array.type_name == kBits || array.type_name == kTexts))) return Status::Ok();
+  return Wrong(fmt::format("{}: type '{}' is not supported", what, array.type_name));
 }
 
 Status VtkLegacyFile::Add(VtkLegacyArray array) {
-  if (binary_ && !cursor_.Line()) return Ended();  // what is left of the line in front of the numbers
+  if ((binary_ || array.type_name == kTexts) && !cursor_.Line()) return Ended();  // what is left of the line in front of the numbers
   array.offset = cursor_.offset();
-  ended_ = until_ == Until::kScalarsOfPoints && array.scalars && array.section == "POINT_DATA";
-  if (!ended_) {
-    if (Status status = Skip(array); !status.ok()) return status;
-  }
+  if (Status status = array.type_name == kTexts ? SkipTexts(array) : Skip(array); !status.ok()) return status;
   if (array.section.empty() || (array.tuples == elements_ && array.components > 0)) arrays_.push_back(std::move(array));
   return Status::Ok();
 }
@@ -294,13 +304,57 @@ Status VtkLegacyFile::Add(VtkLegacyArray array) {
 Status VtkLegacyFile::Skip(const VtkLegacyArray& array) {
   if (binary_) {
     if (Status status = CheckHolds(array); !status.ok()) return status;
-    cursor_.GoTo(array.offset + array.samples() * std::int64_t(BytesPerSample(array.type)));
+    cursor_.GoTo(array.offset + BytesOf(array));
     return Status::Ok();
   }
   for (std::int64_t i = 0; i < array.samples(); ++i) {
     if (!cursor_.Word()) return Damaged(fmt::format("truncated: has {} of {} numbers of {}", i, array.samples(), array.name));
   }
   return Status::Ok();
+}
+
+// A line each; binary: each behind its length, whose first two bits say how many bytes it has.
+Status VtkLegacyFile::SkipTexts(const VtkLegacyArray& array) {
+  for (std::int64_t i = 0; i < array.samples(); ++i) {
+    std::optional<char> next = '\n';
+    if (binary_) {
+      next = cursor_.Next();
+      const auto first = std::uint8_t(next.value_or(0));
+      const int more = first >> 6 == 3 ? 0 : first >> 6 == 2 ? 1 : first >> 6 == 1 ? 3 : 7;
+      std::int64_t length = first & 0x3f;
+      for (int byte = 0; byte < more && next && length < kMostTuples; ++byte) {
+        next = cursor_.Next();
+        length = length << 8 | std::uint8_t(next.value_or(0));
+      }
+      if (next && length > 0) {  // the last byte of the text is read, so that a text that is cut off is noticed
+        cursor_.GoTo(cursor_.offset() + std::min(length, kMostTuples) - 1);
+        next = cursor_.Next();
+      }
+    } else if (!cursor_.Line()) {
+      next.reset();
+    }
+    if (!next) return Damaged(fmt::format("truncated: has {} of {} texts of {}", i, array.samples(), array.name));
+  }
+  return Status::Ok();
+}
+
+OfferedArrays VtkLegacyFile::Offered() const {
+  OfferedArrays offered;
+  std::array<bool, 2> has_active = {};  // by ValuesAt
+  for (std::size_t i = 0; i < arrays_.size(); ++i) {
+    const VtkLegacyArray& array = arrays_[i];
+    if (array.section.empty()) continue;
+    const ValuesAt at = array.section == "POINT_DATA" ? ValuesAt::kPoints : ValuesAt::kCells;
+    const bool active = array.scalars && !std::exchange(has_active[std::size_t(at)], true);
+    offered.arrays.push_back({.name = array.name,
+                              .at = at,
+                              .type = array.supported ? std::optional(array.type) : std::nullopt,
+                              .type_name = array.type_name,
+                              .components = array.components,
+                              .active = active});
+    offered.numbers.push_back(i);
+  }
+  return offered;
 }
 
 Vec3 VtkLegacyFile::Three(const std::string& keyword, const Vec3& if_absent) const {
@@ -317,7 +371,7 @@ Result<VtkLegacyArray> VtkLegacyFile::Own(const std::string& name) const {
 
 Status VtkLegacyFile::CheckHolds(const VtkLegacyArray& array) const {
   // In text, a digit and a blank at least.
-  const std::int64_t bytes = binary_ ? array.samples() * std::int64_t(BytesPerSample(array.type)) : 2 * array.samples() - 1;
+  const std::int64_t bytes = binary_ ? BytesOf(array) : 2 * array.samples() - 1;
   return slabstream::CheckHolds({.file = path_, .offset = array.offset}, std::max<std::int64_t>(bytes, 0));
 }
 
@@ -328,7 +382,12 @@ Status VtkLegacyFile::ReadSamples(const VtkLegacyArray& array, AlignedVector<std
     return Status::Ok();
   }
   cursor_.GoTo(array.offset);
-  Status status = ReadTextSamples(cursor_, array.type, out);
+  AlignedVector<std::byte> shares(array.colors ? out.size() * sizeof(float) : 0);
+  Status status = array.colors ? ReadTextSamples(cursor_, SampleType::kFloat32, shares) : ReadTextSamples(cursor_, array.type, out);
+  if (array.colors && status.ok()) {
+    std::ranges::transform(Converted<float>(SampleType::kFloat32, shares), out.begin(),
+                           [](float share) { return std::byte(std::lround(255 * std::clamp(share, 0.0F, 1.0F))); });
+  }
   return status.ok() ? status : Status(status.code(), path_ + ": " + status.message());
 }
 

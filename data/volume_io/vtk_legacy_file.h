@@ -2,6 +2,8 @@
 // numbers are big-endian. Errors name the path. One thread at a time.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -13,6 +15,9 @@
 #include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
 #include "common/math/vec.h"
+#include "common/volume/memory_budget.h"
+#include "data/volume_io/converted_samples.h"
+#include "data/volume_io/grid_arrays.h"
 #include "data/volume_io/sample_type.h"
 #include "data/volume_io/text_cursor.h"
 
@@ -21,24 +26,26 @@ namespace slabstream {
 // Numbers in the file: `tuples` of `components` each, from byte `offset` on.
 struct VtkLegacyArray {
   std::string section;  // "POINT_DATA" or "CELL_DATA"; "": the dataset's own
-  std::string name;     // of the dataset's own: its keyword, "POINTS", "CELLS", "OFFSETS", "CONNECTIVITY" or "CELL_TYPES"
+  // Of the dataset's own: its keyword, "POINTS", "CELLS", "OFFSETS", "CONNECTIVITY", "CELL_TYPES" or "X_COORDINATES".
+  std::string name;
+  std::string type_name = {};  // as the file calls it
   SampleType type = SampleType::kUint8;
+  bool supported = true;  // the type; else the array is only listed
   int components = 1;
   std::int64_t tuples = 0, offset = 0;
-  bool scalars = false;  // by the keyword SCALARS
+  bool scalars = false;  // by the keyword SCALARS, or COLOR_SCALARS of one component
+  bool colors = false;   // COLOR_SCALARS: bytes, which in a text are shares of 255
 
   std::int64_t samples() const { return tuples * components; }
 };
 
 class VtkLegacyFile {
  public:
-  // How far the keywords are read: to the first scalars of points, which need not be complete, or to the file's end.
-  enum class Until { kScalarsOfPoints, kEnd };
-
-  // `kind`: of the dataset, "STRUCTURED_POINTS". NotFound: no such file. InvalidArgument: another kind, or what is not supported. DataLoss:
-  // truncated.
-  static Result<VtkLegacyFile> Open(const std::string& path, std::string_view kind, Until until);
-  // The kind of its dataset; nothing: it is no such file.
+  // Reads the keywords. Their letters may be small ones. `kinds`: of datasets, "STRUCTURED_POINTS". NotFound: no such file.
+  // InvalidArgument: another kind, or what is not supported. DataLoss: truncated.
+  static Result<VtkLegacyFile> Open(const std::string& path, const std::vector<std::string_view>& kinds);
+  const std::string& kind() const { return kind_; }
+  // The kind of the dataset in a file; nothing: it is no such file.
   static std::optional<std::string> KindOf(const std::string& path);
 
   // DIMENSIONS, SPACING (which older files call ASPECT_RATIO) or ORIGIN.
@@ -46,6 +53,8 @@ class VtkLegacyFile {
   std::int64_t cells() const { return cells_; }  // by CELLS; 0: there are none
   // In the file's order. Arrays of fields are left out unless they have a tuple for each element of their section.
   const std::vector<VtkLegacyArray>& arrays() const { return arrays_; }
+  // Those of points and cells, and their numbers in arrays(). The first scalars of both are active.
+  OfferedArrays Offered() const;
   // The dataset's own of this name. InvalidArgument: there is none.
   Result<VtkLegacyArray> Own(const std::string& name) const;
 
@@ -53,20 +62,25 @@ class VtkLegacyFile {
   Status CheckHolds(const VtkLegacyArray& array) const;
   // Fills `out`, the samples of the array, in this machine's byte order. The array was checked (CheckHolds). DataLoss: truncated, damaged.
   Status ReadSamples(const VtkLegacyArray& array, AlignedVector<std::byte>& out);
+  // The same, as numbers. ResourceExhausted: they do not fit the memory.
+  template <class T>
+  Result<AlignedVector<T>> ReadNumbers(const VtkLegacyArray& array);
 
   Status Wrong(const std::string& why) const { return Status::InvalidArgument(path_ + ": " + why); }
   Status Damaged(const std::string& why) const { return Status::DataLoss(path_ + ": " + why); }
 
  private:
-  VtkLegacyFile(const std::string& path, Until until) : path_(path), until_(until), cursor_(path) {}
+  explicit VtkLegacyFile(const std::string& path) : path_(path), cursor_(path) {}
   Status Ended() const { return Damaged("truncated: the header ends early"); }
+  std::optional<std::string> Keyword();  // the next word, in capital letters
   // Reads the lines in front of the keywords, and the kind of the dataset.
-  Result<std::string> ReadStart();
+  Status ReadStart();
   Status ReadKeywords();
   Status OnKeyword(const std::string& keyword);
   Status ReadThree(const std::string& keyword);
   Status ReadSection(const std::string& keyword);
-  Status ReadPoints();
+  // "KEYWORD n type" and the numbers of n tuples.
+  Status ReadPlaces(const std::string& keyword, int components);
   Status ReadCells();
   // "NAME type" and `tuples` numbers.
   Status ReadPartOfCells(const std::string& name, std::int64_t tuples);
@@ -77,16 +91,17 @@ class VtkLegacyFile {
   Status SkipLookupTable();
   Status SkipMetadata();
   Result<std::int64_t> ReadCount(const std::string& keyword, std::int64_t most);
-  Result<SampleType> ReadType(const std::string& what);
-  // An array whose numbers are next: passes by them, unless nothing behind them is asked for.
+  // Of numbers; sets the type of the array.
+  Status ReadType(VtkLegacyArray& array, const std::string& what);
+  // An array whose numbers are next: passes by them.
   Status Add(VtkLegacyArray array);
   Status Skip(const VtkLegacyArray& array);
+  Status SkipTexts(const VtkLegacyArray& array);
 
   std::string path_;
-  Until until_;
   TextCursor cursor_;
-  bool ended_ = false;  // nothing more is asked for
-  int version_ = 0;     // the number in front of the point
+  std::string kind_;
+  int version_ = 0;  // the number in front of the point
   bool binary_ = false;
   std::map<std::string, Vec3> threes_;
   std::int64_t cells_ = 0;
@@ -94,5 +109,16 @@ class VtkLegacyFile {
   std::int64_t elements_ = 0;  // of it
   std::vector<VtkLegacyArray> arrays_;
 };
+
+template <class T>
+Result<AlignedVector<T>> VtkLegacyFile::ReadNumbers(const VtkLegacyArray& array) {
+  if (Status status = CheckHolds(array); !status.ok()) return status;
+  const std::int64_t bytes = array.samples() * std::int64_t(BytesPerSample(array.type));
+  const Status fits = CheckFitsMemory(bytes + array.samples() * std::int64_t(sizeof(T)), fmt::format("{}: array {}", path_, array.name));
+  if (!fits.ok()) return fits;
+  AlignedVector<std::byte> read(static_cast<std::size_t>(bytes));
+  if (Status status = ReadSamples(array, read); !status.ok()) return status;
+  return Converted<T>(array.type, read);
+}
 
 }  // namespace slabstream

@@ -1,10 +1,8 @@
 // Unstructured grids in legacy VTK files (vtk_legacy_file.h).
 #include <fmt/format.h>
 
-#include <array>
 #include <utility>
 
-#include "common/volume/memory_budget.h"
 #include "data/volume_io/mesh_builder.h"
 #include "data/volume_io/mesh_formats.h"
 #include "data/volume_io/vtk_legacy_file.h"
@@ -29,8 +27,6 @@ class LegacyGridReader {
  private:
   // The dataset's own array of this name, in which there are between 1 and `most` tuples.
   Result<VtkLegacyArray> Own(const std::string& name, std::int64_t most) const;
-  template <class T>
-  Result<AlignedVector<T>> Numbers(const VtkLegacyArray& array);
   Result<WholeNumbers> OfCells(const std::string& name, std::int64_t most);
   Result<CellPoints> ReadCountedCells();
   Result<CellPoints> ReadCellsWithOffsets();
@@ -50,24 +46,13 @@ Result<VtkLegacyArray> LegacyGridReader::Own(const std::string& name, std::int64
   return array;
 }
 
-template <class T>
-Result<AlignedVector<T>> LegacyGridReader::Numbers(const VtkLegacyArray& array) {
-  const std::int64_t bytes = array.samples() * std::int64_t(BytesPerSample(array.type));
-  if (Status status = CheckFitsMemory(bytes + array.samples() * std::int64_t(sizeof(T)), fmt::format("{}: array {}", path_, array.name));
-      !status.ok())
-    return status;
-  AlignedVector<std::byte> read(static_cast<std::size_t>(bytes));
-  if (Status status = file_.ReadSamples(array, read); !status.ok()) return status;
-  return Converted<T>(array.type, read);
-}
-
 Result<WholeNumbers> LegacyGridReader::OfCells(const std::string& name, std::int64_t most) {
   const Result<VtkLegacyArray> array = Own(name, most);
   if (!array.ok()) return array.status();
   if (array->type == SampleType::kFloat32 || array->type == SampleType::kFloat64) {
     return file_.Wrong(fmt::format("{} has no whole numbers", name));
   }
-  return Numbers<std::int64_t>(*array);
+  return file_.ReadNumbers<std::int64_t>(*array);
 }
 
 constexpr std::int64_t kMostCorners = std::int64_t{1} << 40;
@@ -101,7 +86,7 @@ Result<CellPoints> LegacyGridReader::ReadCellsWithOffsets() {
 Status LegacyGridReader::ReadPoints() {
   const Result<VtkLegacyArray> array = Own("POINTS", kMaxMeshPoints);
   if (!array.ok()) return array.status();
-  const Result<AlignedVector<double>> places = Numbers<double>(*array);
+  const Result<AlignedVector<double>> places = file_.ReadNumbers<double>(*array);
   return places.ok() ? builder_.SetPoints(*places) : places.status();
 }
 
@@ -114,44 +99,35 @@ Status LegacyGridReader::ReadCells() {
     return file_.Damaged(fmt::format("CELLS states {} cells and has {}, CELL_TYPES has {}, must be one number", file_.cells(),
                                      points->ends.size(), kinds->size()));
   }
-  const Result<std::int64_t> count = builder_.SetCells(*kinds, points->ends);
-  if (!count.ok()) return count.status();
-  if (std::size_t(*count) != points->corners.size()) {
-    return file_.Damaged(fmt::format("CONNECTIVITY has {} points of cells, must have {}", points->corners.size(), *count));
+  if (Status status = builder_.SetCells(*kinds, points->ends); !status.ok()) return status;
+  if (points->ends.back() != std::int64_t(points->corners.size())) {
+    return file_.Damaged(fmt::format("CONNECTIVITY has {} points of cells, must have {}", points->corners.size(), points->ends.back()));
   }
-  return builder_.SetCorners(points->corners);
+  return builder_.AddCorners(points->corners, 0, file_.Own("POINTS")->tuples);
 }
 
 Result<LoadedMesh> LegacyGridReader::Read(const MeshOptions& options) {
-  std::vector<const VtkLegacyArray*> listed;
-  std::array<bool, 2> has_active = {};  // by section, whose first scalars are active
-  for (const VtkLegacyArray& array : file_.arrays()) {
-    if (array.section.empty()) continue;
-    const ValuesAt at = array.section == "POINT_DATA" ? ValuesAt::kPoints : ValuesAt::kCells;
-    const bool active = array.scalars && !std::exchange(has_active[std::size_t(at)], true);
-    builder_.AddArray({array.name, at, array.type, array.components}, active);
-    listed.push_back(&array);
-  }
-  const Result<std::size_t> chosen = builder_.ChooseArray(options);
+  const OfferedArrays offered = file_.Offered();
+  const Result<std::size_t> chosen = builder_.SetArrays(offered.arrays, options);
   if (!chosen.ok()) return chosen.status();
   if (options.headers_only) return builder_.Take();
-  const VtkLegacyArray& array = *listed[*chosen];
+  const VtkLegacyArray& array = file_.arrays()[offered.numbers[*chosen]];
   if (Status status = ReadPoints(); !status.ok()) return status;
   if (Status status = ReadCells(); !status.ok()) return status;
   const bool of_points = array.section == "POINT_DATA";
   if (const std::int64_t elements = of_points ? file_.Own("POINTS")->tuples : file_.cells(); array.tuples != elements) {
     return file_.Damaged(fmt::format("{} has {} elements, the grid has {}", array.section, array.tuples, elements));
   }
-  Result<AlignedVector<float>> values = Numbers<float>(array);
+  const Result<AlignedVector<float>> values = file_.ReadNumbers<float>(array);
   if (!values.ok()) return values.status();
-  builder_.SetValues(*std::move(values));
+  if (Status status = builder_.SetValues(*values); !status.ok()) return status;
   return builder_.Take();
 }
 
 }  // namespace
 
 Result<LoadedMesh> ReadVtkLegacyGrid(const std::string& path, const MeshOptions& options) {
-  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, "UNSTRUCTURED_GRID", VtkLegacyFile::Until::kEnd);
+  Result<VtkLegacyFile> file = VtkLegacyFile::Open(path, {"UNSTRUCTURED_GRID"});
   if (!file.ok()) return file.status();
   return LegacyGridReader(path, *std::move(file)).Read(options);
 }

@@ -1,24 +1,43 @@
 #include "data/volume_io/vtk_xml.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <sstream>
 #include <utility>
 
+#include "common/base/find_named.h"
 #include "common/base/parse_number.h"
+#include "common/base/trimmed.h"
+#include "data/codecs/codecs.h"
 #include "data/volume_io/payload.h"
+#include "data/volume_io/raw_volume.h"
 #include "data/volume_io/text_cursor.h"
 
 namespace slabstream {
+
+struct VtkCompressor {
+  std::string_view name;
+  SharedCodec codec;
+  std::int64_t most_ratio = 1;  // of the bytes of a block to those that are stored, at most
+};
+
 namespace {
+
+const std::vector<VtkCompressor>& Compressors() {
+  // LZ4: a byte of a length stands for 255. xz packs zeros about 7000:1.
+  static const std::vector<VtkCompressor> compressors = {{"vtkZLibDataCompressor", ZlibCodec(), kMaxDeflateRatio},
+                                                         {"vtkLZ4DataCompressor", Lz4BlockCodec(), 256},
+                                                         {"vtkLZMADataCompressor", XzCodec(), 16384}};
+  return compressors;
+}
 
 constexpr std::array<std::pair<std::string_view, SampleType>, 10> kTypes = {{{"Int8", SampleType::kInt8},
                                                                              {"UInt8", SampleType::kUint8},
@@ -118,7 +137,8 @@ Status ReadPlain(ByteSource& source, const HeaderFormat& header, std::span<std::
 }
 
 // The number of blocks, the size of all but the last, the size of the last if it is less (else 0), and the size of each when compressed.
-Status ReadBlocks(ByteSource& source, const HeaderFormat& format, std::int64_t file_bytes, std::span<std::byte> out) {
+Status ReadBlocks(ByteSource& source, const HeaderFormat& format, const ChunkCodec& codec, std::int64_t file_bytes,
+                  std::span<std::byte> out) {
   std::array<std::uint64_t, 3> header{};
   for (std::uint64_t& number : header) {
     const Result<std::uint64_t> read = ReadCount(source, format);
@@ -142,19 +162,14 @@ Status ReadBlocks(ByteSource& source, const HeaderFormat& format, std::int64_t f
       return Status::DataLoss(fmt::format("block {} has {} bytes, the file {}", i, *bytes, file_bytes));
     packed_bytes.push_back(*bytes);
   }
-  std::vector<std::byte> packed;
-  std::size_t done = 0;
   for (std::uint64_t i = 0; i < blocks; ++i) {
-    packed.resize(packed_bytes[i]);
-    const std::size_t bytes = std::min<std::size_t>(block_bytes, out.size() - done);
-    uLongf unpacked = bytes;
-    uLong used = packed.size();
-    const bool sound = source.Read(packed) == packed.size() && uncompress2(reinterpret_cast<Bytef*>(out.data() + done), &unpacked,
-                                                                           reinterpret_cast<const Bytef*>(packed.data()), &used) == Z_OK;
-    if (!sound || unpacked != bytes || used != packed.size()) {
-      return Status::DataLoss(fmt::format("block {} is truncated or damaged", i));
-    }
-    done += bytes;
+    std::vector<std::byte> packed(packed_bytes[i]);
+    const std::size_t bytes = std::min<std::size_t>(block_bytes, out.size());
+    if (source.Read(packed) != packed.size()) return Status::DataLoss(fmt::format("block {} is truncated", i));
+    const Result<Bytes> unpacked = codec.Decode(Bytes(std::move(packed)), bytes);
+    if (!unpacked.ok() || unpacked->size() != bytes) return Status::DataLoss(fmt::format("block {} is damaged", i));
+    std::ranges::copy(unpacked->span(), out.begin());
+    out = out.subspan(bytes);
   }
   return Status::Ok();
 }
@@ -165,24 +180,26 @@ std::string_view VtkTypeName(SampleType type) {
   return std::ranges::find(kTypes, type, [](const auto& entry) { return entry.second; })->first;
 }
 
-Result<VtkXmlFile> VtkXmlFile::Open(const std::string& path, std::string_view type) {
+Result<VtkXmlFile> VtkXmlFile::Open(const std::string& path, std::string_view type, const ReadOptions& options) {
   VtkXmlFile file(path);
   if (Status status = file.ReadElements(type); !status.ok()) return status;
+  if (Status status = file.TakeTime(options); !status.ok()) return status;
   return file;
 }
 
 bool VtkXmlFile::OnStart(const XmlTag& tag, std::string_view type) {
+  if (std::exchange(in_array_, false)) arrays_.back().end = tag.begin;
   const std::string parent = open_.empty() ? "" : open_.back(), grandparent = open_.size() < 2 ? "" : open_[open_.size() - 2];
   open_.push_back(tag.name);
   if (tag.name == "VTKFile") file_ = tag;
   if (tag.name == type) dataset_ = tag;
-  if (tag.name == "Piece" && ++pieces_ == 1) piece_ = tag;
+  if (tag.name == "Piece") pieces_.push_back(tag);
   if (tag.name == "PointData") point_scalars_ = tag.Attribute("Scalars");
   if (tag.name == "CellData") cell_scalars_ = tag.Attribute("Scalars");
-  if (tag.name == "DataArray" && grandparent == "Piece" && pieces_ == 1) {
-    constexpr std::size_t kMostArrays = 4096;
+  if (tag.name == "DataArray" && grandparent == "Piece") {
+    constexpr std::size_t kMostArrays = 65536;
     in_array_ = arrays_.size() < kMostArrays;
-    if (in_array_) arrays_.push_back({tag, parent, tag.end, tag.end});
+    if (in_array_) arrays_.push_back({tag, parent, pieces_.size() - 1, tag.end, tag.end});
   }
   if (tag.name != "AppendedData") return true;
   appended_ = tag.end;
@@ -192,13 +209,8 @@ bool VtkXmlFile::OnStart(const XmlTag& tag, std::string_view type) {
 
 void VtkXmlFile::OnEnd(const XmlTag& tag) {
   open_.pop_back();
-  if (!in_array_) return;
-  if (tag.name == "DataArray") {
-    arrays_.back().end = std::max(arrays_.back().begin, tag.begin);
-    in_array_ = false;
-  } else {
-    arrays_.back().begin = tag.end;  // samples stand behind what else is in the element
-  }
+  // An empty element has one tag, which begins and ends it.
+  if (std::exchange(in_array_, false)) arrays_.back().end = std::max(arrays_.back().begin, tag.begin);
 }
 
 Status VtkXmlFile::ReadElements(std::string_view type) {
@@ -208,14 +220,69 @@ Status VtkXmlFile::ReadElements(std::string_view type) {
     file.read(out.data(), std::streamsize(out.size()));
     return std::size_t(file.gcount());
   };
-  const XmlEvents events{[&](const XmlTag& tag) { return OnStart(tag, type); }, [&](const XmlTag& tag) { OnEnd(tag); }};
+  const auto on_start = [&](XmlTag tag) {
+    for (auto& [name, value] : tag.attributes) value = std::string(Trimmed(value));
+    return OnStart(tag, type);
+  };
+  const XmlEvents events{on_start, [&](const XmlTag& tag) { OnEnd(tag); }};
   if (Status status = ReadXml(read, events); !status.ok()) {
     return Status(status.code(), fmt::format("{}: not a VTK file of type {}: {}", path_, type, status.message()));
   }
   if (file_.Attribute("type") != type || dataset_.name.empty()) {
     return Wrong(fmt::format("a VTK file of type '{}', must be {}", file_.Attribute("type"), type));
   }
+  if (pieces_.empty() || pieces_.size() > kMostVtkPieces) {
+    return Wrong(fmt::format("has {} pieces, must have 1 to {}", pieces_.size(), kMostVtkPieces));
+  }
   return appended_ > 0 ? FindAppended() : Status::Ok();
+}
+
+// An array without the attribute TimeStep is that of all times.
+Status VtkXmlFile::TakeTime(const ReadOptions& options) {
+  const auto words = [](const std::string& text) {
+    std::istringstream stream(text);
+    return std::vector<std::string>(std::istream_iterator<std::string>(stream), {});
+  };
+  times_ = std::max<std::int64_t>(1, std::int64_t(words(dataset_.Attribute("TimeValues")).size()));
+  const Result<std::int64_t> time = ChosenVolume(path_, times_, options);
+  if (!time.ok()) return time.status();
+  time_ = *time;
+  std::erase_if(arrays_, [&](const VtkArray& array) {
+    const std::vector<std::string> steps = words(array.tag.Attribute("TimeStep"));
+    return !steps.empty() && std::ranges::find(steps, std::to_string(time_)) == steps.end();
+  });
+  return Status::Ok();
+}
+
+GridArray VtkXmlFile::Described(const VtkArray& array) const {
+  const bool of_points = array.section == "PointData";
+  const std::string& active = ActiveScalars(array.section);
+  const std::string type_name = array.tag.Attribute("type"), components = array.tag.Attribute("NumberOfComponents");
+  const auto* const type = std::ranges::find(kTypes, type_name, [](const auto& entry) { return entry.first; });
+  return {.name = array.name(),
+          .at = of_points ? ValuesAt::kPoints : ValuesAt::kCells,
+          .type = type == kTypes.end() ? std::nullopt : std::optional(type->second),
+          .type_name = type_name,
+          .components = components.empty() ? 1 : ParseNumber<int>(components).value_or(0),
+          .active = !active.empty() && active == array.name()};
+}
+
+OfferedArrays VtkXmlFile::Offered() const {
+  OfferedArrays offered;
+  for (std::size_t i = 0; i < arrays_.size(); ++i) {
+    const VtkArray& array = arrays_[i];
+    if (array.piece != 0 || (array.section != "PointData" && array.section != "CellData")) continue;
+    offered.arrays.push_back(Described(array));
+    offered.numbers.push_back(i);
+  }
+  return offered;
+}
+
+Result<const VtkArray*> VtkXmlFile::Find(std::size_t piece, std::string_view section, const std::string& name) const {
+  for (const VtkArray& array : arrays_) {
+    if (array.piece == piece && array.section == section && (name.empty() || array.name() == name)) return &array;
+  }
+  return Wrong(fmt::format("has no array {} in {}{}", name, section, pieces_.size() > 1 ? fmt::format(" of piece {}", piece) : ""));
 }
 
 Status VtkXmlFile::FindAppended() {
@@ -225,6 +292,15 @@ Status VtkXmlFile::FindAppended() {
   if (c != '_') return Damaged("no underscore begins its appended samples");
   appended_ = cursor.offset();
   return Status::Ok();
+}
+
+Result<const VtkArray*> VtkXmlFile::FindLike(std::size_t piece, const VtkArray& array) const {
+  const Result<const VtkArray*> found = Find(piece, array.section, array.name());
+  if (!found.ok()) return found;
+  const GridArray wanted = Described(array), described = Described(**found);
+  if (described.type == wanted.type && described.components == wanted.components) return found;
+  return Wrong(fmt::format("array {} has {} components of {} in piece {}, must have {} of {}", array.name(), described.components,
+                           described.type_name, piece, wanted.components, wanted.type_name));
 }
 
 Result<std::vector<double>> VtkXmlFile::Numbers(const XmlTag& tag, const std::string& key, std::size_t count,
@@ -243,27 +319,28 @@ Result<std::vector<double>> VtkXmlFile::Numbers(const XmlTag& tag, const std::st
 }
 
 Result<VtkArrayType> VtkXmlFile::TypeOf(const VtkArray& array, int most_components) const {
-  const std::string type_name = array.tag.Attribute("type"), components = array.tag.Attribute("NumberOfComponents");
-  const auto* const type = std::ranges::find(kTypes, type_name, [](const auto& entry) { return entry.first; });
-  if (type == kTypes.end()) return Wrong(fmt::format("array {}: type '{}' is not supported", array.name(), type_name));
-  const VtkArrayType result = {type->second, components.empty() ? 1 : ParseNumber<int>(components).value_or(0)};
-  if (result.components >= 1 && result.components <= most_components) return result;
-  return Wrong(fmt::format("array {}: NumberOfComponents is '{}', must be in [1, {}]", array.name(), components, most_components));
+  const GridArray described = Described(array);
+  if (!described.type) return Wrong(fmt::format("array {}: type '{}' is not supported", array.name(), described.type_name));
+  if (described.components >= 1 && described.components <= most_components) return VtkArrayType{*described.type, described.components};
+  return Wrong(fmt::format("array {}: NumberOfComponents is '{}', must be in [1, {}]", array.name(),
+                           array.tag.Attribute("NumberOfComponents"), most_components));
 }
 
 Result<VtkXmlFile::Place> VtkXmlFile::PlaceOf(const VtkArray& array) const {
   const std::string name = array.name(), format = array.tag.Attribute("format"), compressor = file_.Attribute("compressor");
   const bool appended = format == "appended";
   Place place = {.text = format == "ascii", .begin = array.begin, .end = array.end};
-  place.compressed = !place.text && !compressor.empty();
-  if (place.compressed && compressor != "vtkZLibDataCompressor") {
-    return Wrong(fmt::format("compressor {} is not supported; supported: vtkZLibDataCompressor", compressor));
+  if (!place.text && !compressor.empty()) {
+    place.compressor = FindNamed(Compressors(), compressor);
+    if (place.compressor == nullptr) {
+      return Wrong(fmt::format("compressor {} is not supported; supported: {}", compressor, NamesOf(Compressors())));
+    }
   }
   if (!place.text && !appended && format != "binary") {
     return Wrong(fmt::format("array {}: format '{}', must be ascii, binary or appended", name, format));
   }
-  place.base64 = !appended || appended_encoding_ == "base64";
-  if (appended && !place.base64 && appended_encoding_ != "raw") {
+  place.base64 = !appended || appended_encoding_ != "raw";
+  if (appended && place.base64 && appended_encoding_ != "base64" && !appended_encoding_.empty()) {
     return Wrong(fmt::format("its appended samples have encoding '{}', must be raw or base64", appended_encoding_));
   }
   std::error_code error;
@@ -283,7 +360,7 @@ Status VtkXmlFile::CheckHolds(const VtkArray& array, SampleType type, std::int64
   if (!place.ok()) return place.status();
   // A text has a digit and a blank for each sample, at least.
   const std::int64_t bytes = samples * std::int64_t(BytesPerSample(type));
-  const std::int64_t least = place->text ? 2 * samples - 1 : place->compressed ? bytes / kMaxDeflateRatio : bytes;
+  const std::int64_t least = place->text ? 2 * samples - 1 : place->compressor != nullptr ? bytes / place->compressor->most_ratio : bytes;
   if (place->end - place->begin >= least) return Status::Ok();
   return Damaged(fmt::format("truncated: array {} has {} bytes, its {} samples need at least {}", array.name(),
                              std::max<std::int64_t>(place->end - place->begin, 0), samples, least));
@@ -297,7 +374,7 @@ Result<VtkXmlFile::PlainSamples> VtkXmlFile::FindPlainSamples(const VtkArray& ar
   if (Status status = CheckHolds(array, type, samples); !status.ok()) return status;
   const Result<Place> place = PlaceOf(array);
   if (!place.ok()) return place.status();
-  if (place->text || place->base64 || place->compressed) {
+  if (place->text || place->base64 || place->compressor != nullptr) {
     return Wrong(fmt::format("array {}: its samples are text, base64 or compressed", array.name()));
   }
   ByteSource source(path_, place->begin, place->end, false);
@@ -317,7 +394,8 @@ Status VtkXmlFile::ReadSamples(const VtkArray& array, SampleType type, AlignedVe
   } else {
     ByteSource source(path_, place->begin, place->end, place->base64);
     const HeaderFormat header = HeaderOf(file_);
-    status = place->compressed ? ReadBlocks(source, header, place->file_bytes, out) : ReadPlain(source, header, out);
+    status = place->compressor != nullptr ? ReadBlocks(source, header, *place->compressor->codec, place->file_bytes, out)
+                                          : ReadPlain(source, header, out);
     if (header.big_endian) SwapByteOrder(type, out);
   }
   return InArray(array, status);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "common/base/log.h"
@@ -88,18 +89,16 @@ Reach ReachOf(double per_step, std::int32_t count) {
 }
 
 template <class T>
-void CopyTurned(const VoxelBlock& from, const AxisTurn& turn, VoxelBlock& to) {
+void CopyTurned(const T* first, const Index3& stored, const AxisTurn& turn, T* out) {
   constexpr std::int32_t kTile = 32;  // voxels a side: what is read and written of a tile stays in a cache
-  const Index3 stored = from.box.size(), size = to.box.size();
+  const Index3 size = {stored[turn.from[0]], stored[turn.from[1]], stored[turn.from[2]]};
   const std::array<std::int64_t, 3> strides = {1, stored.x, std::int64_t{stored.x} * stored.y};
   std::array<std::int64_t, 3> step{};
-  const T* first = from.samples<T>();
   for (std::size_t i = 0; i < 3; ++i) {
     const std::int64_t stride = strides[std::size_t(turn.from[i])];
     step[i] = turn.flipped[i] ? -stride : stride;
     if (turn.flipped[i]) first += stride * (size[int(i)] - 1);
   }
-  T* const out = to.samples<T>();
   const auto copy = [&](const Index3& begin, const Index3& end) {
     for (std::int32_t z = begin.z; z < end.z; ++z) {
       for (std::int32_t y = begin.y; y < end.y; ++y) {
@@ -116,14 +115,22 @@ void CopyTurned(const VoxelBlock& from, const AxisTurn& turn, VoxelBlock& to) {
   }
 }
 
+// The nearest value of the type, halves away from zero.
 template <class T>
-void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, VoxelBlock& to) {
-  const Index3 slanted = from.box.size(), size = to.box.size();
-  const T* const in = from.samples<T>();
-  T* out = to.samples<T>();
+T Rounded(double value) {
+  if constexpr (!std::is_integral_v<T>) {
+    return T(value);
+  } else {
+    // The first double above all values; converting it would be undefined.
+    return value >= std::ldexp(1.0, std::numeric_limits<T>::digits) ? std::numeric_limits<T>::max() : T(std::round(value));
+  }
+}
+
+template <class T>
+void SampleStraight(const T* in, const Index3& slanted, const Slant& slant, double outside, Sampling sampling, T* out, const Index3& size) {
+  const auto is_inside = [&](std::int32_t x, std::int32_t y) { return x >= 0 && x < slanted.x && y >= 0 && y < slanted.y; };
   const auto sample = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
-    const bool inside = x >= 0 && x < slanted.x && y >= 0 && y < slanted.y;
-    return inside ? double(in[NumberIn(slanted, {x, y, z})]) : outside;
+    return is_inside(x, y) ? double(in[NumberIn(slanted, {x, y, z})]) : outside;
   };
   for (std::int32_t z = 0; z < size.z; ++z) {
     for (std::int32_t straight_y = 0; straight_y < size.y; ++straight_y) {
@@ -132,12 +139,17 @@ void SampleStraight(const VoxelBlock& from, const Slant& slant, double outside, 
       const double beyond_y = y - y0;
       for (std::int32_t straight_x = 0; straight_x < size.x; ++straight_x) {
         const double x = straight_x + slant.first.x - slant.x_per_y * y - slant.x_per_z * z;
+        if (sampling == Sampling::kNearest) {
+          const auto nearest_x = std::int32_t(std::floor(x + 0.5)), nearest_y = std::int32_t(std::floor(y + 0.5));
+          *out++ = is_inside(nearest_x, nearest_y) ? in[NumberIn(slanted, {nearest_x, nearest_y, z})] : Rounded<T>(outside);
+          continue;
+        }
         const auto x0 = std::int32_t(std::floor(x));
         const double beyond_x = x - x0;
         const double near = std::lerp(sample(x0, y0, z), sample(x0 + 1, y0, z), beyond_x);
         const double far = std::lerp(sample(x0, y0 + 1, z), sample(x0 + 1, y0 + 1, z), beyond_x);
         const double value = std::lerp(near, far, beyond_y);
-        *out++ = std::is_integral_v<T> ? T(std::lround(value)) : T(value);
+        *out++ = Rounded<T>(value);
       }
     }
   }
@@ -207,16 +219,21 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
   return placed;
 }
 
-VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn) {
-  const Index3 stored = block.box.size();
-  VoxelBlock turned = MakeVoxelBlock({{0, 0, 0}, {stored[turn.from[0]], stored[turn.from[1]], stored[turn.from[2]]}}, block.type);
-  VisitScalarType(block.type, [&]<class T>(const T*) { CopyTurned<T>(block, turn, turned); });
+AlignedVector<std::byte> TurnVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const AxisTurn& turn) {
+  AlignedVector<std::byte> turned(samples.size());
+  VisitSampleType(type, [&]<class T>(const T*) {
+    CopyTurned(reinterpret_cast<const T*>(samples.data()), size, turn, reinterpret_cast<T*>(turned.data()));
+  });
   return turned;
 }
 
-VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside) {
-  VoxelBlock straight = MakeVoxelBlock({{0, 0, 0}, size}, block.type);
-  VisitScalarType(block.type, [&]<class T>(const T*) { SampleStraight<T>(block, slant, outside, straight); });
+AlignedVector<std::byte> StraightenVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const Slant& slant,
+                                          const Index3& straight_size, double outside, Sampling sampling) {
+  AlignedVector<std::byte> straight(CountIn(straight_size) * BytesPerSample(type));
+  VisitSampleType(type, [&]<class T>(const T*) {
+    SampleStraight(reinterpret_cast<const T*>(samples.data()), size, slant, outside, sampling, reinterpret_cast<T*>(straight.data()),
+                   straight_size);
+  });
   return straight;
 }
 

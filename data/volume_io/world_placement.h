@@ -1,6 +1,6 @@
 // From the axes that a file stores its voxels in to those nearest to its world's. Voxels are turned (axes exchanged and run backwards),
 // which moves samples and changes none. If the stored axes are not at right angles, as in CT with a tilted gantry, the voxels are
-// straightened: sampled anew on a grid whose axes are, by linear interpolation within slices.
+// straightened: sampled anew on a grid whose axes are, within slices: measurements by linear interpolation, labels by the nearest voxel.
 #pragma once
 
 #include <array>
@@ -43,9 +43,12 @@ Result<WorldPlacement> PlaceInWorld(const RawHeader& header, const std::string& 
 bool IsFinite(const Vec3& v);
 std::string InBrackets(const Vec3& v);  // "(0, 1.5, nan)", for messages
 
-// `block`: the whole volume as stored.
-VoxelBlock TurnVoxels(const VoxelBlock& block, const AxisTurn& turn);
-// `outside`: what voxels of the straight grid hold that the slanted one does not reach, a sample.
-VoxelBlock StraightenVoxels(const VoxelBlock& block, const Slant& slant, const Index3& size, double outside);
+// `samples`: of a whole volume of `size` voxels as stored.
+AlignedVector<std::byte> TurnVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const AxisTurn& turn);
+enum class Sampling { kLinear, kNearest };
+// `size`: of the slanted grid; `straight_size`: of the straight one. `outside`: what voxels of it hold that the slanted one does not reach,
+// a sample.
+AlignedVector<std::byte> StraightenVoxels(SampleType type, const AlignedVector<std::byte>& samples, const Index3& size, const Slant& slant,
+                                          const Index3& straight_size, double outside, Sampling sampling);
 
 }  // namespace slabstream

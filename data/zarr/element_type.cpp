@@ -8,25 +8,27 @@
 #include <optional>
 #include <type_traits>
 
+#include "common/base/parse_number.h"
+
 namespace slabstream::zarr {
 namespace {
 
 using metadata::Field;
 using metadata::Json;
 
+// "NaN", "-Infinity", "0.5", or the bits in hexadecimal.
 template <class T>
 std::optional<T> FloatOf(const std::string& text) {
-  using Limits = std::numeric_limits<T>;
   using Bits = std::conditional_t<sizeof(T) == 2, std::uint16_t, std::conditional_t<sizeof(T) == 4, std::uint32_t, std::uint64_t>>;
-  if (text == "NaN") return Limits::quiet_NaN();
-  if (text == "Infinity") return Limits::infinity();
-  if (text == "-Infinity") return T(-Limits::infinity());
+  if (!text.starts_with("0x")) {
+    const std::optional<double> number = ParseNumber<double>(text);
+    return number ? std::optional(T(*number)) : std::nullopt;
+  }
   Bits bits = 0;
   const char* const end = text.data() + text.size();
-  if (text.size() != 2 + 2 * sizeof(T) || !text.starts_with("0x")) return std::nullopt;
   constexpr int kHexadecimal = 16;
   const auto read = std::from_chars(text.data() + 2, end, bits, kHexadecimal);
-  if (read.ec != std::errc() || read.ptr != end) return std::nullopt;
+  if (text.size() != 2 + 2 * sizeof(T) || read.ec != std::errc() || read.ptr != end) return std::nullopt;
   return std::bit_cast<T>(bits);
 }
 
@@ -57,7 +59,11 @@ std::optional<T> ElementOf(const Json& value) {
     if (!value.is_number()) return std::nullopt;
     return T(value.get<double>());
   } else {
-    return WholeOf<T>(value);
+    if (!value.is_string()) return WholeOf<T>(value);
+    const std::string& text = value.get_ref<const std::string&>();
+    if (const std::optional<T> whole = ParseNumber<T>(text)) return whole;
+    const std::optional<double> number = ParseNumber<double>(text);
+    return number ? WholeOf<T>(Json(*number)) : std::nullopt;
   }
 }
 
@@ -80,9 +86,9 @@ Result<ElementType> ReadDtype(const Field& dtype) {
 }
 
 Result<SampleType> ReadDataType(const Field& data_type) {
-  if (data_type.is_text() && data_type.value() == "bool") return SampleType::kUint8;
-  const std::optional<SampleType> type =
-      data_type.is_text() ? SampleTypeNamed(data_type.value().get_ref<const std::string&>()) : std::nullopt;
+  const Field name = data_type.is_text() ? data_type : data_type["name"];  // as every extension point may be written
+  if (name.is_text() && name.value() == "bool") return SampleType::kUint8;
+  const std::optional<SampleType> type = name.is_text() ? SampleTypeNamed(name.value().get_ref<const std::string&>()) : std::nullopt;
   if (!type) return data_type.Wrong("bool or one of " + SampleTypeNames());
   return *type;
 }

@@ -20,8 +20,8 @@ Result<ElementType> ReadDtype(const metadata::Field& dtype);
 // Version 3: "uint16".
 Result<SampleType> ReadDataType(const metadata::Field& data_type);
 
-// One element in this machine's byte order: a number, null (0), true, false; of floats also "NaN", "Infinity", "-Infinity", or their bits
-// in hexadecimal such as "0x7fc00000".
+// One element in this machine's byte order: a number, null (0), true, false, or a number as a text, such as "0"; of floats also "NaN",
+// "Infinity", "-Infinity", or their bits in hexadecimal such as "0x7fc00000".
 Result<std::vector<std::byte>> ReadFill(const metadata::Field& fill, SampleType type);
 
 }  // namespace slabstream::zarr

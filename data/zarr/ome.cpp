@@ -3,102 +3,19 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <utility>
 
-#include "data/sources/chunked_array.h"
-#include "data/volume_io/length_names.h"
+#include "common/base/printable.h"
 
 namespace slabstream::zarr {
 namespace {
 
 using metadata::Field;
 
-constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostTransformations = 8;
-
-// From Zarr 3 on, what OME says has a member of its own.
-Field OmeField(const Field& attributes, int zarr_version) { return zarr_version == 3 ? attributes["ome"] : attributes; }
-
-bool IsSpace(AxisKind kind) { return kind == AxisKind::kX || kind == AxisKind::kY || kind == AxisKind::kZ; }
-
-Result<OmeAxis> ReadAxis(const Field& field) {
-  const Field name_field = field.is_text() ? field : field["name"];  // before 0.4 an axis is its name
-  const Result<std::string> name = name_field.Text();
-  if (!name.ok()) return name.status();
-  OmeAxis axis{.name = *name, .kind = AxisNamed(*name)};
-  if (const Field type = field["type"]; type.is_text()) {
-    if (type.value() == "time") axis.kind = AxisKind::kTime;
-    if (type.value() == "channel") axis.kind = AxisKind::kChannel;
-    if (type.value() == "space" && !IsSpace(axis.kind)) {
-      return name_field.Wrong("x, y or z, as the axes of type space are called");
-    }
-  }
-  if (const Field unit = field["unit"]; unit.is_text() && IsSpace(axis.kind)) {
-    axis.unit = LengthUnitNamed(unit.value().get_ref<const std::string&>());
-  }
-  return axis;
-}
-
-Result<std::vector<OmeAxis>> ReadAxes(const Field& field) {
-  std::vector<OmeAxis> axes;
-  if (!field.stated()) {  // 0.1 and 0.2
-    for (const char* const name : {"t", "c", "z", "y", "x"}) axes.push_back({name, AxisNamed(name)});
-    return axes;
-  }
-  if (!field.is_array() || field.size() < 2 || field.size() > kMaxArrayAxes) {
-    return field.Wrong(fmt::format("a list of 2 to {} axes", kMaxArrayAxes));
-  }
-  for (std::size_t i = 0; i < field.size(); ++i) {
-    Result<OmeAxis> axis = ReadAxis(field[i]);
-    if (!axis.ok()) return axis.status();
-    const bool twice = axis->kind != AxisKind::kOther && std::ranges::find(axes, axis->kind, &OmeAxis::kind) != axes.end();
-    if (twice) return field[i].Wrong("another axis than those before it");
-    axes.push_back(*std::move(axis));
-  }
-  for (const AxisKind kind : {AxisKind::kX, AxisKind::kY}) {
-    if (std::ranges::find(axes, kind, &OmeAxis::kind) == axes.end()) return field.Wrong("axes of which one is x and one is y");
-  }
-  return axes;
-}
-
-struct Stated {
-  bool scale = false, translation = false;
-};
-
-// Applies a list of transformations to what `level` has so far. What they are.
-Result<Stated> Transform(const Field& list, const std::vector<OmeAxis>& axes, OmeLevel& level) {
-  if (!list.stated()) return Stated{};
-  if (!list.is_array() || list.size() > kMostTransformations) {
-    return list.Wrong(fmt::format("a list of at most {} transformations", kMostTransformations));
-  }
-  Stated stated;
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    const Field one = list[i], type = one["type"];
-    if (type.is_text() && type.value() == "identity") continue;
-    const bool scale = type.is_text() && type.value() == "scale";
-    if (!scale && !(type.is_text() && type.value() == "translation")) return type.Wrong("scale or translation");
-    const Field numbers = one[scale ? "scale" : "translation"];
-    if (!numbers.is_array() || numbers.size() != axes.size()) return numbers.Wrong(fmt::format("a list of {} numbers", axes.size()));
-    for (std::size_t axis = 0; axis < axes.size(); ++axis) {
-      const Result<double> number = numbers[axis].Number();
-      if (!number.ok()) return number.status();
-      if (scale) {
-        level.scale[axis] *= *number;
-        level.translation[axis] *= *number;
-      } else {
-        level.translation[axis] += *number;
-      }
-      if (!IsSpace(axes[axis].kind)) continue;
-      if (scale && !(*number > 0)) return numbers[axis].Wrong("above 0");
-      if (!(level.scale[axis] > 0) || !std::isfinite(level.scale[axis]) || !std::isfinite(level.translation[axis])) {
-        return numbers[axis].Wrong("such that all scales and translations are finite");
-      }
-    }
-    (scale ? stated.scale : stated.translation) = true;
-  }
-  return stated;
-}
+constexpr std::size_t kMostLevels = 64, kMostDescribed = 4096, kMostLooks = 65536;
 
 OmeChannel ReadChannel(const Field& field) {
   OmeChannel channel;
@@ -108,35 +25,110 @@ OmeChannel ReadChannel(const Field& field) {
   return channel;
 }
 
-}  // namespace
-
-AxisKind AxisNamed(std::string_view name) {
-  std::string lower(name);
-  std::ranges::transform(lower, lower.begin(), [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-  static constexpr std::pair<std::string_view, AxisKind> kNames[] = {{"x", AxisKind::kX},
-                                                                     {"y", AxisKind::kY},
-                                                                     {"z", AxisKind::kZ},
-                                                                     {"t", AxisKind::kTime},
-                                                                     {"time", AxisKind::kTime},
-                                                                     {"c", AxisKind::kChannel},
-                                                                     {"channel", AxisKind::kChannel}};
-  const auto* const found = std::ranges::find(kNames, lower, [](const auto& known) { return known.first; });
-  return found == std::end(kNames) ? AxisKind::kOther : found->second;
+// "0.4", "0.5.2", "0.4-dev-spatialdata"
+bool IsKnownVersion(std::string_view version) {
+  const bool known = version.size() >= 3 && version.starts_with("0.") && version[2] >= '1' && version[2] <= '6';
+  return known && (version.size() == 3 || version[3] < '0' || version[3] > '9');
 }
 
-bool IsOmeImage(const Field& attributes, int zarr_version) { return OmeField(attributes, zarr_version)["multiscales"].stated(); }
+Result<std::string> ReadVersion(const Field& version, std::string_view usual) {
+  if (!version.given()) return std::string(usual);
+  const std::string text = version.is_text() ? *version.Text() : version.value().dump();
+  return IsKnownVersion(text) ? Result<std::string>(text) : version.Wrong("a version of OME-Zarr from 0.1 to 0.6");
+}
 
-Result<OmeImage> ParseOmeImage(const Field& attributes, int zarr_version) {
-  const Field ome = OmeField(attributes, zarr_version), images = ome["multiscales"], image = images[0], datasets = image["datasets"];
+// Up to 0.5 an image has axes; then it has coordinate systems, into one of which the transformations of its levels lead.
+Field AxesOf(const Field& image) {
+  const Field systems = image["coordinateSystems"];
+  if (!systems.is_array()) return image["axes"];
+  const Field output = image["datasets"][0]["coordinateTransformations"][0]["output"], name = output.is_text() ? output : output["name"];
+  for (std::size_t i = 0; i < std::min(systems.size(), kMostLevels); ++i) {
+    if (name.is_text() && systems[i]["name"].is_text() && systems[i]["name"].value() == name.value()) return systems[i]["axes"];
+  }
+  return systems[0]["axes"];
+}
+
+bool AreIdentities(const Field& transformations) {
+  bool all = true;
+  for (std::size_t i = 0; i < transformations.size(); ++i) {
+    const Field type = transformations[i]["type"];
+    all = all && type.is_text() && type.value() == "identity";
+  }
+  return all;
+}
+
+// What axes say that is not taken.
+std::vector<std::string> NotesOfAxes(const Field& fields, const std::vector<OmeAxis>& axes) {
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const Field unit = fields[i]["unit"];
+    if (fields[i]["orientation"].given())
+      notes.push_back(Printable(fmt::format("the orientation of axis {} is not applied", axes[i].name)));
+    if (!IsSpace(axes[i].kind) || axes[i].unit || !unit.is_text()) continue;
+    notes.push_back(Printable(fmt::format("the unit '{}' of axis {} is not known, so lengths have none", *unit.Text(), axes[i].name)));
+  }
+  return notes;
+}
+
+// Colours and names of labels, by their values.
+std::vector<StatedLabel> ReadLooks(const Field& label_image) {
+  std::map<std::uint64_t, StatedLabel> looks;
+  const auto look_of = [&](const Field& entry) -> StatedLabel* {
+    const Result<std::uint64_t> value = entry["label-value"].Whole(1, std::numeric_limits<std::uint64_t>::max());
+    if (!value.ok() || (looks.size() >= kMostLooks && !looks.contains(*value))) return nullptr;
+    return &looks.try_emplace(*value, StatedLabel{.value = *value}).first->second;
+  };
+  const Field colors = label_image["colors"], properties = label_image["properties"];
+  for (std::size_t i = 0; colors.is_array() && i < colors.size(); ++i) {
+    std::array<float, 3> color{};
+    bool right = true;
+    for (std::size_t component = 0; component < 3; ++component) {
+      const Result<double> code = colors[i]["rgba"][component].Number();
+      right = right && code.ok();
+      if (right) color.at(component) = float(std::clamp(*code / 255, 0.0, 1.0));
+    }
+    if (StatedLabel* const look = right ? look_of(colors[i]) : nullptr) look->color = color;
+  }
+  for (std::size_t i = 0; properties.is_array() && i < properties.size(); ++i) {
+    for (const char* const key : {"name", "label", "class"}) {
+      const Field name = properties[i][key];
+      StatedLabel* const look = name.is_text() ? look_of(properties[i]) : nullptr;
+      if (look != nullptr && look->name.empty()) look->name = *name.Text();
+    }
+  }
+  std::vector<StatedLabel> ascending;
+  for (auto& [value, look] : looks) ascending.push_back(std::move(look));
+  return ascending;
+}
+
+}  // namespace
+
+Field OmeField(const Field& attributes) {
+  const Field ome = attributes["ome"];
+  return ome.is_object() && (ome["multiscales"].stated() || !attributes["multiscales"].stated()) ? ome : attributes;
+}
+
+bool IsOmeImage(const Field& attributes) { return OmeField(attributes)["multiscales"].stated(); }
+
+Result<OmeImage> ParseOmeImage(const Field& attributes) {
+  const Field ome = OmeField(attributes), images = ome["multiscales"], image = images[0], datasets = image["datasets"];
   if (!images.is_array() || images.size() < 1) return images.Wrong("a list of images");
   OmeImage read;
-  const Field version = zarr_version == 3 ? ome["version"] : image["version"];
-  read.version = version.is_text() ? *version.Text() : zarr_version == 3 ? "0.5" : "0.4";
-  static constexpr std::array<std::string_view, 5> kVersions = {"0.1", "0.2", "0.3", "0.4", "0.5"};
-  if (std::ranges::find(kVersions, read.version) == kVersions.end()) return version.Wrong("a version of OME-Zarr from 0.1 to 0.5");
-  Result<std::vector<OmeAxis>> axes = ReadAxes(image["axes"]);
+  const Result<std::string> version =
+      ReadVersion(ome["version"].given() ? ome["version"] : image["version"], attributes["ome"].is_object() ? "0.5" : "0.4");
+  if (!version.ok()) return version.status();
+  read.version = *version;
+  const Field axes_field = AxesOf(image), of_all = image["coordinateTransformations"];
+  Result<std::vector<OmeAxis>> axes = ReadOmeAxes(axes_field);
   if (!axes.ok()) return axes.status();
   read.axes = *std::move(axes);
+  read.notes = NotesOfAxes(axes_field, read.axes);
+  // From 0.6 on, and as spatialdata writes them, these lead to further coordinate systems; else they move all levels alike.
+  const bool further = image["coordinateSystems"].is_array() || of_all[0]["output"].given();
+  if (further && !AreIdentities(of_all)) {
+    read.notes.emplace_back("places are those of the image's own coordinate system; its transformations to others are not applied");
+  }
+  if (images.size() > 1) read.notes.push_back(fmt::format("of {} multiscales the first one is shown", images.size()));
 
   if (!datasets.is_array() || datasets.size() < 1 || datasets.size() > kMostLevels) {
     return datasets.Wrong(fmt::format("a list of 1 to {} levels", kMostLevels));
@@ -144,21 +136,21 @@ Result<OmeImage> ParseOmeImage(const Field& attributes, int zarr_version) {
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     const Result<std::string> path = datasets[i]["path"].Text();
     if (!path.ok()) return path.status();
-    OmeLevel level{*path, std::vector<double>(read.axes.size(), 1.0), std::vector<double>(read.axes.size(), 0.0)};
-    const Result<Stated> stated = Transform(datasets[i]["coordinateTransformations"], read.axes, level);
-    if (!stated.ok()) return stated.status();
-    read.scaled = read.scaled || stated->scale;
-    read.translated = read.translated || stated->translation;
-    const Result<Stated> all = Transform(image["coordinateTransformations"], read.axes, level);  // moves all levels alike
-    if (!all.ok()) return all.status();
+    OmeLevel level{*path, {std::vector<double>(read.axes.size(), 1.0), std::vector<double>(read.axes.size(), 0.0)}};
+    Status status = ApplyTransformations(datasets[i]["coordinateTransformations"], read.axes, level.place);
+    read.scaled = read.scaled || level.place.scaled;
+    read.translated = read.translated || level.place.translated;
+    if (status.ok() && !further) status = ApplyTransformations(of_all, read.axes, level.place);
+    if (!status.ok()) return status;
     read.levels.push_back(std::move(level));
   }
 
-  const Field channels = ome["omero"]["channels"];
+  const Field channels = ome["omero"]["channels"], label_image = ome["image-label"];
   for (std::size_t i = 0; channels.is_array() && i < std::min(channels.size(), kMostDescribed); ++i) {
     read.channels.push_back(ReadChannel(channels[i]));
   }
-  read.labels = ome["image-label"].stated();
+  read.labels = label_image.stated();
+  read.looks = ReadLooks(label_image);
   return read;
 }
 

@@ -1,4 +1,4 @@
-// What the attributes of an OME-Zarr image say (https://ngff.openmicroscopy.org, 0.4 and 0.5; images of 0.1 to 0.3 are read, too): which
+// What the attributes of an OME-Zarr image say (https://ngff.openmicroscopy.org, 0.4 to 0.6; images of 0.1 to 0.3 are read, too): which
 // arrays are its levels, what their axes are, and where the voxels lie.
 //
 // Pure. Every number is checked.
@@ -13,21 +13,14 @@
 #include "common/volume/orientation.h"
 #include "common/volume/summary.h"
 #include "data/metadata/json_fields.h"
+#include "data/volume_io/stated_label.h"
+#include "data/zarr/ome_axes.h"
 
 namespace slabstream::zarr {
 
-enum class AxisKind : std::uint8_t { kX, kY, kZ, kTime, kChannel, kOther };
-
-struct OmeAxis {
-  std::string name;  // "z"
-  AxisKind kind = AxisKind::kOther;
-  std::optional<LengthUnit> unit = {};  // of x, y and z
-};
-
 struct OmeLevel {
   std::string path;  // of its array, from the group
-  // Of each axis: position = scale * index + translation. Scales along x, y and z are above 0.
-  std::vector<double> scale, translation;
+  OmePlace place;
 };
 
 struct OmeChannel {
@@ -39,18 +32,21 @@ struct OmeImage {
   std::string version;                      // "0.4"
   std::vector<OmeAxis> axes;                // slowest first
   std::vector<OmeLevel> levels;             // finest first, at least one
-  bool scaled = false, translated = false;  // a level states its scale, its translation
+  bool scaled = false, translated = false;  // a level states it
   std::vector<OmeChannel> channels;         // those that are described, perhaps none
   bool labels = false;
+  std::vector<StatedLabel> looks = {};  // values ascend
+  std::vector<std::string> notes = {};  // SourceInfo::notes
 };
 
-// `attributes`: of a group of that version of Zarr. Whether it is an image.
-bool IsOmeImage(const metadata::Field& attributes, int zarr_version);
+// What OME says in the attributes of a group: their member "ome", as from Zarr 3 on, or the attributes themselves, as some write there,
+// too.
+metadata::Field OmeField(const metadata::Field& attributes);
+
+// `attributes`: of a group. Whether it is an image.
+bool IsOmeImage(const metadata::Field& attributes);
 
 // InvalidArgument, naming the field: it is missing, wrong, or something that is not supported.
-Result<OmeImage> ParseOmeImage(const metadata::Field& attributes, int zarr_version);
-
-// The axis that a name stands for, in upper or lower case: x, y, z, t, c, time, channel.
-AxisKind AxisNamed(std::string_view name);
+Result<OmeImage> ParseOmeImage(const metadata::Field& attributes);
 
 }  // namespace slabstream::zarr

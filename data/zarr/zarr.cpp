@@ -17,17 +17,17 @@ bool IsArchive(const std::string& path) { return path.ends_with(".zip") || path.
 
 bool Recognises(const std::string& path, const ReadOptions&) {
   std::error_code error;
-  const auto is_there = [&](const char* name) { return std::filesystem::is_regular_file(std::filesystem::path(path) / name, error); };
-  if (std::filesystem::is_directory(path, error)) return is_there(kNode3) || is_there(kArray2) || is_there(kGroup2);
+  const auto is_there = [&](std::string_view name) { return std::filesystem::is_regular_file(std::filesystem::path(path) / name, error); };
+  if (std::filesystem::is_directory(path, error)) return std::ranges::any_of(kNodeObjects, is_there);
   if (!IsArchive(path)) return false;
   const Result<std::shared_ptr<Store>> archive = ZipStore(path);
   const Result<std::vector<std::string>> names = archive.ok() ? (*archive)->List("") : archive.status();
-  const auto has = [&](const char* name) { return std::ranges::find(*names, name) != names->end(); };
-  return names.ok() && (has(kNode3) || has(kArray2) || has(kGroup2));
+  const auto has = [&](std::string_view name) { return std::ranges::find(*names, name) != names->end(); };
+  return names.ok() && std::ranges::any_of(kNodeObjects, has);
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();
@@ -40,8 +40,8 @@ Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOp
 SourceFormat Zarr() {
   return {.name = "Zarr",
           .recognises = zarr::Recognises,
-          .options = {"time", "channel", "spacing", "array"},
-          .markers = {zarr::kNode3, zarr::kArray2, zarr::kGroup2, zarr::kAttributes2},
+          .options = {"time", "channel", "spacing", "array", "follow-links"},
+          .markers = {zarr::kNodeObjects.begin(), zarr::kNodeObjects.end()},
           .open = zarr::Open};
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <atomic>
 #include <utility>
 
 #include "common/base/guarded.h"
@@ -25,11 +26,42 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
       : context_(std::move(context)), path_(std::move(path)), layout_(std::move(layout)) {}
 
   const ArrayShape& shape() const override { return layout_.shape; }
+  std::string NameOf(std::span<const std::uint64_t> index) const override { return NameOf(KeyOf(index, separator_)); }
 
   void ReadChunk(std::span<const std::uint64_t> index, ChunkDone done) override {
     if (layout_.sharding) return ReadFromShard(*layout_.sharding, index, std::move(done));
-    const std::string key = Join(path_, layout_.Key(index));
-    const std::uint64_t most = MostStored(shape().chunk_bytes());
+    if (layout_.separator_stated || separator_known_) return ReadObject(KeyOf(index, separator_), std::move(done));
+    auto try_other = [self = shared_from_this(), other = KeyOf(index, '/'),
+                      done = std::move(done)](Result<std::optional<StoredChunk>> chunk) mutable {
+      if (!chunk.ok() || *chunk) {
+        self->separator_known_ = true;
+        return done(std::move(chunk));
+      }
+      self->ReadObject(other, [self, done = std::move(done)](Result<std::optional<StoredChunk>> nested) {
+        if (nested.ok() && *nested) {
+          self->separator_ = '/';
+          self->separator_known_ = true;
+        }
+        done(std::move(nested));
+      });
+    };
+    ReadObject(KeyOf(index, separator_), std::move(try_other));
+  }
+
+ private:
+  using Index = ShardIndices::Index;
+
+  std::string NameOf(const std::string& key) const { return context_.store->name() + "/" + key; }
+
+  // Of the object that holds a chunk: its own, or its shard.
+  std::string KeyOf(std::span<const std::uint64_t> index, char separator) const {
+    std::array<std::uint64_t, kMaxArrayAxes> object{};
+    for (std::size_t i = 0; i < index.size(); ++i) object.at(i) = layout_.sharding ? index[i] / layout_.sharding->chunks[i] : index[i];
+    return Join(path_, layout_.Key(std::span(object).first(index.size()), separator));
+  }
+
+  void ReadObject(const std::string& key, ChunkDone done) {
+    const std::uint64_t most = MostStored(MostEncoded(layout_.codecs, shape().chunk_bytes()));
     auto decode = [self = shared_from_this(), what = NameOf(key), most, done = std::move(done)](Result<Bytes> answer) mutable {
       if (answer.ok() && answer->size() > most) answer = Status::DataLoss(fmt::format("{}: damaged: has more than {} bytes", what, most));
       DecodeOn(self->context_.source, self->layout_.codecs, std::move(answer), self->shape().chunk_bytes(), std::move(what),
@@ -39,19 +71,10 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
     context_.store->Read(key, {.bytes = most + 1}, most + 1, std::move(decode));
   }
 
- private:
-  using Index = ShardIndices::Index;
-
-  std::string NameOf(const std::string& key) const { return context_.store->name() + "/" + key; }
-
   void ReadFromShard(const Sharding& sharding, std::span<const std::uint64_t> index, ChunkDone done) {
-    std::array<std::uint64_t, kMaxArrayAxes> shard{};
     std::uint64_t number = 0;
-    for (std::size_t i = 0; i < index.size(); ++i) {
-      shard.at(i) = index[i] / sharding.chunks[i];
-      number += index[i] % sharding.chunks[i] * sharding.strides[i];
-    }
-    const std::string key = Join(path_, layout_.Key(std::span(shard).first(index.size())));
+    for (std::size_t i = 0; i < index.size(); ++i) number += index[i] % sharding.chunks[i] * sharding.strides[i];
+    const std::string key = KeyOf(index, separator_);
     auto with_index = [self = shared_from_this(), key, number, done = std::move(done)](Result<Index> answer) mutable {
       if (!answer.ok()) return done(answer.status());
       self->ReadIndexed(key, number, *answer, std::move(done));
@@ -86,7 +109,7 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
       if (!chunk.ok()) self->context_.indices->Forget(key);
       done(std::move(chunk));
     };
-    const std::uint64_t bytes = range->bytes, most = MostStored(shape().chunk_bytes());
+    const std::uint64_t bytes = range->bytes, most = MostStored(MostEncoded(layout_.codecs, shape().chunk_bytes()));
     if (bytes > most || range->begin > ~bytes) {
       return decoded(Status::DataLoss(fmt::format("{}: damaged: the index says that it has {} bytes at {}", what, bytes, range->begin)));
     }
@@ -104,6 +127,9 @@ class Array : public ChunkedArray, public std::enable_shared_from_this<Array> {
   const ArrayContext context_;
   const std::string path_;
   const ZarrLayout layout_;
+  // A chunk that was found tells it, where the metadata do not.
+  std::atomic<char> separator_ = layout_.key_separator;
+  std::atomic<bool> separator_known_ = false;
 };
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "data/zarr/element_filters.h"
 
 namespace slabstream::zarr {
 namespace {
@@ -20,13 +21,16 @@ struct NamedCodec {
   SharedCodec (*make)();
 };
 
-// Those of numcodecs, by which version 2 knows them.
-constexpr std::array<NamedCodec, 5> kCompressors = {
-    {{"zlib", ZlibCodec}, {"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"lz4", Lz4Codec}}};
-// Those of version 3 from bytes to bytes.
-constexpr std::array<NamedCodec, 4> kByteCodecs = {
-    {{"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"crc32c", Crc32cCodec}}};
-constexpr std::string_view kNumcodecs = "numcodecs.";  // before their names in version 3
+// From bytes to bytes, by their names in numcodecs, which version 2 uses; version 3 may have "numcodecs." before them.
+constexpr std::array<NamedCodec, 6> kByteCodecs = {
+    {{"zlib", ZlibCodec}, {"gzip", GzipCodec}, {"zstd", ZstdCodec}, {"blosc", BloscCodec}, {"lz4", Lz4Codec}, {"bz2", Bzip2Codec}}};
+struct NamedChecksum {
+  std::string_view name;
+  Checksum checksum;
+  bool in_front;  // unless `location` says something else
+};
+constexpr std::array<NamedChecksum, 3> kChecksums = {
+    {{"crc32c", Checksum::kCrc32c, false}, {"crc32", Checksum::kCrc32, true}, {"adler32", Checksum::kAdler32, true}}};
 
 Result<SharedCodec> ReadShuffle(const Field& settings) {
   const Field element = settings["elementsize"];
@@ -36,19 +40,26 @@ Result<SharedCodec> ReadShuffle(const Field& settings) {
   return ShuffleCodec(*bytes);
 }
 
-// A codec by itself may be its name alone.
-Result<std::string> NameOf(const Field& codec) { return codec.is_text() ? codec.Text() : codec["name"].Text(); }
-Status WrongName(const Field& codec, std::string_view must_be) { return (codec.is_text() ? codec : codec["name"]).Wrong(must_be); }
-
-Result<SharedCodec> ReadByteCodec(const Field& codec, std::string_view name) {
-  const NamedCodec* named = FindNamed(kByteCodecs, name);
-  if (named == nullptr && name.starts_with(kNumcodecs)) {
-    if (name == "numcodecs.shuffle") return ReadShuffle(codec["configuration"]);
-    named = FindNamed(kCompressors, name.substr(kNumcodecs.size()));
+// `name_field`: for messages. `settings`: of the codec.
+Result<SharedCodec> ReadByteCodec(const Field& name_field, std::string_view name, const Field& settings) {
+  if (name == "shuffle") return ReadShuffle(settings);
+  if (const NamedChecksum* const sum = FindNamed(kChecksums, name)) {
+    const Field location = settings["location"];
+    return ChecksumCodec(sum->checksum, location.is_text() ? location.value() == "start" : sum->in_front);
   }
-  if (named == nullptr) return WrongName(codec, "one of " + NamesOf(kByteCodecs) + " here");
-  return named->make();
+  if (const NamedCodec* const named = FindNamed(kByteCodecs, name)) return named->make();
+  return name_field.Wrong(fmt::format("one of {}, {}, shuffle here", NamesOf(kByteCodecs), NamesOf(kChecksums)));
 }
+
+// A codec of version 3 without the prefix of those that numcodecs adds.
+std::string_view WithoutPrefix(std::string_view name) {
+  constexpr std::string_view kNumcodecs = "numcodecs.";
+  return name.starts_with(kNumcodecs) ? name.substr(kNumcodecs.size()) : name;
+}
+
+// A codec by itself may be its name alone.
+Result<std::string> CodecName(const Field& codec) { return codec.is_text() ? codec.Text() : codec["name"].Text(); }
+Status WrongName(const Field& codec, std::string_view must_be) { return (codec.is_text() ? codec : codec["name"]).Wrong(must_be); }
 
 Result<std::vector<std::size_t>> ReadOrder(const Field& order, std::size_t axes) {
   std::vector<std::size_t> read;
@@ -71,21 +82,32 @@ Result<bool> ReadBigEndian(const Field& endian, SampleType type) {
 
 }  // namespace
 
-Result<SharedCodec> ReadCompressor(const Field& compressor) {
-  const Result<std::string> id = compressor["id"].Text();
-  if (!id.ok()) return id.status();
-  const NamedCodec* const named = FindNamed(kCompressors, *id);
-  if (named == nullptr) return compressor["id"].Wrong("one of " + NamesOf(kCompressors));
-  return named->make();
-}
-
-Result<SharedCodec> ReadFilter(const Field& filter) {
-  const Result<std::string> id = filter["id"].Text();
-  if (!id.ok()) return id.status();
-  if (*id == "shuffle") return ReadShuffle(filter);
-  const NamedCodec* const named = FindNamed(kCompressors, *id);
-  if (named == nullptr) return filter["id"].Wrong("shuffle, or one of " + NamesOf(kCompressors));
-  return named->make();
+Result<CodecChain> ReadFilters(const Field& filters, const Field& compressor, SampleType type) {
+  constexpr std::size_t kMostFilters = 16;
+  if (filters.given() && (!filters.is_array() || filters.size() > kMostFilters))
+    return filters.Wrong("a list of at most 16 filters, or null");
+  CodecChain chain;
+  const auto read = [&](const Field& codec) -> Status {
+    const Result<std::string> id = codec["id"].Text();
+    if (!id.ok()) return id.status();
+    if (IsElementFilter(*id)) {
+      const Result<ElementFilter> filter = ReadElementFilter(*id, codec, type, true);
+      if (!filter.ok()) return filter.status();
+      chain.insert(chain.end(), filter->chain.begin(), filter->chain.end());
+      type = filter->stored;
+      return Status::Ok();
+    }
+    Result<SharedCodec> byte_codec = ReadByteCodec(codec["id"], *id, codec);
+    if (byte_codec.ok()) chain.push_back(*std::move(byte_codec));
+    return byte_codec.status();
+  };
+  for (std::size_t i = 0; i < filters.size(); ++i) {
+    if (Status status = read(filters[i]); !status.ok()) return status;
+  }
+  if (compressor.given()) {
+    if (Status status = read(compressor); !status.ok()) return status;
+  }
+  return chain;
 }
 
 Result<CodecList> ReadCodecList(const Field& codecs, std::size_t axes, SampleType type) {
@@ -99,13 +121,20 @@ Result<CodecList> ReadCodecList(const Field& codecs, std::size_t axes, SampleTyp
   bool in_bytes = false;  // the elements have become bytes
   for (std::size_t i = 0; i < codecs.size(); ++i) {
     const Field codec = codecs[i], configuration = codec["configuration"];
-    const Result<std::string> name = NameOf(codec);
+    const Result<std::string> name = CodecName(codec);
     if (!name.ok()) return name.status();
     if (list.sharding) return WrongName(codec, "left out: codecs behind sharding_indexed are not supported");
     if (in_bytes) {
-      Result<SharedCodec> byte_codec = ReadByteCodec(codec, *name);
+      Result<SharedCodec> byte_codec = ReadByteCodec(codec.is_text() ? codec : codec["name"], WithoutPrefix(*name), configuration);
       if (!byte_codec.ok()) return byte_codec.status();
       list.chain.push_back(*std::move(byte_codec));
+    } else if (IsElementFilter(WithoutPrefix(*name))) {
+      const Result<ElementFilter> filter = ReadElementFilter(WithoutPrefix(*name), configuration, type, false);
+      if (!filter.ok()) return filter.status();
+      list.chain.insert(list.chain.end(), filter->chain.begin(), filter->chain.end());
+      type = filter->stored;
+    } else if (!list.chain.empty() && *name != "bytes") {
+      return WrongName(codec, "bytes, which comes next");
     } else if (*name == "transpose") {
       const Result<std::vector<std::size_t>> order = ReadOrder(configuration["order"], axes);
       if (!order.ok()) return order.status();
@@ -124,7 +153,7 @@ Result<CodecList> ReadCodecList(const Field& codecs, std::size_t axes, SampleTyp
       list.sharding = configuration;
       in_bytes = true;
     } else {
-      return WrongName(codec, "one of transpose, bytes, sharding_indexed here");
+      return WrongName(codec, "one of transpose, bytes, sharding_indexed or a filter of numcodecs here");
     }
   }
   if (!in_bytes) return codecs.Wrong("a list with bytes or sharding_indexed");

@@ -13,9 +13,8 @@
 
 namespace slabstream::zarr {
 
-// Version 2: a compressor or filter, {"id": "zlib", ...}.
-Result<SharedCodec> ReadCompressor(const metadata::Field& compressor);
-Result<SharedCodec> ReadFilter(const metadata::Field& filter);
+// Version 2: filters and a compressor, {"id": "zlib", ...}, or null. `type`: of the elements.
+Result<CodecChain> ReadFilters(const metadata::Field& filters, const metadata::Field& compressor, SampleType type);
 
 // Version 3: a list of codecs, as far as they concern the elements of one chunk.
 struct CodecList {

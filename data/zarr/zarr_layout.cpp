@@ -37,7 +37,7 @@ Status CheckChunkBytes(const Field& field, const std::vector<std::uint64_t>& chu
 }
 
 Result<char> ReadSeparator(const Field& separator, char usual) {
-  if (!separator.stated()) return usual;
+  if (!separator.given()) return usual;
   if (!separator.is_text() || (separator.value() != "." && separator.value() != "/")) return separator.Wrong("\".\" or \"/\"");
   return separator.value().get_ref<const std::string&>()[0];
 }
@@ -134,12 +134,12 @@ Status CheckNothingElse(const Field& metadata) {
 
 }  // namespace
 
-std::string ZarrLayout::Key(std::span<const std::uint64_t> index) const {
+std::string ZarrLayout::Key(std::span<const std::uint64_t> index, char separator) const {
   std::array<std::uint64_t, kMaxArrayAxes> of_axes{};
   for (std::size_t i = 0; i < from.size(); ++i) of_axes.at(from[i]) = index[i];
   std::string key = key_prefix;
   for (std::size_t axis = 0; axis < from.size(); ++axis) {
-    if (axis > 0) key += key_separator;
+    if (axis > 0) key += separator;
     key += std::to_string(of_axes.at(axis));
   }
   return key;
@@ -169,22 +169,12 @@ Result<ZarrLayout> ParseLayout2(const Field& metadata) {
   const Result<char> separator = ReadSeparator(metadata["dimension_separator"], '.');
   if (!separator.ok()) return separator.status();
   layout.key_separator = *separator;
+  layout.separator_stated = metadata["dimension_separator"].given() || layout.from.size() == 1;
 
   if (type->swapped) layout.codecs.push_back(SwapBytesCodec(BytesPerSample(type->type)));
-  const Field filters = metadata["filters"];
-  constexpr std::size_t kMostFilters = 16;
-  if (filters.given() && (!filters.is_array() || filters.size() > kMostFilters))
-    return filters.Wrong("a list of at most 16 filters, or null");
-  for (std::size_t i = 0; i < filters.size(); ++i) {
-    Result<SharedCodec> filter = ReadFilter(filters[i]);
-    if (!filter.ok()) return filter.status();
-    layout.codecs.push_back(*std::move(filter));
-  }
-  if (const Field compressor = metadata["compressor"]; compressor.given()) {
-    Result<SharedCodec> codec = ReadCompressor(compressor);
-    if (!codec.ok()) return codec.status();
-    layout.codecs.push_back(*std::move(codec));
-  }
+  const Result<CodecChain> filters = ReadFilters(metadata["filters"], metadata["compressor"], type->type);
+  if (!filters.ok()) return filters.status();
+  layout.codecs.insert(layout.codecs.end(), filters->begin(), filters->end());
   return layout;
 }
 
@@ -200,7 +190,7 @@ Result<ZarrLayout> ParseLayout3(const Field& metadata) {
   if (!grid["name"].is_text() || grid["name"].value() != "regular") return grid["name"].Wrong("\"regular\"");
   const Result<std::vector<std::uint64_t>> chunk = chunk_field.Counts(size->size());
   if (!chunk.ok()) return chunk.status();
-  if (!metadata["fill_value"].given()) return metadata["fill_value"].Wrong("a value of data_type");
+  if (!metadata["fill_value"].stated()) return metadata["fill_value"].Wrong("a value of data_type");
   Result<std::vector<std::byte>> fill = ReadFill(metadata["fill_value"], *type);
   if (!fill.ok()) return fill.status();
 

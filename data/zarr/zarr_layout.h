@@ -43,10 +43,11 @@ struct ZarrLayout {
   std::optional<Sharding> sharding;
   std::string key_prefix;  // "c/", or nothing
   char key_separator = '/';
+  bool separator_stated = true;              // else it may be the other one: writers of nested folders were slow to say so
   std::vector<std::string> dimension_names;  // of the axes of `shape`, "" where there is none; empty: there are none at all
 
   // The name of a chunk or shard within the array's folder. `index`: of it, along each axis of `shape`.
-  std::string Key(std::span<const std::uint64_t> index) const;
+  std::string Key(std::span<const std::uint64_t> index, char separator) const;
 };
 
 // InvalidArgument, naming the field: it is missing, wrong, or something that is not supported.

@@ -1,9 +1,11 @@
 // A node of a Zarr hierarchy: an array or a group, with its attributes.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -48,5 +50,6 @@ class NodeReading {
 
 // The names of the objects of which a node has at least one.
 inline constexpr const char *kNode3 = "zarr.json", *kArray2 = ".zarray", *kGroup2 = ".zgroup", *kAttributes2 = ".zattrs";
+inline constexpr std::array<std::string_view, 4> kNodeObjects = {kNode3, kArray2, kGroup2, kAttributes2};
 
 }  // namespace slabstream::zarr

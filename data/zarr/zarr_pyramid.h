@@ -1,9 +1,4 @@
-// From a Zarr hierarchy to the levels of one volume.
-//
-// A group that is no image opens its only array, or the first image that bioformats2raw wrote; ReadOptions::array takes another one.
-//
-// Axes of plain arrays: x, y, z, t (time) and c (channel) if dimension_names or xarray's _ARRAY_DIMENSIONS call them so; else the last
-// three are z, y and x, and two before them are time and channel; one before them is time, or the channel if the options take one.
+// From a Zarr hierarchy to the levels of one volume (find_volume.h): those of an OME-Zarr image, or one array (plain_array.h).
 //
 // Positions of OME-Zarr are those of centres of voxels. If no level states a translation, the levels' first corners meet, since writers
 // that leave it out average voxels.

@@ -6,15 +6,12 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <future>
-#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -52,55 +49,6 @@ Status CheckOptions(const OmeZarrOptions& options) {
   return Status::Ok();
 }
 
-// What the elements of level 0 are: samples as the source keeps them, or the integers of which they were made.
-struct Elements {
-  SampleType type = SampleType::kUint8;
-  ValueMapping mapping;  // from elements to data values
-
-  static Elements Of(const SourceInfo& info) {
-    const auto& [geometry, type, mapping] = info.levels[0].description;
-    const SampleType stored = SampleTypeNamed(info.file_type).value_or(SampleType::kUint8);
-    switch (type) {
-      case ScalarType::kUint8:
-        if (stored == SampleType::kInt8) return {SampleType::kInt8, {mapping.scale, mapping.FromStored(128)}};
-        return {SampleType::kUint8, mapping};
-      case ScalarType::kUint16:
-        if (stored == SampleType::kInt16) return {SampleType::kInt16, {mapping.scale, mapping.FromStored(32768)}};
-        return {SampleType::kUint16, mapping};
-      case ScalarType::kFloat32: break;
-    }
-    // Labels of many bits are kept as floats, which hold all that labels may be. In an OME-Zarr they must be integers.
-    const bool is_signed = stored == SampleType::kInt32 || stored == SampleType::kInt64;
-    const bool is_unsigned = stored == SampleType::kUint32 || stored == SampleType::kUint64;
-    if (info.labels && (is_signed || is_unsigned)) return {is_signed ? SampleType::kInt32 : SampleType::kUint32, mapping};
-    return {SampleType::kFloat32, mapping};
-  }
-
-  // Turns samples into elements, which have as many bytes.
-  void Convert(std::span<std::byte> samples) const {
-    if (type == SampleType::kInt8 || type == SampleType::kInt16) {
-      const std::size_t bytes = BytesPerSample(type);
-      for (std::size_t i = bytes - 1; i < samples.size(); i += bytes) samples[i] ^= std::byte{0x80};  // the highest bit
-    } else if (type == SampleType::kInt32) {
-      Round<std::int32_t>(samples);
-    } else if (type == SampleType::kUint32) {
-      Round<std::uint32_t>(samples);
-    }
-  }
-
- private:
-  template <class T>
-  static void Round(std::span<std::byte> samples) {
-    for (std::size_t i = 0; i < samples.size(); i += sizeof(T)) {
-      float sample;
-      std::memcpy(&sample, samples.data() + i, sizeof(T));
-      const double kept = std::isnan(sample) ? 0 : double(sample);
-      const T element = T(std::clamp(kept, double(std::numeric_limits<T>::lowest()), double(std::numeric_limits<T>::max())));
-      std::memcpy(samples.data() + i, &element, sizeof(T));
-    }
-  }
-};
-
 // A cube, or a slab of slices. Even along each axis that is halved, so that no voxel of a coarser level lies in two of them.
 Index3 ShardFor(const OmeZarrOptions& options, const Index3& size) {
   if (!options.slices) return Uniform(options.shard_side);
@@ -111,8 +59,7 @@ Index3 ShardFor(const OmeZarrOptions& options, const Index3& size) {
 
 ZarrObjects ObjectsFor(const SourceInfo& source, const std::string& folder, const OmeZarrOptions& options) {
   const VolumeGeometry& geometry = source.levels.front().description.geometry;
-  const ZarrLayout layout = {options.version, Elements::Of(source).type, options.chunk_side, ShardFor(options, geometry.size),
-                             options.codec_level};
+  const ZarrLayout layout = {options.version, source.exact.type, options.chunk_side, ShardFor(options, geometry.size), options.codec_level};
   return {folder, layout, PlanLevels(geometry, CoarsestSide(options))};
 }
 
@@ -252,7 +199,8 @@ class Reader {
     buffer_.resize(objects_.BytesOf(steps_[step].region));
     const auto end = std::make_shared<std::promise<Status>>();
     read_ = end->get_future();
-    source_.Read(0, objects_.BoxOf(steps_[step].region), buffer_, stop_, [end](Status status) { end->set_value(std::move(status)); });
+    const Box box = objects_.BoxOf(steps_[step].region);
+    source_.Read(0, box, BoxRoom::Dense(box, buffer_.data(), true), stop_, [end](Status status) { end->set_value(std::move(status)); });
   }
 
   VolumeSource& source_;
@@ -283,7 +231,6 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
   while (folder.size() > 1 && folder.ends_with('/')) folder.pop_back();
   const SourceInfo& info = source.info();
   const VolumeGeometry& geometry = info.levels[0].description.geometry;
-  const Elements elements = Elements::Of(info);
   const ZarrObjects objects = ObjectsFor(info, folder, options);
   const ZarrLayout& layout = objects.layout();
   const int levels = int(objects.levels().size());
@@ -304,7 +251,7 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
   }
   const std::string name = fs::path(folder).stem().stem().string();
   const std::vector<MetadataFile> metadata =
-      OmeMetadata(layout, objects.levels(), name, geometry.orientation, elements.mapping, info.labels);
+      OmeMetadata(layout, objects.levels(), name, geometry.orientation, info.exact.mapping, info.labels);
   const Result<Target> target = Target::Open(folder, Description(source, options, layout.shard, metadata, stamp));
   if (!target.ok()) return target.status();
 
@@ -331,7 +278,6 @@ Status WriteOmeZarr(VolumeSource& source, const std::string& folder_text, const 
     } else {
       if (region.level == 0) {
         if (Status status = reader.Read(s, buffer); !status.ok()) return status;
-        elements.Convert(buffer);
       }
       if (Status status = objects.Write(region, buffer.data()); !status.ok()) return status;
       progress.done_bytes += objects.BytesOf(region);

@@ -8,7 +8,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "common/base/check.h"
+#include "common/volume/exact_value.h"
 
 namespace slabstream {
 namespace {
@@ -27,7 +27,7 @@ T Mean(const std::array<T, kMost>& values, std::size_t count) {
     }
     return known == 0 ? std::numeric_limits<T>::quiet_NaN() : T(sum / known);
   } else {
-    using Sum = std::conditional_t<sizeof(T) <= 2, std::int32_t, std::int64_t>;
+    using Sum = std::conditional_t<sizeof(T) <= 2, std::int32_t, std::conditional_t<sizeof(T) <= 4, std::int64_t, Int128>>;
     Sum sum = 0;
     for (std::size_t i = 0; i < count; ++i) sum += Sum(values[i]);
     const Sum n = Sum(count), half = n / 2;  // division cuts towards zero
@@ -80,11 +80,7 @@ void ReduceBox(Reduction reduction, const T* from, const Index3& size, const Ind
 void Reduce(SampleType type, Reduction reduction, const std::byte* from, const Index3& size, const Index3& step, std::byte* to,
             const Index3& to_size, const Index3& at) {
   VisitSampleType(type, [&]<class T>(const T*) {
-    if constexpr (sizeof(T) <= 4) {
-      ReduceBox(reduction, reinterpret_cast<const T*>(from), size, step, reinterpret_cast<T*>(to), to_size, at);
-    } else {
-      CHECK(false) << "no type of elements that are written: " << ToString(type);
-    }
+    ReduceBox(reduction, reinterpret_cast<const T*>(from), size, step, reinterpret_cast<T*>(to), to_size, at);
   });
 }
 

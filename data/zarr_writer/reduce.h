@@ -15,7 +15,7 @@ enum class Reduction {
 
 // Each voxel of the result holds `step` (1 or 2 along each axis) voxels of `from`, those at its end perhaps fewer. `from`: samples of a box
 // of `size` voxels, x fastest, whose begin is a multiple of `step` of its level. `to`: samples of a box of `to_size` voxels of the next
-// level; the result begins at voxel `at` of it. `type`: of at most 4 bytes; both are aligned for it.
+// level; the result begins at voxel `at` of it. Both are aligned for `type`.
 void Reduce(SampleType type, Reduction reduction, const std::byte* from, const Index3& size, const Index3& step, std::byte* to,
             const Index3& to_size, const Index3& at);
 

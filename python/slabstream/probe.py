@@ -47,7 +47,7 @@ class Sample:
 
     at: Vector                     # the point: x, y, z of the world
     index: tuple[int, int, int]    # of the voxel, as arrays have it: z, y, x
-    value: float | None            # None: it is not finite
+    value: float | int | None      # None: it is not finite; int: a whole number that float rounds
     label: int | None = None       # as in the file; 0: none; None: the dataset has no labels
     label_name: str = ""
     overlay: float | None = None   # None: there is none here
@@ -87,7 +87,7 @@ def sample_of(message: Any, depth: float | None = None) -> Sample | None:
     return Sample(
         at=(message.at.x, message.at.y, message.at.z),
         index=(message.voxel.z, message.voxel.y, message.voxel.x),
-        value=message.value if message.HasField("value") else None,
+        value=None if not message.HasField("value") else int(message.value) + message.rest if message.rest else message.value,
         label=message.label.value if labelled else None,
         label_name=message.label.name if labelled else "",
         overlay=message.overlay if message.HasField("overlay") else None,

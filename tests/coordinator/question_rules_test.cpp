@@ -143,7 +143,7 @@ TEST_F(UploadRules, BytesComeInOrderWithinTheCreditAndBecomeADataset) {
   }
   EXPECT_EQ(finished, 1);
   DataSource source("", "");
-  source.load = [](const TellRead&) -> Result<LayeredVolume> { return LayeredVolume{}; };
+  source.load = [](const TellRead&) -> Result<LoadedData> { return LoadedData{}; };
   source.held_bytes = Order(1).bytes();
   const Actions done = script.Step(UploadFinished{upload, source});
   const auto replies = ToClients<DataReply>(done);

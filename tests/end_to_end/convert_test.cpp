@@ -5,6 +5,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <vector>
 
 #include "tests/end_to_end/program.h"
 #include "tests/support/full_disk.h"
@@ -111,6 +112,34 @@ TEST_F(ConvertTest, SamplesStayOfTheirTypeIfThatHoldsTheirValues) {
     MustRun({"convert", file + std::string(".nrrd"), "v.nii"});
     EXPECT_EQ(Info({"v.nii"})["file_type"], type);
   }
+}
+
+// Labels of a file that is read as a whole, of one that is read in parts, and of a store.
+TEST_F(ConvertTest, LabelsOf64BitsAreExactInFilesValuesAndStores) {
+  const std::vector<std::uint64_t> ids = {0, 12857642016, 12857642017, 13046505472, std::uint64_t{1} << 63 | 1};
+  const std::string samples(reinterpret_cast<const char*>(ids.data()), ids.size() * sizeof ids[0]);
+  Write("ids.nrrd", "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 5 1 1\nencoding: raw\nendian: little\n\n" + samples);
+  const auto values = [&](const std::string& source) {
+    std::vector<std::string> arguments = {"value", source, "--local", "--json"};
+    for (std::size_t x = 0; x < ids.size(); ++x) arguments.insert(arguments.end(), {"--at", std::to_string(x) + ",0,0"});
+    std::vector<std::uint64_t> found;
+    for (const json& sample : json::parse(MustRun(arguments).out)) {
+      EXPECT_TRUE(sample["value"].is_number_unsigned()) << sample;
+      found.push_back(sample["value"].get<std::uint64_t>());
+    }
+    return found;
+  };
+  std::string from = "ids.nrrd";
+  for (const std::string to : {"a.nii.gz", "b.ome.zarr", "c.nrrd", "d.mha", "e.zarr", "f.npy"}) {
+    EXPECT_EQ(MustRun({"convert", from, to}).err, "");
+    EXPECT_EQ(values(to), ids) << to;
+    from = to;
+  }
+  EXPECT_THAT(Read("f.npy"), testing::EndsWith(samples));
+  const std::string at_last = "4,0,0";
+  EXPECT_THAT(MustRun({"value", "f.npy", "--local", "--at", at_last}).out, HasSubstr("value 9223372036854775809"));
+  EXPECT_THAT(MustRun({"convert", "f.npy", "g.nrrd", "--type", "float32"}).err, HasSubstr("--type float32 rounds values of type uint64"));
+  EXPECT_THAT(MustRun({"info", "f.npy"}).err, HasSubstr("values from 0 to 9223372036854775809 are rounded to float32 for pictures"));
 }
 
 TEST_F(ConvertTest, WarnsOfWhatIsNotKept) {

@@ -267,6 +267,9 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   // Pictures over time say which volume they show.
   run({"turntable", series, "--time", "0:2", "--turns", "0", "--eye", "0,-40,0", "-o", "p%d.png"});
   EXPECT_THAT(MustRun({"info", "p2.png"}).out, HasSubstr("series.npy?time=2"));
+  // SOURCE may name the times itself.
+  run({"turntable", series + "?time=0:2", "--turns", "0", "--eye", "0,-40,0", "-o", "s%d.png"});
+  for (const std::string file : {"0.png", "1.png", "2.png"}) EXPECT_TRUE(ReadFile("p" + file) == ReadFile("s" + file)) << file;
   run({"turntable", series + "?time=1", "--frames", "1", "-o", "q%d.png"});
   run({"turntable", series, "--time", "1", "--frames", "1", "-o", "r%d.png"});
   EXPECT_EQ(ReadFile("q0.png"), ReadFile("r0.png"));

@@ -11,9 +11,22 @@ namespace slabstream {
 namespace {
 
 const std::vector<CodecChain>& Codecs() {
-  static const std::vector<CodecChain> codecs = {
-      {GzipCodec()}, {ZlibCodec()},   {ZstdCodec()}, {BloscCodec()},
-      {Lz4Codec()},  {Crc32cCodec()}, {LzfCodec()},  {SwapBytesCodec(2), ShuffleCodec(4), ZstdCodec(), Crc32cCodec()}};
+  static const std::vector<CodecChain> codecs = {{GzipCodec()},
+                                                 {ZlibCodec()},
+                                                 {ZstdCodec()},
+                                                 {BloscCodec()},
+                                                 {Lz4Codec()},
+                                                 {Crc32cCodec()},
+                                                 {LzfCodec()},
+                                                 {SwapBytesCodec(2), ShuffleCodec(4), ZstdCodec(), Crc32cCodec()},
+                                                 {Lz4JavaCodec()},
+                                                 {Bzip2Codec()},
+                                                 {XzCodec()},
+                                                 {BrotliCodec()},
+                                                 {Lz4BlockCodec()},
+                                                 {BlocksCodec({Lz4BlockCodec()})},
+                                                 {BlocksCodec({ZstdCodec(), true, 2})},
+                                                 {BitshuffleCodec(2, 8)}};
   return codecs;
 }
 
@@ -47,6 +60,11 @@ std::vector<FuzzBytes> ChunkCodecSeeds() {
   };
   std::uint8_t number = 0;
   for (const char* const codec : {"gzip", "zlib", "zstd", "blosc", "lz4", "crc32c", "lzf"}) add(number++, PackBytes(codec, bytes));
+  ++number;
+  for (const char* const codec : {"lz4 java", "bzip2", "xz", "brotli", "lz4 block"}) add(number++, PackBytes(codec, bytes));
+  add(number++, PackBlocks("lz4 block", bytes, 20, 0));
+  add(number++, PackBlocks("zstd", bytes, 32, 2));
+  add(number++, BitshuffledBytes(bytes, 2, 8));
   add(0, PackBytes("gzip", bytes) + PackBytes("gzip", bytes));
   add(2, PackZstdStream(bytes));
   for (const char* const inner : {"blosclz", "lz4", "snappy", "zlib", "zstd"}) {

@@ -47,6 +47,41 @@ std::vector<FuzzBytes> Hdf5FileSeeds() {
     writer.Write("/t00000/s00/0/cells", {.size = {6, 7, 8}, .chunk = {3, 4, 4}, .type = SampleType::kInt16}, samples.data());
   }
   keep(0);
+  const auto double_of = [](double number, std::size_t count) { return std::vector<double>(count, number); };
+  {
+    Hdf5Writer writer(path);
+    writer.Write("/data", {.size = {6, 7, 8}, .chunk = {3, 4, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/z", {6}, {1, 2, 3, 4, 5, 6});
+    writer.Text("/z", "units", "mm");
+    writer.Scales("/data", {"/z", "", ""});
+    writer.Texts("/data", "DIMENSION_LABELS", {"", "y", "x"});
+    writer.Numbers("/data", "scale_factor", {0.5});
+    writer.Numbers("/data", "_FillValue", {7});
+  }
+  keep(0);
+  {
+    Hdf5Writer writer(path);
+    writer.Write("/data", {.size = {6, 7, 8}}, samples.data());
+    writer.Text("/data", "axistags", R"({"axes": [{"key": "x"}, {"key": "y"}, {"key": "c"}]})");
+    writer.Numbers("/data", "element_size_um", {1, 2});
+  }
+  keep(1);
+  {
+    Hdf5Writer writer(path);
+    writer.Write("/ITKImage/0/VoxelData", {.size = {6, 7, 8}}, samples.data());
+    writer.Doubles("/ITKImage/0/Spacing", {3}, double_of(2, 3));
+    writer.Doubles("/ITKImage/0/Origin", {3}, double_of(1, 3));
+    writer.Doubles("/ITKImage/0/Directions", {3, 3}, {1, 0, 0, 0, 1, 0, 0, 0, 1});
+  }
+  keep(0);
+  {
+    Hdf5Writer writer(path);
+    writer.Write("/minc-2.0/image/0/image", {.size = {6, 7, 8}, .chunk = {3, 4, 4}}, samples.data());
+    writer.Text("/minc-2.0/image/0/image", "dimorder", "zspace,yspace,xspace");
+    writer.Doubles("/minc-2.0/image/0/image-min", {6}, double_of(0, 6));
+    writer.Doubles("/minc-2.0/image/0/image-max", {6}, double_of(9, 6));
+  }
+  keep(0);
   return seeds;
 }
 

@@ -21,7 +21,7 @@ struct Kind {
 
 const std::vector<Kind>& Kinds() {
   static const std::vector<Kind> kinds = [] {
-    std::vector<Kind> all = {{".png", true}, {".jpg", true}};
+    std::vector<Kind> all = {{".png", true}, {".jpg", true}, {".bmp", true}, {".jp2", true}};
     for (const VolumeFormat& format : VolumeFormats()) {
       for (const std::string_view ending : format.endings) all.push_back({std::string(ending)});
     }
@@ -152,8 +152,16 @@ std::vector<FuzzBytes> VolumeFileSeeds() {
   }
   const std::string ome =
       "<OME><Image><Pixels SizeZ=\"2\" SizeC=\"1\" SizeT=\"1\" DimensionOrder=\"XYZCT\" PhysicalSizeX=\"2\"/></Image></OME>";
-  WriteTiff(path, {}, FileBytes(24, 'x'), {.description = ome});
-  seeds.push_back(Seed(".tif", ReadFile(path)));
+  const std::string imagej = "ImageJ=1.54f\nimages=2\nslices=2\nspacing=2\nunit=um\ncf=0\nc0=1\nc1=2\nmin=3\nmax=4\n";
+  for (const std::string& description : {ome, imagej, std::string("{\"shape\": [2, 3, 4], \"axes\": \"ZYX\"}")}) {
+    WriteTiff(path, {}, FileBytes(24, 'x'), {.description = description});
+    seeds.push_back(Seed(".tif", ReadFile(path)));
+  }
+  seeds.push_back(Seed(".bmp", Bmp({4, 2, 1}, {.bits = 8, .palette = FileBytes(1024, 'x')}, FileBytes(8, 1))));
+  seeds.push_back(Seed(".bmp", Bmp({1, 2, 1}, {.bits = 24}, FileBytes(8, 1)), 3));
+  const std::string jp2 = SharedFiles().Path(".seed.jp2");
+  WriteJpeg2000(jp2, {16, 16, 1}, 3, 10, true, std::vector<int>(std::size_t{3} * 16 * 16, -5));
+  seeds.push_back(Seed(".jp2", ReadFile(jp2), 3));
   for (const int picture : {0, 2, 3}) {
     WritePng(path, {4, 4, 1}, picture == 0 ? 16 : 8, picture, FileBytes(picture == 0 ? 32 : picture == 2 ? 48 : 16, 1), picture == 2);
     seeds.push_back(Seed(".png", ReadFile(path), picture == 0 ? 0 : 3));

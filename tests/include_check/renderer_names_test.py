@@ -13,6 +13,7 @@ ALLOWED = {
     ("client/cli/client_commands.cpp", "slice"): "a command",
     ("common/stats/report.cpp", "splat"): "a stage",
     ("common/wire/request_fields.h", "slice"): "a field of a message",
+    ("data/volume_io/page_layout.cpp", "slice"): "a page of a volume",
     ("gateway/openapi.cpp", "slice"): "a command",
     ("gateway/page_message.cpp", "slice"): "a kind of picture",
     ("python/slabstream/drafts.py", "slice"): "a command",

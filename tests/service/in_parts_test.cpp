@@ -66,7 +66,7 @@ class InPartsTest : public testing::Test {
   }
   static std::shared_ptr<const Volume> Level(const std::string& path, int level) {
     const std::shared_ptr<VolumeSource> source = OpenSource(path, {}, ProcessReadContext()).value();
-    return ReadLevel(*source, level).value();
+    return ReadLevel(*source, level).value().volume;
   }
   Result<Picture> Render(const FrameRequest& request) { return client_->Render(request, seconds(60)); }
   void ExpectPictureOf(const FrameRequest& request, const Volume& volume) { Expect(request, RenderDirectly(request, volume), 0); }

@@ -47,6 +47,21 @@ TEST_F(VolumeArgumentTest, OptionsForReadingStandBeforeTheTransferFunction) {
   Expect(head + "?tine=3:opaque", true, head + "?tine=3:opaque", "");
 }
 
+TEST_F(VolumeArgumentTest, AddressesAndOptionsMayHoldColons) {
+  const std::string head = Touch("head.nii");
+  for (const std::string whole :
+       {"http://host:8080/a.zarr", "http://host:8080", "http://[::1]:8080/a", "zarr://http://host:8080/a.zarr",
+        "https://host/a.zarr/|zarr3:", "s3://b/a?endpoint=http://host:9000", "s3://b/a?endpoint=http://host:9000,array=a,channel=2",
+        "https://host/a?sig=a:b", "https://host/a?header=Authorization:@/run/token", "https://host/a?header=Referer:https://host/"}) {
+    Expect(whole, true, whole, "");
+    Expect(whole + (whole.find('?') == std::string::npos ? "?time=1:opaque" : ",time=1:opaque"), true,
+           whole + (whole.find('?') == std::string::npos ? "?time=1" : ",time=1"), "opaque");
+  }
+  Expect("https://host/a.zarr:opaque", true, "https://host/a.zarr", "opaque");
+  Expect(head + "?time=0:1,channel=1", true, head + "?time=0:1,channel=1", "");
+  Expect(head + "?time=0:1", true, head + "?time=0:1", "");
+}
+
 TEST_F(VolumeArgumentTest, ADatasetsNameMayHoldAColon) {
   Expect("head:ct-skin", false, "head", "ct-skin");
   Expect("head:2026", false, "head:2026", "");

@@ -522,7 +522,7 @@ template <>
 std::vector<SampleReply> SamplesOf() {
   const VolumeSample full{{-1e9, 0, 1}, true,  {kMaxVolumeSide, 0, 1}, 1e300, LabelAt{kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n')},
                           -2.5,         1e-300};
-  return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .label = LabelAt{}}}}};
+  return {{}, {kMax64, {full, {.at = {1, 2, 3}}, {.at = {}, .inside = true, .value = 0x1p60, .label = LabelAt{}, .rest = -1}}}};
 }
 
 template <>

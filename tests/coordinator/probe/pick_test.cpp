@@ -197,6 +197,17 @@ TEST(SampleAt, IsTheVoxelThatHoldsThePoint) {
     EXPECT_FALSE(SampleAt(probe, summary, geometry.ToWorld(p)).inside);
 }
 
+TEST(SampleAt, TellsTheExactValue) {
+  const Volume volume = MakeVolume({{2, 1, 1}, {1, 1, 1}}, ScalarType::kFloat32, [](const Index3&) { return 0x1p60; });
+  const VolumeSummary summary = Summarize(volume);
+  ProbeVolume probe{.voxels = VoxelBricks(volume.block)};
+  EXPECT_EQ(SampleAt(probe, summary, {1, 0, 0}).rest, 0);
+  probe.exact = [](const Index3& voxel) { return ExactValue{0x1p60, voxel.x}; };
+  const VolumeSample sample = SampleAt(probe, summary, {1, 0, 0});
+  EXPECT_EQ(sample.value, 0x1p60);
+  EXPECT_EQ(sample.rest, 1);
+}
+
 TEST(Percentiles, AreThoseOfAllFiniteVoxels) {
   const Volume ramp =
       MakeVolume({{256, 4, 4}, {1, 1, 1}}, ScalarType::kFloat32, [](const Index3& v) { return v.y == 0 && v.z == 0 ? NAN : v.x; });

@@ -59,7 +59,7 @@ class BrickStoreTest : public testing::Test {
     EXPECT_EQ(info.labels, whole->info.labels);
     const auto read = ReadLevel(*stored.source, 0);
     ASSERT_TRUE(read.ok()) << read.status().message();
-    EXPECT_TRUE((*read)->block.bytes == whole->volume->block.bytes);
+    EXPECT_TRUE(read->volume->block.bytes == whole->volume->block.bytes);
   }
   std::vector<std::string> Stores() const {
     std::vector<std::string> names;

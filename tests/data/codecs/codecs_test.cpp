@@ -50,9 +50,22 @@ const std::vector<Case>& Cases() {
        }},
       {"blosc", BloscCodec(), [](const std::string& bytes) { return PackBytes("blosc", bytes, 2); }},
       {"lz4", Lz4Codec(), [](const std::string& bytes) { return PackBytes("lz4", bytes); }},
+      {"lz4_java", Lz4JavaCodec(), [](const std::string& bytes) { return PackBytes("lz4 java", bytes); }},
+      {"lz4_blocks", BlocksCodec({Lz4BlockCodec()}), [](const std::string& bytes) { return PackBlocks("lz4 block", bytes, 100, 0); }},
+      {"bitshuffle_lz4", BlocksCodec({Lz4BlockCodec(), true, 2}),
+       [](const std::string& bytes) { return PackBlocks("lz4 block", bytes, 64, 2); }},
+      {"bitshuffle_zstd", BlocksCodec({ZstdCodec(), true, 3}), [](const std::string& bytes) { return PackBlocks("zstd", bytes, 240, 3); }},
+      {"bzip2", Bzip2Codec(), [](const std::string& bytes) { return PackBytes("bzip2", bytes); }},
+      {"bzip2_streams", Bzip2Codec(),
+       [](const std::string& bytes) {
+         return PackBytes("bzip2", bytes.substr(0, bytes.size() / 2)) + PackBytes("bzip2", bytes.substr(bytes.size() / 2));
+       }},
+      {"xz", XzCodec(), [](const std::string& bytes) { return PackBytes("xz", bytes); }},
+      {"brotli", BrotliCodec(), [](const std::string& bytes) { return PackBytes("brotli", bytes); }, false},
       {"lzf", LzfCodec(), [](const std::string& bytes) { return PackBytes("lzf", bytes); }, false},
       {"crc32c", Crc32cCodec(), [](const std::string& bytes) { return PackBytes("crc32c", bytes); }},
       {"swap", SwapBytesCodec(4), [](const std::string& bytes) { return SwappedBytes(bytes, 4); }, false},
+      {"bitshuffle", BitshuffleCodec(4, 16), [](const std::string& bytes) { return BitshuffledBytes(bytes, 4, 16); }, false},
       {"shuffle", ShuffleCodec(8), [](const std::string& bytes) { return ShuffledBytes(bytes, 8); }, false}};
   return cases;
 }
@@ -113,6 +126,29 @@ TEST(BloscCodecTest, HasEveryInnerCodecAndShuffle) {
         EXPECT_TRUE(Text(*decoded) == bytes) << inner << shuffle << element;
       }
     }
+  }
+}
+
+// It does not tell how many bytes it holds, so its readers state them.
+TEST(Lz4BlockTest, HoldsAtMostWhatIsStated) {
+  Random random(5);
+  SCOPED_TRACE(random.trace());
+  const std::string bytes = SomeBytes(random, 4000);
+  const Bytes packed = ToBytes(PackBytes("lz4 block", bytes));
+  EXPECT_EQ(Text(Lz4BlockCodec()->Decode(packed, 4000).value()), bytes);
+  EXPECT_EQ(Text(Lz4BlockCodec()->Decode(packed, 9000).value()), bytes);
+  EXPECT_EQ(Lz4BlockCodec()->Decode(packed, 3999).status().code(), StatusCode::kDataLoss);
+  EXPECT_EQ(Lz4BlockCodec()->Decode(ToBytes(std::string(100, '\xff')), 9000).status().code(), StatusCode::kDataLoss);
+}
+
+// A stream of few bytes may hold very many, and only those that are wanted may take memory.
+TEST(Codecs, BombsAreRefused) {
+  const std::string zeros(std::size_t{8} << 20, '\0');
+  for (const auto& [name, codec] : {std::pair{"bzip2", Bzip2Codec()}, {"xz", XzCodec()}, {"brotli", BrotliCodec()}}) {
+    const Bytes bomb = ToBytes(PackBytes(name, zeros));
+    EXPECT_LT(bomb.size(), 10'000U);
+    EXPECT_EQ(codec->Decode(bomb, 100'000).status().code(), StatusCode::kResourceExhausted) << name;
+    EXPECT_EQ(codec->Decode(bomb, zeros.size()).value().size(), zeros.size()) << name;
   }
 }
 

@@ -50,7 +50,7 @@ TEST(H5py, WritesWhatIsReadHere) {
     ASSERT_EQ(std::system(("/usr/bin/python3 -B " + directory / "write.py" + " " + path + " " + version).c_str()), 0);
     const auto file = Hdf5File::Open(path);
     ASSERT_TRUE(file.ok()) << file.status().message();
-    const std::vector<std::string> names = (*file)->Datasets(3);
+    const std::vector<std::string> names = (*file)->Datasets(3).paths;
     EXPECT_EQ(names.size(), 14U * 6U + 3U);
     for (const std::string& name : names) {
       SCOPED_TRACE(version + name);

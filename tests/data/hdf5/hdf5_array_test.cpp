@@ -162,8 +162,8 @@ TEST_F(Hdf5ArrayTest, SaysWhichFilterIsMissing) {
     const hid_t creation = H5Pcreate(H5P_DATASET_CREATE), space = H5Screate_simple(1, std::array<hsize_t, 1>{8}.data(), nullptr);
     const hsize_t chunk = 4;
     H5Pset_chunk(creation, 1, &chunk);
-    constexpr H5Z_filter_t kLz4 = 32004;
-    H5Pset_filter(creation, kLz4, H5Z_FLAG_OPTIONAL, 0, nullptr);
+    constexpr H5Z_filter_t kBlosc2 = 32026;
+    H5Pset_filter(creation, kBlosc2, H5Z_FLAG_OPTIONAL, 0, nullptr);
     H5Dclose(H5Dcreate2(writer.file(), "/data", H5T_NATIVE_UINT8, space, H5P_DEFAULT, creation, H5P_DEFAULT));
     H5Pclose(creation);
     H5Sclose(space);
@@ -172,7 +172,7 @@ TEST_F(Hdf5ArrayTest, SaysWhichFilterIsMissing) {
   ASSERT_FALSE(array.ok());
   EXPECT_EQ(array.status().code(), StatusCode::kInvalidArgument);
   EXPECT_THAT(array.status().message(),
-              HasSubstr("filter.h5: dataset '/data' is packed by the filter 32004 (lz4), which is not supported"));
+              HasSubstr("filter.h5: dataset '/data' is packed by the filter 32026 (blosc2), which is not supported"));
 }
 
 TEST_F(Hdf5ArrayTest, NoticesDamage) {

@@ -109,4 +109,29 @@ void Hdf5Writer::Numbers(const std::string& object, const std::string& name, con
   WriteAttribute(file_, object, name, H5T_NATIVE_DOUBLE, {value.size()}, value.data());
 }
 
+void Hdf5Writer::Texts(const std::string& object, const std::string& name, const std::vector<std::string>& value) {
+  const hid_t type = H5Tcopy(H5T_C_S1);
+  Must(H5Tset_size(type, H5T_VARIABLE));
+  std::vector<const char*> texts;
+  for (const std::string& text : value) texts.push_back(text.c_str());
+  WriteAttribute(file_, object, name, type, {texts.size()}, static_cast<const void*>(texts.data()));
+  Must(H5Tclose(type));
+}
+
+void Hdf5Writer::Doubles(const std::string& path, const std::vector<hsize_t>& size, const std::vector<double>& values) {
+  Write(path, {.size = size, .type = SampleType::kFloat64}, values.data());
+}
+
+void Hdf5Writer::Scales(const std::string& dataset, const std::vector<std::string>& scales) {
+  std::vector<hobj_ref_t> references(scales.size());
+  std::vector<hvl_t> lists;
+  for (std::size_t i = 0; i < scales.size(); ++i) {
+    if (!scales[i].empty()) Must(H5Rcreate(&references[i], file_, scales[i].c_str(), H5R_OBJECT, -1));
+    lists.push_back({scales[i].empty() ? 0U : 1U, &references[i]});
+  }
+  const hid_t type = H5Tvlen_create(H5T_STD_REF_OBJ);
+  WriteAttribute(file_, dataset, "DIMENSION_LIST", type, {lists.size()}, lists.data());
+  Must(H5Tclose(type));
+}
+
 }  // namespace slabstream

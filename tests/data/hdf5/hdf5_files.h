@@ -38,9 +38,14 @@ class Hdf5Writer {
   void Write(const std::string& path, const Layout& layout, const void* samples);
 
   void Group(const std::string& path);
-  void Text(const std::string& object, const std::string& name, const std::string& value);        // one text
-  void Characters(const std::string& object, const std::string& name, const std::string& value);  // as Imaris writes them
+  void Text(const std::string& object, const std::string& name, const std::string& value);                // one text
+  void Characters(const std::string& object, const std::string& name, const std::string& value);          // as Imaris writes them
+  void Texts(const std::string& object, const std::string& name, const std::vector<std::string>& value);  // an array of them
   void Numbers(const std::string& object, const std::string& name, const std::vector<double>& value);
+  // A dataset of float64.
+  void Doubles(const std::string& path, const std::vector<hsize_t>& size, const std::vector<double>& values);
+  // The dimension scales of a dataset, by their paths, as the library's H5DS writes their list.
+  void Scales(const std::string& dataset, const std::vector<std::string>& scales);
 
  private:
   hid_t file_;

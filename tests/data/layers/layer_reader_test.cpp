@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <span>
+
 #include "common/base/files.h"
 #include "data/layers/color_table.h"
 #include "data/volume_io/volume_reader.h"
@@ -67,6 +71,26 @@ TEST_F(LayerReader, ColoursComeFromTheTableThatIsNamed) {
   EXPECT_EQ(layers.table->labels[0].color, StandardColor(1)) << "which the table does not have";
 }
 
+TEST_F(LayerReader, ColoursOfALabelImageCountWithoutATable) {
+  const std::string image = directory_ / "cells.zarr";
+  std::filesystem::create_directories(image + "/0");
+  const auto write = [&](const std::string& name, const std::string& text) { ASSERT_TRUE(WriteTextFile(image + "/" + name, text).ok()); };
+  write(".zgroup", R"({"zarr_format": 2})");
+  write(".zattrs", R"({"multiscales": [{"version": "0.4", "axes": [{"name": "z", "type": "space"}, {"name": "y", "type": "space"},
+    {"name": "x", "type": "space"}], "datasets": [{"path": "0"}]}], "image-label": {"properties": [{"label-value": 9, "name": "nine"}],
+    "colors": [{"label-value": 2, "rgba": [0, 0, 255, 255]}]}})");
+  write("0/.zarray", R"({"zarr_format": 2, "shape": [1, 1, 3], "chunks": [1, 1, 3], "dtype": "|u1", "compressor": null, "filters": null,
+    "fill_value": 0, "order": "C"})");
+  write("0/0.0.0", "\x01\x02\x09");
+  const Layers layers = ReadLayers({.labels = image}, Grid(3, World::kVoxels)).value();
+  EXPECT_THAT(layers.table->labels,
+              ElementsAre(Label{1, StandardColor(1), ""}, Label{2, {0, 0, 1}, ""}, Label{9, StandardColor(9), "nine"}));
+  ASSERT_TRUE(WriteTextFile(directory_ / "lut.txt", "9 other 255 0 0 0\n").ok());
+  const Layers named = ReadLayers({.labels = image, .label_colors = directory_ / "lut.txt"}, Grid(3, World::kVoxels)).value();
+  EXPECT_THAT(named.table->labels,
+              ElementsAre(Label{1, StandardColor(1), ""}, Label{2, StandardColor(2), ""}, Label{9, {1, 0, 0}, "other"}));
+}
+
 TEST_F(LayerReader, ATableBesideANiftiFileCounts) {
   const std::string path = Write("atlas.nii.gz", {1, 2});
   std::string lut(768, '\0');
@@ -95,6 +119,37 @@ TEST_F(LayerReader, WhatIsNoLabelIsNamed) {
   std::vector<float> values(kMaxLabels + 2);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = float(i);
   EXPECT_THAT(ErrorOf({.labels = Write("e.nrrd", values)}, Grid(2)), HasSubstr("more than 4096 labels"));
+}
+
+// As float32, 2^24 + 1 is 2^24, which is a label.
+TEST_F(LayerReader, LabelsThatFloat32RoundsAreNotTakenForOthers) {
+  const std::uint32_t most = kMaxLabelValue;
+  const std::vector<std::uint32_t> values = {most, most - 1, most};
+  const std::string header = "NRRD0004\ntype: uint32\ndimension: 3\nsizes: 3 1 1\nencoding: raw\nendian: little\n\n";
+  const auto write = [&](const std::vector<std::uint32_t>& of) {
+    const std::string path = directory_ / "labels.nrrd";
+    EXPECT_TRUE(WriteTextFile(path, header + std::string(reinterpret_cast<const char*>(of.data()), 12)).ok());
+    return path;
+  };
+  const VolumeGeometry grid = Grid(3, World::kVoxels);
+  EXPECT_THAT(Numbers(ReadLayers({.labels = write(values)}, grid).value()), ElementsAre(2, 1, 2));
+  EXPECT_THAT(ErrorOf({.labels = write({most, most + 1, 0})}, grid), HasSubstr("the value 16777217 is no label"));
+}
+
+TEST_F(LayerReader, SlantedLabelsKeepTheirNumbers) {
+  const std::string path = directory_ / "slanted.nrrd";
+  const std::string header =
+      "NRRD0004\ntype: uint8\ndimension: 3\nspace: RAS\nsizes: 4 4 4\nencoding: raw\nspace directions: (1,0,0) (0.4,1,0) (0,0.3,1)\n\n";
+  std::string samples;
+  for (int i = 0; i < 64; ++i) samples += i % 3 == 0 ? char(9) : char(200);
+  ASSERT_TRUE(WriteTextFile(path, header + samples).ok());
+  const VolumeGeometry grid{{4, 4, 4}, {1, 1, 1}, {.world = World::kPatient, .origin = {}}};
+  const Layers layers = ReadLayers({.labels = path, .overlay = path}, grid).value();
+  ASSERT_EQ(layers.table->labels.size(), 2U);
+  EXPECT_EQ(layers.table->labels[0].value, 9U);
+  EXPECT_EQ(layers.table->labels[1].value, 200U);
+  const std::span overlay(layers.overlay->block.samples<float>(), 64);
+  EXPECT_TRUE(std::ranges::any_of(overlay, [](float value) { return value > 10 && value < 199; })) << "an overlay is interpolated";
 }
 
 TEST_F(LayerReader, LayersLieInTheSameWorld) {

@@ -29,12 +29,10 @@ VolumeGeometry Placed(const Index3& size, const Vec3& spacing, const Vec3& origi
 
 Vec3 WorldOf(const VolumeGeometry& g, const Index3& v) { return g.orientation.origin + g.orientation.ToWorld(ToVec3(v) * g.spacing); }
 
-std::uint32_t Same(double sample) { return std::uint32_t(sample); }
-
 TEST(NearestOn, KeepsSamplesOnTheSameGrid) {
   const VolumeGeometry grid = Placed({5, 4, 3}, {0.7, 1.1, 1.3}, {-31.7, 12.9, 4.1}, 0.3);
-  const Volume labels = MakeVolume<std::uint8_t>(grid, ScalarType::kUint8, [](const Index3& v) { return v.x + 10 * v.y + 50 * v.z; });
-  EXPECT_EQ(NearestOn(grid, labels, ScalarType::kUint8, Same).bytes, labels.block.bytes);
+  const Volume labels = MakeVolume<std::uint16_t>(grid, ScalarType::kUint16, [](const Index3& v) { return v.x + 10 * v.y + 50 * v.z; });
+  EXPECT_EQ(NearestOn(grid, grid, labels.block, ScalarType::kUint16).bytes, labels.block.bytes);
 }
 
 TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
@@ -46,7 +44,7 @@ TEST(NearestOn, IsTheVoxelThatHoldsThePointInWorldSpace) {
     const VolumeGeometry coarse = Placed({5, 6, 4}, {real(1, 3), 2, real(1, 3)}, {real(-3, 3), real(-3, 3), 0}, real(-0.7, 0.7));
     const Volume labels =
         MakeVolume<std::uint16_t>(coarse, ScalarType::kUint16, [](const Index3& v) { return 1 + v.x + 5 * v.y + 30 * v.z; });
-    const VoxelBlock found = NearestOn(grid, labels, ScalarType::kUint16, Same);
+    const VoxelBlock found = NearestOn(grid, coarse, labels.block, ScalarType::kUint16);
     for (Index3 v; v.z < grid.size.z; ++v.z) {
       for (v.y = 0; v.y < grid.size.y; ++v.y) {
         for (v.x = 0; v.x < grid.size.x; ++v.x) {

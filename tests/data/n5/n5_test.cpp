@@ -1,10 +1,7 @@
 // N5 containers, written block by block as the specification says.
-#include <blosc.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
-#include <zstd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -13,7 +10,9 @@
 
 #include "common/base/files.h"
 #include "data/n5/n5_array.h"
+#include "data/n5/n5_pyramid.h"
 #include "data/open/open_source.h"
+#include "tests/data/codecs/packed_bytes.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/sources/read_array.h"
 #include "tests/support/random.h"
@@ -28,35 +27,6 @@ using Sizes = std::vector<std::uint64_t>;
 void WriteText(const std::filesystem::path& path, const std::string& text) {
   std::filesystem::create_directories(path.parent_path());
   std::ofstream(path, std::ios::binary) << text;
-}
-
-std::string Compressed(const std::string& name, const std::string& bytes, int element_bytes) {
-  if (name == "raw") return bytes;
-  if (name == "zstd") {
-    std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-    packed.resize(ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 3));
-    return packed;
-  }
-  if (name == "blosc") {
-    std::string packed(bytes.size() + BLOSC_MAX_OVERHEAD, '\0');
-    const int size = blosc_compress_ctx(5, BLOSC_SHUFFLE, std::size_t(element_bytes), bytes.size(), bytes.data(), packed.data(),
-                                        packed.size(), "lz4", 0, 1);
-    packed.resize(std::size_t(size));
-    return packed;
-  }
-  z_stream stream{};
-  constexpr int kGzip = 31, kZlib = 15;
-  CHECK(deflateInit2(&stream, 6, Z_DEFLATED, name == "gzip" ? kGzip : kZlib, 8, Z_DEFAULT_STRATEGY) == Z_OK);
-  std::string packed(deflateBound(&stream, uLong(bytes.size())), '\0');
-  std::string input = bytes;
-  stream.next_in = reinterpret_cast<Bytef*>(input.data());
-  stream.avail_in = uInt(input.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = uInt(packed.size());
-  CHECK(deflate(&stream, Z_FINISH) == Z_STREAM_END);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
 }
 
 std::string BigEndian(std::uint64_t value, int bytes) {
@@ -127,7 +97,10 @@ std::vector<std::byte> WriteDataset(const std::filesystem::path& folder, const S
       std::ranges::reverse(element);
       std::memcpy(elements.data() + place * each, element.data(), each);
     } while (NextIndex(at, reversed));
-    WriteText(path, header + Compressed(spec.compression, bytes, int(each)));
+    WriteText(path, header + PackBytes(spec.compression == "raw"   ? ""
+                                       : spec.compression == "lz4" ? "lz4 java"
+                                                                   : spec.compression,
+                                       bytes, each));
   } while (NextIndex(index, reversed_counts));
   return elements;
 }
@@ -151,7 +124,7 @@ class N5Test : public testing::Test {
 TEST_F(N5Test, BlocksOfEveryShapeTypeAndCompression) {
   Random random(5);
   SCOPED_TRACE(random.trace());
-  const std::vector<std::string> compressions = {"raw", "gzip", "zlib", "zstd", "blosc"};
+  const std::vector<std::string> compressions = {"raw", "gzip", "zlib", "zstd", "blosc", "lz4", "bzip2", "xz"};
   for (int round = 0; round < 120; ++round) {
     Spec spec{.type = SampleType(random.Integer(0, 9)),
               .compression = compressions[random.Integer<std::size_t>(0, compressions.size() - 1)],
@@ -215,8 +188,7 @@ TEST_F(N5Test, WrongAttributesAreNamed) {
       {with("[2, 2, 2]", "[2, 2]"), "blockSize is [2,2], must be a list of 3 numbers"},
       {with("[2, 2, 2]", "[2000000000, 2000000000, 2000000000]"), "has blocks of more than 1073741824 bytes"},
       {with("uint16", "string"), "dataType is \"string\", must be one of int8"},
-      {with("raw", "bzip2"), "compression.type is \"bzip2\", must be a supported compression: raw, gzip, zstd or blosc"},
-      {with("raw", "lz4"), "compression.type is \"lz4\", must be a supported compression"},
+      {with("raw", "jpeg"), "compression.type is \"jpeg\", must be a supported compression: raw, gzip, zstd, blosc, lz4, bzip2 or xz"},
       {with("\"compression\"", "\"packing\""), "must be a text"},
   };
   for (const auto& [text, why] : cases) {
@@ -286,9 +258,191 @@ TEST_F(N5Test, GroupsOfLevels) {
   ExpectRefused({.dataset = "/raw"}, "takes no option dataset");
 }
 
+// COSEM's lists are in the order of `axes`, whatever that is.
+TEST_F(N5Test, TransformsSayWhereLevelsLie) {
+  Random random(9);
+  const std::string zyx = R"(, "transform": {"axes": ["z", "y", "x"], "scale": [5, 4, 3], "translate": [100, 200, 300],
+    "units": ["nm", "nm", "nm"]})";
+  const std::string xyz = R"(, "transform": {"axes": ["x", "y", "z"], "scale": [6, 8, 10], "translate": [301.5, 202, 102.5],
+    "units": ["nm", "nm", "nm"]})";
+  WriteDataset(root_ + "/em/fine", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random, zyx);
+  WriteDataset(root_ + "/em/coarse", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random, xyz);
+  WriteText(root_ + "/em/attributes.json", R"({"multiscales": [{"datasets": [{"path": "fine"}, {"path": "coarse"}]}]})");
+  const auto check = [](const SourceInfo& info) {
+    ASSERT_EQ(info.levels.size(), 2U);
+    const VolumeGeometry &fine = info.levels[0].description.geometry, &coarse = info.levels[1].description.geometry;
+    EXPECT_EQ(fine.spacing, (Vec3{3, 4, 5}));
+    EXPECT_EQ(fine.orientation.origin, (Vec3{300, 200, 100}));
+    EXPECT_EQ(fine.orientation.unit, LengthUnit::kNanometre);
+    EXPECT_EQ(coarse.spacing, (Vec3{6, 8, 10}));
+    EXPECT_EQ(coarse.orientation.origin, (Vec3{301.5, 202, 102.5}));
+    EXPECT_THAT(info.notes, testing::ElementsAre("spacing and origin are those of the attribute transform"));
+  };
+  const auto own = Open();
+  ASSERT_TRUE(own.ok()) << own.status().message();
+  check((*own)->info());
+
+  // The group may say it of all levels, in COSEM's words or in those of OME-Zarr.
+  WriteDataset(root_ + "/em/fine", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
+  WriteDataset(root_ + "/em/coarse", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
+  WriteText(root_ + "/em/attributes.json",
+            R"({"multiscales": [{"datasets": [{"path": "fine")" + zyx + R"(}, {"path": "coarse")" + xyz + "}]}]}");
+  check((*Open())->info());
+  WriteText(root_ + "/em/attributes.json",
+            R"({"multiscales": [{"axes": [{"name": "z", "unit": "nanometer"}, {"name": "y", "unit": "nanometer"},
+    {"name": "x", "unit": "nanometer"}], "datasets": [
+    {"path": "fine", "coordinateTransformations": [{"type": "scale", "scale": [5, 4, 3]}, {"type": "translation", "translation": [100, 200, 300]}]},
+    {"path": "coarse", "coordinateTransformations": [{"type": "scale", "scale": [10, 8, 6]},
+      {"type": "translation", "translation": [102.5, 202, 301.5]}]}]}]})");
+  check((*Open())->info());
+
+  const auto refused = [&](const std::string& transform, const char* why) {
+    WriteDataset(root_ + "/bad", {.size = {4, 4, 4}, .block = {4, 4, 4}}, random, R"(, "transform": )" + transform);
+    ExpectRefused({.array = "bad"}, why);
+  };
+  refused(R"({"axes": ["z", "y", "x"], "scale": [1, 2]})", "transform.scale is [1,2], must be a list of 3 numbers");
+  refused(R"({"axes": ["z", "y", "x"], "scale": [1, 2, 0]})", "transform.scale[2] is 0, must be above 0");
+  refused(R"({"scale": [1, 2, 3], "translate": [1, 2]})", "transform.translate[2]");
+  refused(R"({"scale": [1, 2, 3], "units": ["nm", "um", "um"]})", "must be one unit for all axes of space");
+}
+
+// x, y, channels, slices, frames, without those of 1.
+TEST_F(N5Test, HyperstacksOfFiji) {
+  Random random(10);
+  const auto write = [&](const Sizes& size, int channels, int slices, int frames) {
+    std::filesystem::remove_all(root_);
+    return WriteDataset(root_, {.size = size, .block = Sizes(size.size(), 8)}, random,
+                        fmt::format(R"(, "pixelWidth": 0.5, "pixelHeight": 0.25, "pixelDepth": 2, "pixelUnit": "um", "xOrigin": 4,
+      "numChannels": {}, "numSlices": {}, "numFrames": {})",
+                                    channels, slices, frames));
+  };
+  const std::vector<std::byte> elements = write({5, 4, 2, 3}, 2, 3, 1);
+  const auto source = Open({.channel = 1});
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  const SourceInfo& info = (*source)->info();
+  const VolumeGeometry& geometry = info.levels[0].description.geometry;
+  EXPECT_EQ(info.channels.size(), 2U);
+  EXPECT_EQ(info.times, 1);
+  EXPECT_EQ(geometry.size, (Index3{5, 4, 3}));
+  EXPECT_EQ(geometry.spacing, (Vec3{0.5, 0.25, 2}));
+  EXPECT_EQ(geometry.orientation.origin, (Vec3{-2, 0, 0}));
+  EXPECT_EQ(geometry.orientation.unit, LengthUnit::kMicrometre);
+  std::vector<std::byte> expected;
+  for (std::size_t z = 0; z < 3; ++z) {
+    const auto slice = elements.begin() + std::ptrdiff_t((2 * z + 1) * 40);  // of 20 elements of 2 bytes
+    expected.insert(expected.end(), slice, slice + 40);
+  }
+  EXPECT_EQ(SamplesOf<std::byte>(**source).value(), expected);
+
+  write({5, 4, 3, 6}, 1, 3, 6);
+  EXPECT_EQ((*Open({.time = TimeRange{5, 5}}))->info().times, 6);
+  EXPECT_EQ((*Open({.describe = true}))->info().time, 0);
+  write({5, 4, 2, 3, 6}, 2, 3, 6);
+  EXPECT_EQ((*Open({.time = TimeRange{5, 5}, .channel = 1}))->info().time, 5);
+  write({5, 4, 1, 3, 1}, 1, 3, 1);
+  EXPECT_EQ((*Open())->info().levels[0].description.geometry.size, (Index3{5, 4, 3}));
+  write({5, 4, 6}, 2, 3, 1);  // neither 6 slices nor 2 channels
+  ExpectRefused({}, "numChannels is 2, must be that of a dataset of 5 x 4 x 6, whose axes are x, y, channels, slices and frames");
+}
+
+TEST_F(N5Test, SpacingInTheWordsOfOthers) {
+  Random random(11);
+  const auto geometry = [&](const std::string& attributes) {
+    WriteDataset(root_, {.size = {5, 4, 3}, .block = {4, 4, 4}}, random, attributes);
+    return (*Open())->info().levels[0].description.geometry;
+  };
+  EXPECT_EQ(geometry(R"(, "pixelResolution": [1, 2, 3])").spacing, (Vec3{1, 2, 3}));
+  EXPECT_EQ(geometry(R"(, "pixelResolution": {"unit": "um", "dimensions": [1, 2, 3]})").orientation.unit, LengthUnit::kMicrometre);
+  EXPECT_EQ(geometry(R"(, "resolution": [1, 2, 3], "units": ["nm", "nm", "nm"])").orientation.unit, LengthUnit::kNanometre);
+  EXPECT_EQ(geometry(R"(, "resolution": [1, 2, 3], "offset": [-4, 5, 6])").orientation.origin, (Vec3{-4, 5, 6}));
+  EXPECT_EQ(geometry(R"(, "resolution": [3, 2, 1], "offset": [6, 5, -4], "axes": ["z", "y", "x"])").spacing, (Vec3{1, 2, 3}));
+  EXPECT_EQ(geometry(R"(, "resolution": [1, 2, 3], "axes": ["x", "y", "z"])").spacing, (Vec3{1, 2, 3}));
+}
+
+TEST_F(N5Test, ChannelsInFolders) {
+  Random random(12);
+  std::vector<std::byte> second;
+  for (const char* const channel : {"/c0", "/c1"}) {
+    second = WriteDataset(root_ + channel + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
+    WriteDataset(root_ + channel + "/s1", {.size = {5, 4, 3}, .block = {4, 4, 4}}, random, R"(, "downsamplingFactors": [2, 2, 2])");
+    WriteText(root_ + channel + "/attributes.json", R"({"pixelResolution": [1, 1, 2]})");
+  }
+  const auto source = Open({.channel = 1});
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  EXPECT_EQ((*source)->info().channels.size(), 2U);
+  EXPECT_EQ((*source)->info().levels[1].description.geometry.spacing, (Vec3{2, 2, 4}));
+  EXPECT_EQ(SamplesOf<std::byte>(**source).value(), second);
+  ExpectRefused({.channel = 2}, "has 2 channels, so channel must be 0 to 1");
+}
+
+// A folder that is only asked for objects by their names, like a server. Counts them.
+class Unlisted : public Store {
+ public:
+  explicit Unlisted(std::shared_ptr<Store> store) : store_(std::move(store)) {}
+  void Read(const std::string& key, const ByteRange& range, std::uint64_t most, Done done) override {
+    ++reads;
+    store_->Read(key, range, most, std::move(done));
+  }
+  Result<std::vector<std::string>> List(const std::string&) override { return Status::InvalidArgument("it cannot list"); }
+  const std::string& name() const override { return store_->name(); }
+
+  int reads = 0;
+
+ private:
+  const std::shared_ptr<Store> store_;
+};
+
+TEST_F(N5Test, WhatCannotBeListedOpensLikeAFolder) {
+  Random random(13);
+  const auto levels = [&](const std::string& folder) {
+    WriteDataset(folder + "/s0", {.size = {9, 8, 5}, .block = {4, 4, 4}}, random);
+    WriteDataset(folder + "/s1", {.size = {5, 4, 3}, .block = {4, 4, 4}}, random);
+  };
+  const auto open = [&](const ReadOptions& options = {}) -> Result<Pyramid> {
+    const auto store = std::make_shared<Unlisted>(FolderStore(root_));
+    Result<Pyramid> pyramid = n5::OpenPyramid(store, options, context_);
+    EXPECT_LT(store->reads, 40);
+    return pyramid;
+  };
+  levels(root_ + "/volumes/raw");
+  EXPECT_EQ(open({.array = "volumes/raw"})->levels.size(), 2U);
+  EXPECT_EQ(open().status().message(), "it cannot list");
+  levels(root_ + "/c0");
+  levels(root_ + "/c1");
+  EXPECT_EQ(open({.channel = 1})->info.channels.size(), 2U);
+  levels(root_);
+  EXPECT_EQ(open()->levels.size(), 2U);
+  std::filesystem::remove_all(root_);
+  for (int setup = 0; setup < 3; ++setup) {
+    WriteText(fmt::format("{}/setup{}/attributes.json", root_, setup), "{}");
+    for (int time = 0; time < 21; ++time) {
+      WriteText(fmt::format("{}/setup{}/timepoint{}/s0/attributes.json", root_, setup, time), "{}");
+    }
+    levels(fmt::format("{}/setup{}/timepoint20", root_, setup));
+  }
+  const Result<Pyramid> views = open({.time = TimeRange{20, 20}, .channel = 2});
+  ASSERT_TRUE(views.ok()) << views.status().message();
+  EXPECT_EQ(views->info.times, 21);
+  EXPECT_EQ(views->info.channels.size(), 3U);
+  EXPECT_EQ(views->levels.size(), 2U);
+}
+
 TEST_F(N5Test, AnEmptyContainerSaysSo) {
   std::filesystem::create_directories(root_);
   ExpectRefused({}, "scan.n5: holds no dataset");
+}
+
+TEST(N5Source, OneLineTellsThatNoBlockIsThere) {
+  const TemporaryDirectory directory;
+  Random random(15);
+  SCOPED_TRACE(random.trace());
+  // Attributes that Python wrote may hold NaN.
+  WriteDataset(directory / "a.n5", {.size = {6, 5, 4}, .block = {3, 3, 3}, .missing = 1}, random, R"(, "offset": NaN)");
+  const auto source = Opened(OpenSource(directory / "a.n5", {}, TestReadContext()));
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(*SamplesOf<std::uint16_t>(*source), std::vector<std::uint16_t>(120, 0));
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("no chunk was found, so that all voxels have the fill value; looked for " +
+                                                                (directory / "a.n5/0/0/0") + " and 7 others"));
 }
 
 }  // namespace

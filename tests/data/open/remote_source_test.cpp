@@ -95,6 +95,63 @@ TEST_F(RemoteSourceTest, SaysWhatIsThereOrWhatIsWrong) {
   EXPECT_EQ(failure("/scan.zarr", {.dims = Index3{1, 1, 1}}).code(), StatusCode::kInvalidArgument);
 }
 
+// Buckets that do not let strangers list them say 403 of what is not there; viewers answer all with a page.
+TEST_F(RemoteSourceTest, OpensWhereWhatIsMissingIsForbiddenOrAPage) {
+  const ScriptedServer::Script serves = ServesFolder(directory_.path());
+  const std::string answers[] = {AnswerText("403 Forbidden", "<Error><Code>AccessDenied</Code></Error>"),
+                                 AnswerText("200 OK", "<!doctype html><html></html>", "Content-Type: text/html\r\n")};
+  for (const OmeZarrVersion version : {OmeZarrVersion::k04, OmeZarrVersion::k05}) {
+    const std::string name = version == OmeZarrVersion::k04 ? "four.zarr" : "five.zarr", path = Write(name, version);
+    std::filesystem::remove(path + (version == OmeZarrVersion::k04 ? "/0/0/0/0" : "/0/c/0/0/0"));
+    for (const std::string& missing : answers) {
+      const ScriptedServer server([&](const ServerRequest& request) {
+        return std::filesystem::is_regular_file(directory_.path() + request.target) ? serves(request) : missing;
+      });
+      const auto files = Opened(Open(path)), remote = Opened(Open(server.url() + "/" + name));
+      EXPECT_EQ(AllOf(*remote, 0), AllOf(*files, 0)) << name << missing;
+    }
+  }
+}
+
+TEST_F(RemoteSourceTest, APageForEverythingIsNoVolume) {
+  const std::pair<std::string, const char*> pages[] = {
+      {AnswerText("200 OK", "<html>an app</html>", "Content-Type: text/html\r\n"), "a page of HTML came"},
+      {AnswerText("200 OK", "<p>an app"), "it holds none of"},
+      {AnswerText("200 OK", "{\"error\": \"not found\"}"), "it holds none of"},
+      {AnswerText("200 OK", ""), "it holds none of"}};
+  for (const auto& [page, why] : pages) {
+    const ScriptedServer server([answer = page](const ServerRequest&) { return answer; });
+    EXPECT_THAT(Open(server.url() + "/a.n5").status().message(), HasSubstr(why));
+  }
+}
+
+// One marker that cannot be read does not matter if another one is there.
+TEST_F(RemoteSourceTest, OneMarkerIsEnough) {
+  Write("scan.zarr", OmeZarrVersion::k05);
+  const ScriptedServer::Script serves = ServesFolder(directory_.path());
+  const ScriptedServer server([&](const ServerRequest& request) {
+    return request.target.ends_with("/attributes.json") ? AnswerText("400 Bad Request", "") : serves(request);
+  });
+  EXPECT_TRUE(Open(server.url() + "/scan.zarr").ok());
+}
+
+TEST_F(RemoteSourceTest, TheQueryOfAnAddressGoesWithEachRequestAndIsNotShown) {
+  const std::string path = Write("scan.zarr", OmeZarrVersion::k04);
+  const ScriptedServer::Script serves = ServesFolder(directory_.path());
+  const ScriptedServer server([&](const ServerRequest& request) {
+    const std::string signature = "?sv=1&sig=secret";
+    if (!request.target.ends_with(signature)) return AnswerText("403 x", "");
+    ServerRequest plain = request;
+    plain.target.resize(plain.target.size() - signature.size());
+    return serves(plain);
+  });
+  const auto remote = Opened(Open(server.url() + "/scan.zarr", {.query = "sv=1&sig=secret"}));
+  EXPECT_EQ(AllOf(*remote, 0), AllOf(*Opened(Open(path)), 0));
+  EXPECT_THAT(remote->info().notes, testing::Contains("each request has the query of the address: sv, sig"));
+  EXPECT_THAT(Open(server.url() + "/scan.zarr", {.query = "sig=secret"}).status().message(), testing::Not(HasSubstr("secret")));
+  EXPECT_THAT(Open(path, {.headers = {"A:b"}}).status().message(), HasSubstr("takes no option header"));
+}
+
 TEST_F(RemoteSourceTest, AStoreThatComesBackIsReadAgain) {
   Write("scan.zarr", OmeZarrVersion::k04);
   std::atomic<bool> broken = false;

@@ -37,6 +37,19 @@ bool IsExact(const std::string& file_type) {
          file_type == "float16";
 }
 
+// Values of exact samples are those of the whole reader's.
+void ExpectExact(VolumeSource& source, const Box& box, const LoadedVolume& whole) {
+  const ExactType of = source.info().exact, wanted = BestType(*whole.volume, whole.exact.get());
+  const std::size_t bytes = BytesPerSample(of.type), wanted_bytes = BytesPerSample(wanted.type);
+  std::vector<std::byte> read(std::size_t(box.voxel_count()) * bytes, std::byte{0xa5});
+  ASSERT_TRUE(source.ReadNow(0, box, BoxRoom::Dense(box, read.data(), true)).ok());
+  const std::byte* const samples = whole.exact != nullptr ? whole.exact->bytes.data() : whole.volume->block.bytes.data();
+  for (std::size_t i = 0; i < std::size_t(box.voxel_count()); ++i) {
+    const std::size_t place = NumberIn(whole.volume->block.box.size(), box.begin + PlaceIn(box.size(), i));
+    ASSERT_EQ(ExactValueOf(of, read.data() + i * bytes), ExactValueOf(wanted, samples + place * wanted_bytes)) << i;
+  }
+}
+
 void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random& random, int boxes = 12) {
   SCOPED_TRACE(path);
   const Result<LoadedVolume> whole = ReadVolume(path, options);
@@ -65,6 +78,7 @@ void ExpectLikeWhole(const std::string& path, const ReadOptions& options, Random
     } else {
       ASSERT_EQ(DataValues(description, read), DataValues(wanted, cut)) << "box " << i;
     }
+    ExpectExact(**source, box, *whole);
   }
 }
 

@@ -113,6 +113,23 @@ TEST(SliceStream, TakesOneOfSeveralTimesAndComponents) {
   for (int channel = 0; channel < 3; ++channel) ExpectStreamLikeWhole(directory / "v.nrrd", {.channel = channel});
 }
 
+TEST(SliceStream, ReadsChannelsMatricesAndSeveralFilesAsTheWholeReaderDoes) {
+  const TemporaryDirectory directory;
+  FileBytes samples;
+  for (int i = 0; i < 144; ++i) samples += char(i);
+  WriteFile(directory / "v.nii.gz", Gzip(NiftiHeader({.qform = 1, .sform = 2, .dimensions = {4, 3, 2, 2, 3}}) + samples));
+  for (const char* matrix : {"sform", "qform"}) {
+    for (int channel = 0; channel < 3; ++channel) {
+      ExpectStreamLikeWhole(directory / "v.nii.gz", {.time = TimeRange{1, 1}, .channel = channel, .matrix = matrix});
+    }
+  }
+  for (int i = 0; i < 4; ++i) WriteFile(directory / fmt::format("{}.gz", i), Gzip(samples.substr(std::size_t(i) * 36, 36)));
+  WriteFile(directory / "v.nhdr",
+            "NRRD0004\ntype: uint8\ndimension: 4\nkinds: space space space time\nsizes: 4 3 4 3\nencoding: gzip\n"
+            "data file: %d.gz 0 3 1\n\n");
+  for (int time = 0; time < 3; ++time) ExpectStreamLikeWhole(directory / "v.nhdr", {.time = TimeRange{time, time}});
+}
+
 TEST(SliceStream, ReadsInOrderOnceAndAnyBoxFromTheBeginning) {
   const TemporaryDirectory directory;
   const std::string path = directory / "v.nii.gz";

@@ -14,6 +14,7 @@
 #include "data/precomputed/jpeg_codec.h"
 #include "data/precomputed/segmentation_codec.h"
 #include "data/precomputed/sharding.h"
+#include "tests/data/codecs/packed_bytes.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/data/volume_io/more_files.h"
 #include "tests/data/volume_io/volume_files.h"
@@ -207,6 +208,35 @@ TEST_F(PrecomputedTest, RawChunksPlainAndGzipped) {
   EXPECT_THAT(damaged.message(), HasSubstr("em/8_8_40/100-104_-3-1_0-3: has 5 bytes, expected 192"));
 }
 
+// CloudVolume names the packing of a file in its ending, unless it writes to a server.
+TEST_F(PrecomputedTest, FilesOfEveryEndingAreUnpacked) {
+  const std::pair<const char*, const char*> packings[] = {{"", ""},          {".gz", "gzip"}, {".br", "brotli"}, {".zstd", "zstd"},
+                                                          {".bz2", "bzip2"}, {".xz", "xz"},   {"", "gzip"},      {"", "zstd"}};
+  std::vector<std::uint32_t> labels(4 * 4 * 4 * std::size(packings));
+  for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = std::uint32_t(i / 5);
+  for (const std::string encoding : {"raw", "compressed_segmentation"}) {
+    std::filesystem::remove_all(root_);
+    WriteText(root_ + "/info", Info("segmentation", "uint32", 1,
+                                    fmt::format(R"({{"key": "s", "size": [4, 4, {}], "chunk_sizes": [[4, 4, 4]], "resolution": [1, 1, 1],
+      "encoding": "{}", "compressed_segmentation_block_size": [2, 2, 2]}})",
+                                                4 * std::size(packings), encoding)));
+    for (std::size_t i = 0; i < std::size(packings); ++i) {
+      const std::vector<std::uint32_t> part(labels.begin() + std::ptrdiff_t(64 * i), labels.begin() + std::ptrdiff_t(64 * (i + 1)));
+      const std::string bytes = encoding == "raw" ? std::string(reinterpret_cast<const char*>(part.data()), 256)
+                                                  : Word(1) + Segmented(part, {4, 4, 4}, {2, 2, 2});
+      WriteText(fmt::format("{}/s/0-4_0-4_{}-{}{}", root_, 4 * i, 4 * i + 4, packings[i].first), PackBytes(packings[i].second, bytes));
+    }
+    const auto samples = SamplesOf<float>(**Open());
+    ASSERT_TRUE(samples.ok()) << samples.status().message();
+    EXPECT_TRUE(std::ranges::equal(*samples, labels)) << encoding;
+  }
+  // What is not packed as its ending says is no chunk of zeros.
+  WriteText(root_ + "/s/0-4_0-4_8-12.br", "no brotli");
+  const Status damaged = SamplesOf<float>(**Open()).status();
+  EXPECT_EQ(damaged.code(), StatusCode::kDataLoss);
+  EXPECT_THAT(damaged.message(), HasSubstr("em/s/0-4_0-4_8-12.br: damaged: these are no bytes of brotli"));
+}
+
 TEST_F(PrecomputedTest, JpegChunks) {
   for (const int channels : {1, 3}) {
     WriteText(root_ + "/info", Info("image", "uint8", channels, R"({"key": "0", "size": [8, 4, 8], "chunk_sizes": [[8, 4, 4]],
@@ -375,7 +405,7 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
       {with("\"raw\"", "\"raw\", \"sharding\": " + ShardingText("identity", 32, 33)),
        "shard_bits is 33, must be a whole number in [0, 32]"},
       {with("\"raw\"", "\"compressed_segmentation\""), "must be raw or jpeg, since labels are uint32 or uint64"},
-      {with("uint8", "float16"), "data_type is \"float16\", must be one of int8"},
+      {with("uint8", "complex64"), "data_type is \"complex64\", must be one of int8"},
       {with("[8, 4, 8]", "[8, 0, 8]"), "scales[0].size[1] is 0, must be a whole number"},
       {with("[8, 4, 8]", "[8, 4]"), "scales[0].size is [8,4], must be a list of 3 numbers"},
       {with("[8, 4, 8]", "[8, 4, 80000]"), "80000"},
@@ -397,6 +427,23 @@ TEST_F(PrecomputedTest, WhatIsWrongOrNotSupportedIsNamed) {
   EXPECT_FALSE(SamplesOf<std::uint8_t>(**outside).ok()) << "chunks lie in the folder";
   WriteText(root_ + "/info", good);
   ExpectRefused({.time = TimeRange{0, 0}}, "takes no option time");
+}
+
+TEST_F(PrecomputedTest, OneLineTellsThatNoChunkIsThere) {
+  const auto said = [&](const std::string& more) {
+    WriteText(root_ + "/info", Info("image", "uint8", 1,
+                                    R"({"key": "s", "size": [10, 7, 5], "chunk_sizes": [[4, 4, 3]],
+      "resolution": [8, 8, 40], "voxel_offset": [-8, 0, 0], "encoding": "raw")" +
+                                        more + "}"));
+    const auto source = Opened(Open());
+    testing::internal::CaptureStderr();
+    EXPECT_TRUE(SamplesOf<std::uint8_t>(*source).ok());
+    return testing::internal::GetCapturedStderr();
+  };
+  EXPECT_THAT(said(""), HasSubstr("looked for " + root_ + "/s/-8--4_0-4_0-3 and 11 others"));
+  EXPECT_THAT(said(R"(, "sharding": {"@type": "neuroglancer_uint64_sharded_v1", "hash": "identity", "minishard_bits": 1, "shard_bits": 2,
+    "preshift_bits": 0})"),
+              HasSubstr("looked for " + root_ + "/s/0.shard and 11 others"));
 }
 
 }  // namespace

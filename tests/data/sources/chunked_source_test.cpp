@@ -77,6 +77,7 @@ struct RandomPyramid {
     while (order.size() < 3) order.push_back(-1);
     for (std::size_t i = order.size(); i > 1; --i) std::swap(order[i - 1], order[random.Integer<std::size_t>(0, i - 1)]);
     level.axes = {order[0], order[1], order[2]};
+    for (bool& mirrored : level.mirrored) mirrored = random.Chance(0.3);
     level.at = at;
     array = std::make_shared<MemoryArray>(shape, RandomElements(shape.type, count, random), arrive_on);
     for (std::uint64_t chunk = 0; chunk < array->chunk_count(); ++chunk) {
@@ -85,13 +86,17 @@ struct RandomPyramid {
     level.array = array;
   }
 
-  double Expected(const Index3& v) const {
+  const std::byte* Element(const Index3& v) const {
     std::vector<std::uint64_t> element = at;
     for (int axis = 0; axis < 3; ++axis) {
-      if (level.axes[std::size_t(axis)] >= 0) element[std::size_t(level.axes[std::size_t(axis)])] = std::uint64_t(v[axis]);
+      if (level.axes[std::size_t(axis)] < 0) continue;
+      const auto a = std::size_t(level.axes[std::size_t(axis)]);
+      const auto along = std::uint64_t(v[axis]);
+      element[a] = level.mirrored[std::size_t(axis)] ? array->shape().size[a] - 1 - along : along;
     }
-    return 2 * ValueOf(array->shape().type, array->element(element)) + 3;
+    return array->element(element);
   }
+  double Expected(const Index3& v) const { return 2 * ValueOf(array->shape().type, Element(v)) + 3; }
 
   Pyramid pyramid() const { return {.levels = {level}, .rescale = {2, 3}}; }
 
@@ -106,11 +111,15 @@ void ExpectBox(VolumeSource& source, const RandomPyramid& random, const Box& box
   std::vector<std::byte> out(std::size_t(box.voxel_count()) * BytesPerSample(description.type), std::byte{0xEE});
   const Status status = source.ReadNow(0, box, out);
   ASSERT_TRUE(status.ok()) << status.message();
+  const std::size_t stored = BytesPerSample(source.info().exact.type);
+  std::vector<std::byte> exact(std::size_t(box.voxel_count()) * stored, std::byte{0xEE});
+  ASSERT_TRUE(source.ReadNow(0, box, BoxRoom::Dense(box, exact.data(), true)).ok());
   std::size_t number = 0;
   for (Index3 v = box.begin; v.z < box.end.z; ++v.z) {
     for (v.y = box.begin.y; v.y < box.end.y; ++v.y) {
       for (v.x = box.begin.x; v.x < box.end.x; ++v.x, ++number) {
         ASSERT_EQ(ValueOf(description, out, number), random.Expected(v)) << v.x << " " << v.y << " " << v.z;
+        ASSERT_EQ(std::memcmp(exact.data() + number * stored, random.Element(v), stored), 0) << v.x << " " << v.y << " " << v.z;
       }
     }
   }
@@ -141,8 +150,9 @@ std::shared_ptr<MemoryArray> SmallCube(const SourceContext& context = nullptr) {
   return std::make_shared<MemoryArray>(shape, RandomElements(SampleType::kUint8, 512, random), context);
 }
 
-std::shared_ptr<VolumeSource> SourceOf(const std::shared_ptr<ChunkedArray>& array, const SourceContext& context) {
-  return *MakeChunkedSource("cube", {.levels = {{.array = array, .at = {0, 0, 0}}}}, context);
+std::shared_ptr<VolumeSource> SourceOf(const std::shared_ptr<ChunkedArray>& array, const SourceContext& context,
+                                       const std::string& name = "cube") {
+  return *MakeChunkedSource(name, {.levels = {{.array = array, .at = {0, 0, 0}}}}, context);
 }
 
 constexpr Box kCube = {{0, 0, 0}, {8, 8, 8}};
@@ -164,6 +174,19 @@ TEST(ChunkedSourceTest, ZerosAreNotWrittenWhereAllIsZero) {
       EXPECT_EQ(out[511], std::byte{5});
     }
   }
+}
+
+// The least int8 is kept as 0, but is not 0 itself.
+TEST(ChunkedSourceTest, WhatIsKeptAsZeroIsWrittenIfItIsExactlyAnotherNumber) {
+  const ArrayShape shape = {.size = {8, 8, 8}, .chunk = {4, 4, 4}, .type = SampleType::kInt8, .fill = {std::byte{0x80}}};
+  const auto array = std::make_shared<MemoryArray>(shape, std::vector<std::byte>(512, std::byte{5}));
+  array->missing = {0};
+  std::vector<std::byte> out(512);
+  BoxRoom room = BoxRoom::Dense(kCube, out.data(), true);
+  room.zeroed = true;
+  ASSERT_TRUE(SourceOf(array, Context())->ReadNow(0, kCube, room).ok());
+  EXPECT_EQ(out[0], std::byte{0x80});
+  EXPECT_EQ(out[511], std::byte{5});
 }
 
 struct RunningRead {
@@ -254,6 +277,18 @@ TEST(ChunkedSourceTest, KeepsChunksOfWhichNoReadTookAll) {
   EXPECT_EQ(part[5], *array->element(std::vector<std::uint64_t>{1, 1, 5}));
   source.reset();
   EXPECT_EQ(context->cache().bytes(), 0U);
+}
+
+TEST(ChunkedSourceTest, KeepsAllChunksOfASmallLevelBehindAnAddress) {
+  for (const std::string name : {"cube", "http://host/cube"}) {
+    for (const std::uint64_t small : {std::uint64_t{511}, std::uint64_t{512}}) {
+      const std::shared_ptr<MemoryArray> array = SmallCube();
+      const auto source = SourceOf(array, Context({.decode_threads = 1, .small_bytes = small}), name);
+      std::vector<std::byte> out(512);
+      for (int i = 0; i < 2; ++i) EXPECT_TRUE(source->ReadNow(0, kCube, out).ok());
+      EXPECT_EQ(array->asked().size(), name == "cube" || small < 512 ? 16U : 8U);
+    }
+  }
 }
 
 TEST(ChunkedSourceTest, ChunksUnderWayStayWithinTheLimit) {

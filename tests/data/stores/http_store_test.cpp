@@ -23,6 +23,23 @@ using testing::HasSubstr;
 constexpr char kTen[] = "0123456789";
 constexpr int kTries = HttpTransfers::kTries;
 
+// Of an object, what a request asks for, as web servers answer it.
+std::string AnswerPart(const ServerRequest& request, const std::string& object, const std::string& headers = "") {
+  std::size_t begin = 0, last = 0;
+  if (request.method == "HEAD") return fmt::format("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n{}\r\n", object.size(), headers);
+  if (std::sscanf(request.header("range").c_str(), "bytes=%zu-%zu", &begin, &last) != 2) return AnswerText("200 OK", object, headers);
+  const std::string all = fmt::format("/{}\r\n", object.size());
+  if (begin >= object.size()) return AnswerText("416 x", "", "Content-Range: bytes *" + all + headers);
+  const std::string part = object.substr(begin, last + 1 - begin);
+  return AnswerText("206 x", part, fmt::format("Content-Range: bytes {}-{}{}{}", begin, begin + part.size() - 1, all, headers));
+}
+
+std::string FromHex(const std::string& digits) {
+  std::string bytes;
+  for (std::size_t i = 0; i < digits.size(); i += 2) bytes += char(std::stoi(digits.substr(i, 2), nullptr, 16));
+  return bytes;
+}
+
 class HttpStoreTest : public ::testing::Test {
  protected:
   std::shared_ptr<Store> StoreAt(const std::string& url) { return HttpStore(url, transfers_).value(); }
@@ -140,21 +157,176 @@ TEST_F(HttpStoreTest, OtherBytesThanAskedForAreRefused) {
 }
 
 TEST_F(HttpStoreTest, AnObjectThatChangesIsNoMixture) {
-  std::atomic<int> version = 1;
+  for (const bool has_tags : {true, false}) {
+    std::atomic<int> version = 1;
+    const ScriptedServer server([&](const ServerRequest& request) {
+      const std::string tag = has_tags ? fmt::format("ETag: \"{}\"\r\n", version.load()) : "";
+      const std::string object = version == 1 ? kTen : version == 2 ? "abcdefghij" : "0123456789x";
+      return AnswerPart(request, object, tag);
+    });
+    const std::shared_ptr<Store> store = StoreAt(server.url());
+    EXPECT_EQ(Read(*store, "whole").value(), kTen);
+    EXPECT_EQ(Read(*store, "parts", {2, 3}).value(), "234");
+    for (const int changed : {2, 3}) {  // other bytes, another size
+      version = changed;
+      std::vector<Status> reads = {Read(*store, "parts", {2, 3}).status(), Read(*store, "whole").status()};
+      if (has_tags) reads.push_back(Read(*store, "parts", {7, 2}).status());  // only its version tells
+      for (const Status& status : reads) {
+        EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+        EXPECT_THAT(status.message(), HasSubstr("has changed since it was opened"));
+      }
+    }
+    version = 2;
+    EXPECT_EQ(Read(*store, "another").value(), "abcdefghij");
+    EXPECT_EQ(Read(*StoreAt(server.url()), "parts", {2, 3}).value(), "cde") << "who opens it now sees the new one";
+  }
+}
+
+// Replicas behind one address have ETags of their own; pages made on request are as old as the answer.
+TEST_F(HttpStoreTest, OtherVersionsOfTheSameBytesAreNoChange) {
+  for (const std::string name : {"ETag: \"{}\"\r\n", "Last-Modified: Thu, 01 Jan 1970 00:00:{:02} GMT\r\n"}) {
+    std::atomic<int> count = 0;
+    const ScriptedServer server([&](const ServerRequest& request) {
+      const int turn = ++count;
+      return AnswerPart(request, kTen, fmt::format(fmt::runtime(name), name.starts_with("E") ? turn % 2 : turn % 60));
+    });
+    const std::shared_ptr<Store> store = StoreAt(server.url());
+    EXPECT_EQ(Read(*store, "shard", {0, 4, true}).value(), "6789");
+    for (std::uint64_t i = 0; i < 8; ++i) EXPECT_EQ(Read(*store, "shard", {i, 2}).value(), std::string(kTen).substr(i, 2));
+    EXPECT_EQ(Read(*store, "shard").value(), kTen);
+  }
+}
+
+// ---- servers that answer otherwise
+
+// A bucket that does not let strangers list it says 403 of what is not there.
+TEST_F(HttpStoreTest, ForbiddenIsMissingWhereOthersCanBeRead) {
+  std::atomic<bool> open = true;
   const ScriptedServer server([&](const ServerRequest& request) {
-    const std::string tag = fmt::format("ETag: \"{}\"\r\n", version.load());
-    if (request.header("range").empty()) return AnswerText("200 OK", kTen, tag);
-    return AnswerText("206 Partial Content", "234", "Content-Range: bytes 2-4/10\r\n" + tag);
+    if (open && request.target.starts_with("/there")) return AnswerText("200 OK", kTen);
+    if (request.target == "/empty") return std::string("HTTP/1.1 204 No Content\r\n\r\n");
+    return AnswerText("403 Forbidden", "<?xml?><Error><Code>AccessDenied</Code></Error>");
   });
   const std::shared_ptr<Store> store = StoreAt(server.url());
-  EXPECT_EQ(Read(*store, "object").value(), kTen);
-  EXPECT_EQ(Read(*store, "object", {2, 3}).value(), "234");
-  version = 2;
-  const Status changed = Read(*store, "object", {2, 3}).status();
-  EXPECT_EQ(changed.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(changed.message(), HasSubstr("has changed since it was opened"));
-  EXPECT_EQ(Read(*store, "another").value(), kTen);
-  EXPECT_EQ(Read(*StoreAt(server.url()), "object", {2, 3}).value(), "234") << "who opens it now sees the new one";
+  const Status first = Read(*store, "missing").status();
+  EXPECT_EQ(first.code(), StatusCode::kUnavailable) << "perhaps all is forbidden";
+  EXPECT_THAT(first.message(), HasSubstr("HTTP 403 (AccessDenied): it is not public"));
+  EXPECT_EQ(Read(*store, "there").value(), kTen);
+  EXPECT_EQ(Read(*store, "empty").status().code(), StatusCode::kNotFound);
+  std::atomic<int> left = 40, missing = 0;
+  std::promise<void> all;
+  for (int i = 0; i < 40; ++i) {
+    store->Read(fmt::format("missing{}", i), i % 2 == 0 ? ByteRange{} : ByteRange{0, 4, true}, 100, [&](const Result<Bytes>& bytes) {
+      if (bytes.status().code() == StatusCode::kNotFound) ++missing;
+      if (--left == 0) all.set_value();
+    });
+  }
+  all.get_future().get();
+  EXPECT_EQ(missing, 40);
+  // A token that has run out must not look like missing chunks.
+  open = false;
+  EXPECT_EQ(Read(*store, "there2").status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(Read(*store, "missing").status().code(), StatusCode::kUnavailable);
+  open = true;
+  EXPECT_EQ(Read(*store, "there2").value(), kTen);
+  EXPECT_THAT(FailureOf([](const ServerRequest&) { return AnswerText("401 Unauthorized", ""); }).message(), HasSubstr("HTTP 401"));
+}
+
+TEST_F(HttpStoreTest, APageOfHtmlIsNoObject) {
+  const std::string page = "\n<!DOCTYPE html><html><body>log in</body></html>";
+  const ScriptedServer server([&](const ServerRequest& request) {
+    return request.target == "/there" ? AnswerText("200 OK", kTen, "Content-Type: text/html\r\n")
+                                      : AnswerPart(request, page, "Content-Type: text/html; charset=utf-8\r\n");
+  });
+  const std::shared_ptr<Store> store = StoreAt(server.url());
+  EXPECT_EQ(Read(*store, "chunk").status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(Read(*store, "there").value(), kTen) << "what it is called is not what it is";
+  EXPECT_EQ(Read(*store, "chunk").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(Read(*store, "shard", {0, 4, true}).status().code(), StatusCode::kNotFound);
+}
+
+TEST_F(HttpStoreTest, SizesAreKnownWithoutHead) {
+  const auto unsized = [](const ServerRequest&) { return std::string("HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n"); };
+  const std::pair<std::string, ScriptedServer::Script> heads[] = {{"without a length", unsized},
+                                                                  {"405", [](const ServerRequest&) { return AnswerText("405 x", ""); }},
+                                                                  {"403", [](const ServerRequest&) { return AnswerText("403 x", ""); }},
+                                                                  {"501", [](const ServerRequest&) { return AnswerText("501 x", ""); }}};
+  const std::string large(1000, 'x');
+  for (const auto& [name, head] : heads) {
+    const ScriptedServer server([&](const ServerRequest& request) {
+      if (request.method == "HEAD") return head(request);
+      return AnswerPart(request, request.target == "/large" ? large : request.target == "/none" ? "" : kTen);
+    });
+    const std::shared_ptr<Store> store = StoreAt(server.url());
+    EXPECT_EQ(Read(*store, "ten", {0, 4, true}).value(), "6789") << name;
+    EXPECT_EQ(Read(*store, "ten", {4, ByteRange::kAll}).value(), "456789") << name;
+    EXPECT_EQ(Read(*store, "large", {0, 4, true}).value(), "xxxx") << name;
+    EXPECT_EQ(Read(*store, "none", {0, 4, true}).value(), "") << name;
+  }
+}
+
+TEST_F(HttpStoreTest, WhatComesEncodedIsDecoded) {
+  // "0123456789" as `gzip -n` and `brotli` write it.
+  const std::string gzip = FromHex("1f8b08000000000000033330343236313533b7b00400c6c784a60a000000");
+  const std::string brotli = FromHex("8b04803031323334353637383903");
+  const auto answer = [](const std::string& body, const std::string& encoding) {
+    return [=](const ServerRequest& request) {
+      EXPECT_EQ(request.header("accept-encoding"), "");
+      return AnswerText("200 OK", body, "Content-Encoding: " + encoding + "\r\n");
+    };
+  };
+  const auto read = [&](const ScriptedServer::Script& script, const std::string& key, std::uint64_t most = 1000) {
+    const ScriptedServer server(script);
+    return Read(*StoreAt(server.url()), key, {}, most);
+  };
+  EXPECT_EQ(read(answer(gzip, "gzip"), "zarr.json").value(), kTen);
+  EXPECT_EQ(read(answer(brotli, "br"), "zarr.json").value(), kTen);
+  EXPECT_EQ(read(answer(gzip, "gzip"), "info.gz").value(), gzip) << "the name says that it is compressed";
+  EXPECT_EQ(read(answer(kTen, "gzip"), "chunk").value(), kTen) << "what is said is not so";
+  EXPECT_EQ(read(answer(kTen, "aws-chunked"), "chunk").value(), kTen);
+  EXPECT_EQ(read(answer(gzip, "gzip"), "zarr.json", 9).status().code(), StatusCode::kResourceExhausted);
+}
+
+// ---- what goes along with requests
+
+TEST_F(HttpStoreTest, QueryAndHeadersGoToThisServerAlone) {
+  const TemporaryDirectory folder;
+  ASSERT_TRUE(WriteTextFile(folder / "token", "Bearer secret\n").ok());
+  ASSERT_TRUE(WriteTextFile(folder / "lines", "a\nb\n").ok());
+  const ScriptedServer other([](const ServerRequest&) { return AnswerText("200 OK", "x"); });
+  const ScriptedServer server([&](const ServerRequest& request) {
+    const bool right = request.header("authorization") == "Bearer secret" && request.header("x-more") == "1";
+    if (request.target.ends_with("?away")) return AnswerText("302 x", "", fmt::format("Location: {}/x\r\n", other.url()));
+    return AnswerText(right && request.target == "/a%20b?sig=secret%2B" ? "200 OK" : "401 x", kTen);
+  });
+  const auto open = [&](const std::string& query, const std::string& file) {
+    return HttpStore(server.url(), transfers_, nullptr, {.query = query, .headers = {"Authorization:@" + folder / file, "X-More: 1"}});
+  };
+  EXPECT_EQ(Read(*open("sig=secret%2B", "token").value(), "a b").value(), kTen);
+  const Status refused = Read(*open("sig=other", "token").value(), "a b").status();
+  EXPECT_THAT(refused.message(), HasSubstr("/a%20b: HTTP 401"));
+  EXPECT_EQ(Read(*open("away", "token").value(), "a").value(), "x");
+  ASSERT_EQ(other.requests().size(), 1U);
+  EXPECT_EQ(other.requests().front().header("authorization"), "") << "another port is another server";
+  EXPECT_EQ(other.requests().front().target, "/x");
+  for (const char* file : {"lines", "none"}) {
+    EXPECT_EQ(open("", file).status().code(), StatusCode::kInvalidArgument);
+    EXPECT_THAT(open("", file).status().message(), HasSubstr("header Authorization: "));
+  }
+}
+
+TEST_F(HttpStoreTest, ASilentServerIsLeftInTime) {
+  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .patience = seconds(1)});
+  std::promise<void> end;
+  const std::shared_future<void> ended(end.get_future());
+  const ScriptedServer server([&](const ServerRequest&) {
+    ended.wait();
+    return std::string();
+  });
+  const Status failure = Read(**HttpStore(server.url(), impatient), "object").status();
+  EXPECT_EQ(failure.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(failure.message(), HasSubstr("no answer within 1 s, or less than 1024 bytes a second; 1 try"));
+  end.set_value();
 }
 
 TEST_F(HttpStoreTest, RedirectsAreFollowedWhereTheyMayLead) {
@@ -190,12 +362,7 @@ TEST_F(HttpStoreTest, PartsThatWaitSideBySideAreOneRequest) {
       may_go.wait();
       return AnswerText("200 OK", "x");
     }
-    std::size_t begin = 0, last = 0;
-    if (request.target == "/none") return AnswerText("404 x", "");
-    if (std::sscanf(request.header("range").c_str(), "bytes=%zu-%zu", &begin, &last) != 2) return AnswerText("400 x", "");
-    if (begin >= object.size()) return AnswerText("416 x", "", fmt::format("Content-Range: bytes */{}\r\n", object.size()));
-    const std::string part = object.substr(begin, last + 1 - begin);
-    return AnswerText("206 x", part, fmt::format("Content-Range: bytes {}-{}/{}\r\n", begin, begin + part.size() - 1, object.size()));
+    return request.target == "/none" ? AnswerText("404 x", "") : AnswerPart(request, object);
   });
   const std::shared_ptr<Store> store = StoreAt(server.url());
   constexpr std::size_t kWaiting = HttpTransfers::kMostOfAHost, kParts = 200;

@@ -178,7 +178,8 @@ TEST_F(ObjectCacheTest, AStoreMayTakeWhatIsKeptWithoutAskingForIt) {
   cache.Keep(server.url() + "/volume/old", {"\"v1\"", 4, BytesOf("kept")});
   HttpTransfers transfers({});
   const std::shared_ptr<Store> checks = HttpStore(server.url() + "/volume", transfers, &cache).value(),
-                               takes = HttpStore(server.url() + "/volume", transfers, &cache, KeptObjects::kAreTaken).value();
+                               takes =
+                                   HttpStore(server.url() + "/volume", transfers, &cache, {.kept = WebOptions::Kept::kAreTaken}).value();
   EXPECT_EQ(TextOf(ReadNow(*takes, "old").value()), "kept");
   EXPECT_EQ(asked, 0);
   EXPECT_EQ(TextOf(ReadNow(*takes, "new").value()), "served");

@@ -14,6 +14,7 @@
 #include "common/base/files.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/store.h"
+#include "data/stores/transfer.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/support/temporary_directory.h"
 
@@ -160,6 +161,43 @@ TEST_F(S3Test, RequestsAreSignedForThisServerAlone) {
   // Where a redirect leads to, nobody gets a signature. It is an address of this machine, so nobody is asked at all.
   EXPECT_THAT(read("away"), HasSubstr("an address of this machine"));
   EXPECT_TRUE(other.requests().empty());
+}
+
+// A bucket is asked in the region that its server names, from then on.
+TEST_F(S3Test, BucketsMayBeInAnotherRegion) {
+  Set("AWS_ACCESS_KEY_ID", "KEY");
+  Set("AWS_SECRET_ACCESS_KEY", kSecret);
+  const std::string malformed = "<Error><Code>AuthorizationHeaderMalformed</Code><Region>eu-central-1</Region></Error>";
+  const std::string answers[] = {AnswerText("301 x", "", "x-amz-bucket-region: eu-central-1\r\n"),
+                                 AnswerText("403 x", "", "x-amz-bucket-region: eu-central-1\r\n"), AnswerText("400 x", malformed)};
+  for (const std::string& answer : answers) {
+    const ScriptedServer server([&](const ServerRequest& request) {
+      const bool is_there = request.header("authorization").find("/eu-central-1/s3/") != std::string::npos;
+      return !is_there ? answer : AnswerText(IsSigned(request, kSecret) ? "200 OK" : "403 x", "ten");
+    });
+    HttpTransfers transfers({});
+    const std::shared_ptr<Store> store = HttpStore("s3://bucket/em?endpoint=" + server.url(), transfers).value();
+    for (const char* key : {"a", "b", "c"}) EXPECT_TRUE(ReadNow(*store, key).ok()) << answer;
+    EXPECT_EQ(server.requests().size(), 4U) << "it is told once";
+  }
+  const ScriptedServer nowhere([&](const ServerRequest&) { return answers[0]; });
+  HttpTransfers transfers({});
+  const Status status = ReadNow(**HttpStore("s3://bucket/em?endpoint=" + nowhere.url(), transfers), "a").status();
+  EXPECT_THAT(status.message(), HasSubstr("the bucket is in the region 'eu-central-1'"));
+}
+
+TEST_F(S3Test, RegionsAreInTheNamesOfAmazon) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"https://bucket.s3.us-east-1.amazonaws.com/a", "https://bucket.s3.eu-west-3.amazonaws.com/a"},
+      {"https://my.bucket.s3.amazonaws.com/a", "https://my.bucket.s3.eu-west-3.amazonaws.com/a"},
+      {"https://s3.amazonaws.com/bucket/a", "https://s3.eu-west-3.amazonaws.com/bucket/a"},
+      {"https://s3-us-west-2.amazonaws.com/bucket/a", "https://s3.eu-west-3.amazonaws.com/bucket/a"},
+      {"https://amazonaws.com/a", "https://amazonaws.com/a"},
+      {"https://ec2.us-east-1.amazonaws.com/a", "https://ec2.us-east-1.amazonaws.com/a"},
+      {"https://s3.amazonaws.com.example.org/a", "https://s3.amazonaws.com.example.org/a"},
+      {"http://127.0.0.1:9000/bucket", "http://127.0.0.1:9000/bucket"},
+  };
+  for (const auto& [url, there] : cases) EXPECT_EQ(InRegion(url, "eu-west-3"), there);
 }
 
 }  // namespace

@@ -158,6 +158,14 @@ TEST(FolderStoreTest, FollowsLinksInsideOnly) {
     EXPECT_THAT(status.message(), HasSubstr("is not followed")) << key;
   }
   EXPECT_EQ(store->List("folder").status().code(), StatusCode::kUnavailable);
+  const auto following = FolderStore(folder / "store", Links::kMayLeadOut);
+  for (const char* const key : {"up", "absolute", "folder/file"}) EXPECT_EQ(*ReadPart(*following, key), "out") << key;
+  EXPECT_THAT(*following->List("folder"), ElementsAre("file"));
+  EXPECT_EQ(CodeOf(*following, "../secret/file"), StatusCode::kInvalidArgument);
+  // Chunks that are not there have the fill value; those that were not fetched must not.
+  std::filesystem::create_symlink("../annex/key", folder / "store/unfetched");
+  EXPECT_THAT(ReadPart(*following, "unfetched").status().message(), HasSubstr("is a link to a file that is not there"));
+  EXPECT_EQ(CodeOf(*following, "nothing"), StatusCode::kNotFound);
   // The store itself may be behind a link: its name is the operator's.
   std::filesystem::create_directory_symlink("store", folder / "alias");
   EXPECT_EQ(*ReadPart(*FolderStore(folder / "alias"), "a/inside"), "in");

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstring>
 #include <mutex>
 #include <numeric>
 
@@ -135,12 +137,39 @@ TEST(ReadLevelTest, IsTheVolume) {
   SCOPED_TRACE(random.trace());
   for (const ScalarType type : kTypes) {
     const std::shared_ptr<const Volume> volume = SomeVolume(random, {33, 70, 130}, type);
-    const Result<std::shared_ptr<const Volume>> read = ReadLevel(*MakeMemorySource(volume, {}), 0);
+    const Result<LevelInMemory> read = ReadLevel(*MakeMemorySource(volume, {}), 0);
     ASSERT_TRUE(read.ok()) << read.status().message();
-    EXPECT_EQ((*read)->description, volume->description);
-    EXPECT_EQ((*read)->block.box, volume->block.box);
-    EXPECT_EQ((*read)->block.bytes, volume->block.bytes);
+    EXPECT_EQ(read->volume->description, volume->description);
+    EXPECT_EQ(read->volume->block.box, volume->block.box);
+    EXPECT_EQ(read->volume->block.bytes, volume->block.bytes);
+    EXPECT_EQ(read->exact, nullptr);
   }
+}
+
+// Large enough to be read in several stretches. The one number that float32 rounds lies in the last slice.
+TEST(ReadLevelTest, KeepsWholeNumbersThatAreRounded) {
+  const auto volume = std::make_shared<Volume>();
+  volume->description = {.geometry = {.size = {512, 512, 40}}, .type = ScalarType::kFloat32};
+  volume->block = MakeVoxelBlock(volume->description.geometry.bounds(), ScalarType::kFloat32);
+  const std::size_t count = CountIn(volume->description.geometry.size);
+  std::vector<std::uint64_t> ids(count);
+  for (std::size_t i = 0; i < count; ++i) ids[i] = i * 3;
+  const auto read = [&](ExactWanted wanted) {
+    const auto exact = std::make_shared<ExactSamples>(ExactSamples{{SampleType::kUint64}, {}});
+    exact->bytes.resize(count * sizeof(std::uint64_t));
+    std::memcpy(exact->bytes.data(), ids.data(), exact->bytes.size());
+    std::ranges::copy(ids, volume->block.samples<float>());
+    Result<LevelInMemory> level = ReadLevel(*MakeMemorySource(volume, {}, exact), 0, nullptr, wanted);
+    EXPECT_TRUE(level.ok()) << level.status().message();
+    EXPECT_EQ(level->volume->block.bytes, volume->block.bytes);
+    EXPECT_TRUE(level->exact == nullptr || level->exact->bytes == exact->bytes);
+    return level->exact != nullptr;
+  };
+  for (std::uint64_t& id : ids) id &= 0xffffff;  // all of these are exact as float32
+  EXPECT_FALSE(read(ExactWanted::kLabels));
+  EXPECT_TRUE(read(ExactWanted::kAll));
+  ids.back() = 12857642017;
+  EXPECT_TRUE(read(ExactWanted::kLabels));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <gdcmGlobal.h>
 #include <gdcmImageChangeTransferSyntax.h>
 #include <gdcmImageReader.h>
+#include <gdcmSequenceOfFragments.h>
 #include <gdcmSequenceOfItems.h>
 #include <gdcmTrace.h>
 #include <gdcmUIDGenerator.h>
@@ -102,12 +103,12 @@ gdcm::DataElement CompressedPixels(const std::string& path, DicomSyntax syntax) 
   return change.GetOutput().GetDataElement();
 }
 
-void Write(const std::string& path, const gdcm::DataSet& data, DicomSyntax syntax) {
+void Write(const std::string& path, const gdcm::DataSet& data, const gdcm::TransferSyntax& syntax) {
   std::filesystem::remove(path);
   gdcm::Writer writer;
   writer.SetFileName(path.c_str());
   writer.GetFile().SetDataSet(data);
-  writer.GetFile().GetHeader().SetDataSetTransferSyntax(SyntaxOf(syntax));
+  writer.GetFile().GetHeader().SetDataSetTransferSyntax(syntax);
   CHECK(writer.Write()) << path;
 }
 
@@ -162,6 +163,24 @@ void WriteDicom(const std::string& path, const DicomSpec& spec) {
     for (const std::vector<DicomGroups>& frame : spec.per_frame) items.push_back(GroupItem(frame));
     PutSequence(data, 0x52009230, items);
   }
+  for (const auto& [tag, items] : spec.sequences) {
+    std::vector<gdcm::DataSet> sets(items.size());
+    for (std::size_t i = 0; i < items.size(); ++i) Put(sets[i], items[i]);
+    PutSequence(data, tag, sets);
+  }
+  if (!spec.frames.empty()) {
+    const gdcm::SmartPointer<gdcm::SequenceOfFragments> fragments = new gdcm::SequenceOfFragments;
+    for (FileBytes frame : spec.frames) {
+      if (frame.size() % 2 == 1) frame += '\0';
+      gdcm::Fragment fragment;
+      fragment.SetByteValue(frame.data(), gdcm::VL(std::uint32_t(frame.size())));
+      fragments->AddFragment(fragment);
+    }
+    gdcm::DataElement element(gdcm::Tag(0x7fe0, 0x0010), 0, gdcm::VR::OB);
+    element.SetValue(*fragments);
+    data.Replace(element);
+    return Write(path, data, gdcm::TransferSyntax::GetTSType(spec.frames_syntax.c_str()));
+  }
   if (!spec.pixels.empty()) {
     const bool words = spec.values.at(kTagBitsAllocated) != "8";
     FileBytes pixels = spec.pixels;
@@ -171,11 +190,30 @@ void WriteDicom(const std::string& path, const DicomSpec& spec) {
     data.Replace(element);
   }
   const bool compressed = spec.syntax > DicomSyntax::kBigEndian;
-  Write(path, data, compressed ? DicomSyntax::kExplicit : spec.syntax);
+  Write(path, data, SyntaxOf(compressed ? DicomSyntax::kExplicit : spec.syntax));
   if (!compressed) return;
   // Not by GDCM's writer of images, which changes what it does not know.
   data.Replace(CompressedPixels(path, spec.syntax));
-  Write(path, data, spec.syntax);
+  Write(path, data, SyntaxOf(spec.syntax));
+}
+
+FileBytes DicomElement(DicomTag tag, std::string_view type, std::uint32_t length, const FileBytes& value) {
+  const auto put = [](std::uint32_t number, int bytes) {
+    FileBytes out;
+    for (int i = 0; i < bytes; ++i) out += char(number >> (8 * i) & 0xff);
+    return out;
+  };
+  FileBytes bytes = put(tag >> 16, 2) + put(tag & 0xffff, 2) + FileBytes(type);
+  if (type.empty()) return bytes + put(length, 4) + value;
+  const bool is_long = type == "OB" || type == "OW" || type == "SQ" || type == "UN" || type == "OF" || type == "OD";
+  return bytes + (is_long ? put(0, 2) + put(length, 4) : put(length, 2)) + value;
+}
+
+std::size_t BeginOfDataSet(const FileBytes& file) {
+  constexpr std::size_t kMeta = 132, kLength = 8, kFirst = 12;  // its first element is the length of the others
+  std::uint32_t length = 0;
+  std::memcpy(&length, file.data() + kMeta + kLength, sizeof(length));
+  return kMeta + kFirst + length;
 }
 
 void WriteSeries(const std::string& directory, const Stored& stored, SampleType type, const DicomValues& changed, DicomSyntax syntax) {

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "data/volume_io/dicom_elements.h"
@@ -40,13 +42,22 @@ struct DicomGroups {
 struct DicomSpec {
   DicomValues values = SliceValues();
   FileBytes pixels;  // in little endian; empty: none
+  // Compressed frames, one each, instead of pixels, and their transfer syntax (UID).
+  std::vector<FileBytes> frames = {};
+  std::string frames_syntax = {};
   DicomSyntax syntax = DicomSyntax::kExplicit;
   // Functional groups of a multi-frame image: of all frames, and of each.
   std::vector<DicomGroups> shared;
   std::vector<std::vector<DicomGroups>> per_frame;
+  std::vector<std::pair<DicomTag, std::vector<DicomValues>>> sequences = {};  // further ones, with the values of their items
 };
 
 void WriteDicom(const std::string& path, const DicomSpec& spec);
+
+// An element as explicit little endian has it, with any length; without a type as implicit has it.
+FileBytes DicomElement(DicomTag tag, std::string_view type, std::uint32_t length, const FileBytes& value = "");
+// Where the data set of a file of WriteDicom begins, behind its file meta information.
+std::size_t BeginOfDataSet(const FileBytes& file);
 
 // The slices of a stored object as a series: one file each, whose names and InstanceNumbers are in no order. `changed`: elements that
 // differ from SliceValues(). Samples are of type `type`, in little endian.

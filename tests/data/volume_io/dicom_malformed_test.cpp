@@ -82,49 +82,38 @@ TEST(DicomMalformed, AlteredBytesNeverDoHarm) {
   }
 }
 
-// An element as explicit little endian has it, with a length of its own.
-FileBytes Element(DicomTag tag, std::string_view type, std::uint32_t length, const FileBytes& value = "") {
-  const auto put = [](std::uint32_t number, int bytes) {
-    FileBytes out;
-    for (int i = 0; i < bytes; ++i) out += char(number >> (8 * i) & 0xff);
-    return out;
-  };
-  FileBytes bytes = put(tag >> 16, 2) + put(tag & 0xffff, 2) + FileBytes(type);
-  if (type.empty()) return bytes + put(length, 4) + value;
-  const bool is_long = type == "OB" || type == "OW" || type == "SQ" || type == "UN";
-  return bytes + (is_long ? put(0, 2) + put(length, 4) : put(length, 2)) + value;
-}
-
 FileBytes Beginning(const std::string& transfer_syntax = "1.2.840.10008.1.2.1") {
   FileBytes uid = transfer_syntax;
   if (uid.size() % 2 == 1) uid += '\0';
-  return FileBytes(128, '\0') + "DICM" + Element(0x00020010, "UI", std::uint32_t(uid.size()), uid);
+  return FileBytes(128, '\0') + "DICM" + DicomElement(0x00020010, "UI", std::uint32_t(uid.size()), uid);
 }
 
 TEST(DicomMalformed, LengthsAndDepthsAreNotBelieved) {
   constexpr std::uint32_t kOpen = 0xffffffff;
-  FileBytes deep = Beginning(), items = Beginning() + Element(0x52009230, "SQ", kOpen);
-  for (int i = 0; i < 100000; ++i) deep += Element(0x52009230, "SQ", kOpen) + Element(0xfffee000, "", kOpen);
+  FileBytes deep = Beginning(), items = Beginning() + DicomElement(0x52009230, "SQ", kOpen);
+  for (int i = 0; i < 100000; ++i) deep += DicomElement(0x52009230, "SQ", kOpen) + DicomElement(0xfffee000, "", kOpen);
   for (int i = 0; i < 5000000; ++i) items += FileBytes("\xfe\xff\x00\xe0\x00\x00\x00\x00", 8);
   const struct {
     const char* name;
     FileBytes bytes;
     std::string why;
   } cases[] = {
-      {"a value of 4 GiB", Beginning() + Element(0x00080060, "OB", 0xfffffff0, "abc"), "(0008,0060) claims 4294967280 bytes, there are 3"},
-      {"a wanted text that is too long", Beginning() + Element(0x0020000e, "UI", 60000, "1.2"), "(0020,000e) claims 60000 bytes"},
-      {"a sequence that is too long", Beginning() + Element(0x52009230, "SQ", 1000, "abc"), "(5200,9230) claims 1000 bytes"},
-      {"an item that is too long", Beginning() + Element(0x52009230, "SQ", kOpen) + Element(0xfffee000, "", 1000),
+      {"a value of 4 GiB", Beginning() + DicomElement(0x00080060, "OB", 0xfffffff0, "abc"),
+       "(0008,0060) claims 4294967280 bytes, there are 3"},
+      {"a wanted text that is too long", Beginning() + DicomElement(0x0020000e, "UI", 60000, "1.2"), "(0020,000e) claims 60000 bytes"},
+      {"a sequence that is too long", Beginning() + DicomElement(0x52009230, "SQ", 1000, "abc"), "(5200,9230) claims 1000 bytes"},
+      {"an item that is too long", Beginning() + DicomElement(0x52009230, "SQ", kOpen) + DicomElement(0xfffee000, "", 1000),
        "(fffe,e000) claims 1000"},
-      {"no item", Beginning() + Element(0x52009230, "SQ", kOpen) + Element(0x00080060, "CS", 2, "CT"),
+      {"no item", Beginning() + DicomElement(0x52009230, "SQ", kOpen) + DicomElement(0x00080060, "CS", 2, "CT"),
        "must begin there, found (0008,0060)"},
       {"half an element", Beginning() + "\x08", "1 bytes are left"},
       {"sequences without an end", deep, "nest more than 16 deep"},
       {"millions of items", items, "more than 4194304 elements"},
-      {"no transfer syntax", FileBytes(128, '\0') + "DICM" + Element(0x00080060, "CS", 2, "CT"), "no transfer syntax"},
-      {"deflated", Beginning("1.2.840.10008.1.2.1.99"), "deflated"},
-      {"nothing", FileBytes(128, '\0') + "DICM", "no transfer syntax"},
-      {"no image", Beginning() + Element(0x00080060, "CS", 2, "SR"), "no images: its modality is 'SR'"},
+      {"no transfer syntax for compressed pixels", FileBytes(128, '\0') + "DICM" + DicomElement(0x7fe00010, "OB", kOpen),
+       "has compressed pixels, and no transfer syntax is stated"},
+      {"deflated nothing", Beginning("1.2.840.10008.1.2.1.99"), "no images"},
+      {"nothing", FileBytes(128, '\0') + "DICM", "no images"},
+      {"no image", Beginning() + DicomElement(0x00080060, "CS", 2, "SR"), "no images: its modality is 'SR'"},
   };
   for (const auto& each : cases) {
     SCOPED_TRACE(each.name);
@@ -163,10 +152,10 @@ TEST(DicomMalformed, ClaimsOfPixelsAreChecked) {
         if (tag == kTagFrames) {
           FileBytes value = text;
           if (value.size() % 2 == 1) value += ' ';
-          const FileBytes rows = Element(kTagRows, "US", 2);
-          bytes.insert(bytes.find(rows), Element(kTagFrames, "IS", std::uint32_t(value.size()), value));
+          const FileBytes rows = DicomElement(kTagRows, "US", 2);
+          bytes.insert(bytes.find(rows), DicomElement(kTagFrames, "IS", std::uint32_t(value.size()), value));
         } else {
-          const FileBytes header = Element(tag, "US", 2);
+          const FileBytes header = DicomElement(tag, "US", 2);
           const int number = std::stoi(text);
           bytes.replace(bytes.find(header) + header.size(), 2, {char(number & 0xff), char(number >> 8)});
         }

@@ -106,8 +106,8 @@ TEST(Dicom, GivesBackEveryTypeOfPixelsInEveryTransferSyntax) {
   for (const auto& [type, low, high] : cases) {
     for (const DicomSyntax syntax : {DicomSyntax::kImplicit, DicomSyntax::kExplicit, DicomSyntax::kBigEndian, DicomSyntax::kJpegLossless,
                                      DicomSyntax::kJpegLs, DicomSyntax::kJpeg2000, DicomSyntax::kRle}) {
-      // GDCM's coders take no more bits.
-      if (BytesPerSample(type) == 4 && syntax > DicomSyntax::kBigEndian) continue;
+      // GDCM's coders take no more bits, and programs differ in what 32 bits in big endian are.
+      if (BytesPerSample(type) == 4 && syntax >= DicomSyntax::kBigEndian) continue;
       SCOPED_TRACE(fmt::format("{} {}", ToString(type), int(syntax)));
       std::vector<double> values;  // slices of fewer pixels are too small for GDCM's coders
       for (int i = 0; i < 20 * 16 * 3; ++i) values.push_back(i % 120);

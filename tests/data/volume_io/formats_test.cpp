@@ -228,26 +228,6 @@ TEST(Geometry, TakesDistancesFromNegativeSpacingsAndOneFromZero) {
   EXPECT_EQ(Read(directory / "v.nrrd").info.description.geometry.spacing, (Vec3{2, 0.5, 3}));
 }
 
-TEST(Nifti, TakesTheMatrixThatLeadsToTheScanner) {
-  const TemporaryDirectory directory;
-  const auto expect = [&](std::int16_t qform, std::int16_t sform, const std::array<Vec3, 3>& steps) {
-    for (const bool big_endian : {false, true}) {
-      WriteFile(directory / "v.nii", NiftiHeader({.big_endian = big_endian, .qform = qform, .sform = sform}) + std::string(24, 'x'));
-      const VolumeFileInfo info = Read(directory / "v.nii").info;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        for (int i = 0; i < 3; ++i) EXPECT_NEAR(info.steps[axis][i], steps[axis][i], 1e-6) << qform << sform;
-      }
-    }
-  };
-  const std::array<Vec3, 3> turned = {Vec3{0, 1, 0}, Vec3{-1, 0, 0}, Vec3{0, 0, 1}},
-                            swapped = {Vec3{2, 0, 0}, Vec3{0, 0, 2}, Vec3{0, 2, 0}};
-  expect(0, 0, {Vec3{1, 0, 0}, Vec3{0, 1, 0}, Vec3{0, 0, 1}});
-  expect(1, 0, turned);
-  expect(2, 2, turned);
-  expect(0, 2, swapped);
-  expect(2, 1, swapped);
-}
-
 TEST(Nrrd, SkipsBytesBeforeTheSamples) {
   const TemporaryDirectory directory;
   std::string samples;

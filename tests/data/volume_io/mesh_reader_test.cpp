@@ -20,7 +20,7 @@ class MeshReader : public testing::Test {
  protected:
   Result<LoadedMesh> Read(const FileBytes& bytes, const std::string& array = "") {
     WriteFile(path_, bytes);
-    return ReadMesh(path_, {array});
+    return ReadMesh(path_, {.array = array});
   }
   // The message with which the file is refused.
   std::string Refusal(const VtuSpec& spec, const std::string& array = "") {
@@ -96,8 +96,9 @@ TEST_F(MeshReader, ReadsLegacyFilesOfBothVersions) {
         EXPECT_EQ(loaded->info.arrays[loaded->info.array].name, "height");
         EXPECT_EQ(Read(legacy, "number")->mesh.values, Read(VtuFile(spec), "number")->mesh.values);
         EXPECT_EQ(Read(legacy, "a b")->mesh.values, AlignedVector<float>(10, 5));
-        EXPECT_THAT(Read(legacy, "wind").status().message(), HasSubstr("array wind has 3 components, must have 1"));
-        EXPECT_THAT(Read(legacy, "heat").status().message(), HasSubstr("has no array 'heat'; it has number, height, a b"));
+        EXPECT_THAT(Read(legacy, "wind").status().message(), HasSubstr("has 3 components a voxel, of which --channel takes one"));
+        EXPECT_EQ(ReadMesh(path_, {.array = "wind", .channel = 2})->mesh.values, AlignedVector<float>(10, 7));
+        EXPECT_THAT(Read(legacy, "heat").status().message(), HasSubstr("has no array 'heat'; it has number, wind, height, a b"));
       }
     }
   }
@@ -134,7 +135,8 @@ TEST_F(MeshReader, SaysWhatIsWrongWithALegacyFile) {
     EXPECT_FALSE(loaded.ok());
     return loaded.ok() ? "" : loaded.status().message();
   };
-  EXPECT_THAT(with("UNSTRUCTURED_GRID", "POLYDATA"), HasSubstr("a VTK dataset of type POLYDATA, must be UNSTRUCTURED_GRID"));
+  EXPECT_THAT(with("UNSTRUCTURED_GRID", "POLYDATA"),
+              HasSubstr("a VTK dataset of type POLYDATA, must be STRUCTURED_POINTS, RECTILINEAR_GRID or UNSTRUCTURED_GRID"));
   EXPECT_THAT(with("POINTS 10", "POINTS -1"), HasSubstr("POINTS has '-1', must be a whole number in [0,"));
   EXPECT_THAT(with("POINTS 10", "POINTS 281474976710656"), HasSubstr("truncated: has "));
   EXPECT_THAT(with("POINTS 10 double", "POINTS 10 bit"), HasSubstr("POINTS: type 'bit' is not supported"));
@@ -172,13 +174,13 @@ TEST_F(MeshReader, TakesTheArrayThatIsNamedElseTheActiveOneElseTheOnlyOne) {
   EXPECT_EQ(std::ranges::count(of_cells->mesh.values, 3.0F), 1);
   EXPECT_THAT(Refusal(spec, "heat"), HasSubstr("has no array 'heat'; it has height, number"));
   spec.point_scalars = "";
-  EXPECT_THAT(Refusal(spec), HasSubstr("has several arrays and none is the active scalars; choose one by its name: height, number"));
+  EXPECT_EQ(Read(VtuFile(spec))->mesh.at, ValuesAt::kPoints);  // the only one of points
   spec.cell_scalars = "number";
   ASSERT_TRUE(Read(VtuFile(spec)).ok());
   EXPECT_EQ(Read(VtuFile(spec))->mesh.at, ValuesAt::kCells);
   spec.arrays[0].components = 2;
   spec.arrays[0].values.resize(20);
-  EXPECT_THAT(Refusal(spec, "height"), HasSubstr("array height has 2 components, must have 1"));
+  EXPECT_THAT(Refusal(spec, "height"), HasSubstr("has 2 components a voxel, of which --channel takes one: 0 to 1"));
 }
 
 TEST_F(MeshReader, KeepsThePrecisionOfPointsFarFromTheOrigin) {
@@ -198,7 +200,8 @@ TEST_F(MeshReader, SaysWhatIsWrong) {
     change(spec);
     return Refusal(spec);
   };
-  EXPECT_THAT(with([](VtuSpec& s) { s.points = 0; }), HasSubstr("NumberOfPoints is '0', must be a whole number in [1, 2147483648]"));
+  EXPECT_THAT(with([](VtuSpec& s) { s.points = 0; }), HasSubstr("has no piece with points and cells in it"));
+  EXPECT_THAT(with([](VtuSpec& s) { s.points = -1; }), HasSubstr("NumberOfPoints is '-1', must be a whole number in [0, 2147483648]"));
   EXPECT_THAT(with([](VtuSpec& s) { s.arrays[kKinds].values[2] = 42; }), HasSubstr("cell 2 has VTK's type 42; supported: tetrahedra (10)"));
   EXPECT_THAT(with([](VtuSpec& s) { s.arrays[kKinds].values[0] = 12; }),
               HasSubstr("the points of cell 0, a hexahedron, end at 6, must end at 8"));
@@ -216,7 +219,7 @@ TEST_F(MeshReader, SaysWhatIsWrong) {
               HasSubstr("array connectivity of Cells has no whole numbers"));
   EXPECT_THAT(with([](VtuSpec& s) { s.arrays.erase(s.arrays.begin() + kEnds); }), HasSubstr("has no array offsets in Cells"));
   EXPECT_THAT(with([](VtuSpec& s) { s.arrays.erase(s.arrays.begin(), s.arrays.begin() + 2); }),
-              HasSubstr("has no array with one component"));
+              HasSubstr("has no array of points or cells"));
   EXPECT_THAT(Refusal(GridSpec({{0, 0, 0}, {1, 0, 0}, {0, 1, 1}}, {5}, {{0, 1, 2}})), HasSubstr("has no cells with a volume"));
   const FileSpec image;
   EXPECT_THAT(Read(VtiFile(image, FileBytes(24, '\0'))).status().message(),

@@ -1,6 +1,7 @@
 #include "tests/data/volume_io/more_files.h"
 
 #include <fmt/format.h>
+#include <openjpeg.h>
 #include <png.h>
 
 #include <jpeglib.h>
@@ -11,6 +12,7 @@
 #include <cstring>
 
 #include "common/base/check.h"
+#include "tests/data/codecs/packed_bytes.h"
 
 namespace slabstream {
 namespace {
@@ -43,7 +45,10 @@ FileBytes VtkXmlSamples(const FileSpec& spec, const FileBytes& samples, const Vt
   FileBytes sizes, blocks;
   std::size_t count = 0;
   for (std::size_t begin = 0; begin < samples.size(); begin += options.block, ++count) {
-    const FileBytes block = Zlib(samples.substr(begin, options.block));
+    const FileBytes block = PackBytes(options.compressor == "LZMA"  ? "xz"
+                                      : options.compressor == "LZ4" ? "lz4 block"
+                                                                    : "zlib",
+                                      samples.substr(begin, options.block));
     sizes += Word(block.size(), spec, options);
     blocks += block;
   }
@@ -88,6 +93,15 @@ FileBytes MrcHeader(const MrcSpec& spec) {
   return bytes;
 }
 
+FileBytes MghHeader(const Index3& size, std::int32_t type, const std::array<float, 15>& fields, bool good) {
+  FileBytes bytes(284, '\0');
+  const std::int32_t integers[] = {1, size.x, size.y, size.z, 1, type};
+  for (std::size_t i = 0; i < 6; ++i) PutNumber(bytes, 4 * i, integers[i], true);
+  PutNumber(bytes, 28, std::int16_t(good ? 1 : 0), true);
+  for (std::size_t i = 0; i < fields.size(); ++i) PutNumber(bytes, 30 + 4 * i, fields[i], true);
+  return bytes;
+}
+
 FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool fortran, int version) {
   FileBytes text = fmt::format("{{'descr': '{}', 'fortran_order': {}, 'shape': {}, }}", descr, fortran ? "True" : "False", shape);
   const std::size_t before = version == 1 ? 10 : 12;
@@ -129,16 +143,19 @@ FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptio
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n"
       "<ImageData WholeExtent=\"{}\" Origin=\"{} {} {}\" Spacing=\"{} {} {}\"{}>\n<Piece Extent=\"{}\">\n<PointData {}>\n",
       spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
-      options.block > 0 ? " compressor=\"vtkZLibDataCompressor\"" : "", extent, options.origin.x, options.origin.y, options.origin.z,
-      spec.spacing.x, spec.spacing.y, spec.spacing.z, options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent,
-      options.attributes);
+      options.block > 0 ? " compressor=\"vtk" + options.compressor + "DataCompressor\"" : "", extent, options.origin.x, options.origin.y,
+      options.origin.z, spec.spacing.x, spec.spacing.y, spec.spacing.z,
+      options.direction.empty() ? "" : " Direction=\"" + options.direction + "\"", extent, options.attributes);
   const FileBytes stored = VtkXmlSamples(spec, samples, options);
   const bool appended = options.format == "appended";
   for (int i = 0; i < options.arrays; ++i) {
     text += fmt::format("<DataArray type=\"{}\" Name=\"density{}\" NumberOfComponents=\"{}\" format=\"{}\"{}>\n", kTypes[int(spec.type)],
                         i == 0 ? "" : std::to_string(i + 1), options.components, options.format, appended ? " offset=\"0\"" : "");
-    if (!appended) text += "<InformationKey name=\"range\">0 1</InformationKey>\n" + stored + "\n";
-    text += "</DataArray>\n";
+    // As VTK does for arrays of several components.
+    if (!appended) text += stored + "\n";
+    text +=
+        "<InformationKey name=\"L2_NORM_RANGE\" location=\"vtkDataArray\" length=\"2\"><Value "
+        "index=\"0\">0</Value></InformationKey>\n</DataArray>\n";
   }
   text += "</PointData>\n</Piece>\n</ImageData>\n";
   if (appended) text += "<AppendedData encoding=\"" + options.encoding + "\">\n  _" + stored + "\n</AppendedData>\n";
@@ -166,6 +183,43 @@ void WritePng(const std::string& path, const Index3& size, int bits, int kind, c
   png_write_end(png, info);
   png_destroy_write_struct(&png, &info);
   CHECK_EQ(std::fclose(file), 0);
+}
+
+FileBytes Bmp(const Index3& size, const BmpKind& kind, const FileBytes& rows) {
+  const auto number = [](std::int64_t value, int bytes) {
+    FileBytes text;
+    for (int i = 0; i < bytes; ++i) text += char(value >> (8 * i));
+    return text;
+  };
+  const auto begin = std::int64_t(54 + kind.palette.size());
+  return "BM" + number(begin + std::int64_t(rows.size()), 4) + number(0, 4) + number(begin, 4) + number(40, 4) + number(size.x, 4) +
+         number(kind.from_top ? -size.y : size.y, 4) + number(1, 2) + number(kind.bits, 2) + number(kind.compression, 4) +
+         number(std::int64_t(rows.size()), 4) + number(0, 8) + number(std::int64_t(kind.palette.size() / 4), 4) + number(0, 4) +
+         kind.palette + rows;
+}
+
+void WriteJpeg2000(const std::string& path, const Index3& size, int components, int bits, bool is_signed, const std::vector<int>& samples) {
+  std::vector<opj_image_cmptparm_t> parts(
+      std::size_t(components),
+      opj_image_cmptparm_t{
+          .dx = 1, .dy = 1, .w = OPJ_UINT32(size.x), .h = OPJ_UINT32(size.y), .prec = OPJ_UINT32(bits), .sgnd = is_signed ? 1U : 0U});
+  opj_image_t* image = opj_image_create(OPJ_UINT32(components), parts.data(), components == 1 ? OPJ_CLRSPC_GRAY : OPJ_CLRSPC_SRGB);
+  image->x1 = OPJ_UINT32(size.x);
+  image->y1 = OPJ_UINT32(size.y);
+  for (std::size_t i = 0; i < samples.size(); ++i) image->comps[i % std::size_t(components)].data[i / std::size_t(components)] = samples[i];
+  opj_cparameters_t parameters;
+  opj_set_default_encoder_parameters(&parameters);
+  parameters.tcp_numlayers = 1;
+  parameters.cp_disto_alloc = 1;
+  parameters.numresolution = 3;
+  opj_codec_t* codec = opj_create_compress(path.ends_with(".jp2") ? OPJ_CODEC_JP2 : OPJ_CODEC_J2K);
+  opj_stream_t* stream = opj_stream_create_default_file_stream(path.c_str(), OPJ_FALSE);
+  CHECK(opj_setup_encoder(codec, &parameters, image) != 0 && opj_start_compress(codec, image, stream) != 0 &&
+        opj_encode(codec, stream) != 0 && opj_end_compress(codec, stream) != 0)
+      << path;
+  opj_stream_destroy(stream);
+  opj_destroy_codec(codec);
+  opj_image_destroy(image);
 }
 
 void WriteJpeg(const std::string& path, const Index3& size, int components, const FileBytes& samples, bool progressive) {
@@ -215,6 +269,7 @@ std::vector<SampleFile> OneOfEachFormat() {
       whole("v.mha", MetaHeader(spec, "LOCAL", std::int64_t(zlib.size())), zlib),
       whole("v.mrc", MrcHeader({.mode = 1, .extension = 40}), samples),
       whole("v.map.gz", "", Gzip(MrcHeader({.mode = 1, .big_endian = true}) + swapped)),
+      whole("v.mgh", MghHeader(spec.size, 4, {1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1}), swapped),
       all("v.vtk", VtkFile(spec, swapped, true)),
       all("v.vtk", VtkFile(spec, AsText(values), false)),
       all("v.vti", VtiFile(spec, samples)),

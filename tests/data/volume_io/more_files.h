@@ -1,6 +1,7 @@
 // Files of further formats, byte by byte like those of volume_files.h; pictures through their libraries.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct MrcSpec {
 };
 FileBytes MrcHeader(const MrcSpec& spec);  // with the extension
 
+// `fields`: spacing, x_ras, y_ras, z_ras and c_ras; `good`: ras_good_flag.
+FileBytes MghHeader(const Index3& size, std::int32_t type, const std::array<float, 15>& fields, bool good = true);
+
 // `shape`: as Python writes it, "(2, 3, 4)".
 FileBytes NpyHeader(const std::string& descr, const std::string& shape, bool fortran = false, int version = 1);
 FileBytes NpyHeader(const FileSpec& spec);
@@ -34,7 +38,8 @@ struct VtiOptions {
   std::string format = "appended";  // ascii, binary or appended
   std::string encoding = "raw";     // of appended samples: raw or base64
   bool wide_header = false;         // UInt64
-  std::size_t block = 0;            // bytes of a block of zlib; 0: not compressed
+  std::size_t block = 0;            // bytes of a block; 0: not compressed
+  std::string compressor = "ZLib";  // or LZ4 or LZMA
   std::string direction;            // nine numbers
   std::string extent;               // "0 3 0 2 0 1" by the size
   Vec3 origin;
@@ -50,6 +55,15 @@ FileBytes VtiFile(const FileSpec& spec, const FileBytes& samples, const VtiOptio
 
 // Samples in this machine's byte order; 8 or 16 bits. `kind`: the PNG colour type, 0 grey, 2 RGB, 3 palette, 4 grey with alpha, 6 RGBA.
 void WritePng(const std::string& path, const Index3& size, int bits, int kind, const FileBytes& samples, bool interlaced = false);
+struct BmpKind {
+  int bits = 8, compression = 0;
+  FileBytes palette = {};  // blue, green, red and 0 of each colour
+  bool from_top = false;   // rows, else from the bottom
+};
+// `rows`: as they are in the file, each filled up to four bytes.
+FileBytes Bmp(const Index3& size, const BmpKind& kind, const FileBytes& rows);
+// Lossless; in a JP2 file if the path ends so, else the bare code stream. `samples`: the components of each pixel together.
+void WriteJpeg2000(const std::string& path, const Index3& size, int components, int bits, bool is_signed, const std::vector<int>& samples);
 void WriteJpeg(const std::string& path, const Index3& size, int components, const FileBytes& samples, bool progressive = false);
 
 // A file of every format that is one file, with the same samples: int16 where the format has it.

@@ -23,6 +23,8 @@ TEST(SourceText, IsAPathWithOptionsBehindIt) {
   EXPECT_EQ(ParseSourceText("head.nii.gz?time=3")->options.time, (TimeRange{3, 3}));
   EXPECT_EQ(ParseSourceText("head.nii.gz?channel=luminance")->options.channel, kLuminance);
   EXPECT_EQ(ParseSourceText("scan.h5?dataset=/exchange/data,time=2")->options.dataset, "/exchange/data");
+  EXPECT_TRUE(ParseSourceText("atlas.zarr?follow-links=yes,time=2")->options.follow_links);
+  EXPECT_FALSE(ParseSourceText("atlas.zarr?follow-links=no")->options.follow_links);
   EXPECT_EQ(ParseSourceText("head.nii.gz")->path, "head.nii.gz");
   EXPECT_EQ(ParseSourceText("what?")->path, "what?") << "no option stands behind the question mark";
 }
@@ -36,6 +38,96 @@ TEST(SourceText, MayBeABucketOfAServer) {
   EXPECT_EQ(timed->options.time, (TimeRange{3, 3}));
   EXPECT_EQ(AtTime(bucket + ",time=3", 4), bucket + ",time=4");
   EXPECT_EQ(ParseSourceText("s3://bucket/em?time=3")->path, "s3://bucket/em");
+}
+
+TEST(SourceText, OptionsStandBehindTheQueryOfAnAddress) {
+  const std::string place = "https://host/a.zarr", signed_place = place + "?sv=2022-11&sig=a%2Bb";
+  struct Case {
+    std::string text, query, options;
+    int time;  // -1: none
+  };
+  const Case cases[] = {{place, "", "", -1},
+                        {place + "?time=1", "", "?time=1", 1},
+                        {place + "?time=1,array=a?b", "", "?time=1,array=a?b", 1},
+                        {signed_place, "sv=2022-11&sig=a%2Bb", "", -1},
+                        {signed_place + ",c=d,time=1,channel=2", "sv=2022-11&sig=a%2Bb,c=d", "?time=1,channel=2", 1},
+                        {signed_place + "?time=1", "sv=2022-11&sig=a%2Bb", "?time=1", 1},
+                        {place + "?token=x y", "token=x%20y", "", -1}};
+  for (const auto& [text, query, options, time] : cases) {
+    const Result<SourceText> source = ParseSourceText(text);
+    ASSERT_TRUE(source.ok()) << text << source.status().message();
+    EXPECT_EQ(source->path, place) << text;
+    EXPECT_EQ(source->options.query, query) << text;
+    EXPECT_EQ(source->options_text, options) << text;
+    EXPECT_EQ(source->options.time ? source->options.time->first : -1, time) << text;
+    const Result<SourceText> later = ParseSourceText(AtTime(text, 7));
+    ASSERT_TRUE(later.ok()) << text << later.status().message();
+    EXPECT_EQ(later->options.time, (TimeRange{7, 7})) << text;
+    EXPECT_EQ(later->options.query, query) << text;
+  }
+  EXPECT_EQ(ParseSourceText("  https://host/my scan.zarr/ \n")->path, "https://host/my%20scan.zarr");
+  EXPECT_EQ(ParseSourceText("s3://b/x?time=1,endpoint=http://h:9000,channel=2")->path, "s3://b/x?endpoint=http://h:9000");
+  EXPECT_EQ(ParseSourceText("s3://b/x?time=1,endpoint=http://h:9000,channel=2")->options_text, "?time=1,channel=2");
+}
+
+TEST(SourceText, HeadersAreOptionsOfAddresses) {
+  const std::string text =
+      WithReadOption(WithReadOption("https://host/x?sig=secret", "header", "Authorization:@/run/token"), "header", "X-Id:key");
+  const Result<SourceText> source = ParseSourceText(text + ",time=1");
+  ASSERT_TRUE(source.ok()) << source.status().message();
+  EXPECT_EQ(source->options.headers, (std::vector<std::string>{"Authorization:@/run/token", "X-Id:key"}));
+  EXPECT_EQ(source->options_text, "?time=1") << "which volume it is, they do not say";
+  EXPECT_EQ(ShownSource(text + ",time=1"), "https://host/x?...?header=Authorization:@/run/token,header=X-Id:...,time=1");
+  for (const char* wrong :
+       {"header=", "header=secret", "header=:secret", "header=A b:secret", "header=A:", "header=Range:secret", "header=A:se\ncret"}) {
+    const Status status = ParseSourceText(std::string("https://host/x?") + wrong).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << wrong;
+    EXPECT_THAT(status.message(), testing::Not(HasSubstr("secret"))) << wrong;
+  }
+}
+
+TEST(SourceText, MayBeSpelledAsOtherProgramsSpellIt) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"zarr://https://host/a.zarr", "https://host/a.zarr"},
+      {"zarr2://s3://bucket/a", "s3://bucket/a"},
+      {"precomputed://gs://bucket/em/my image", "https://storage.googleapis.com/bucket/em/my%20image"},
+      {"n5://https://host/a.n5/", "https://host/a.n5"},
+      {"https://host/a.zarr/|zarr3:", "https://host/a.zarr"},
+      {"https://host/a.zarr|zarr2:labels/cells/|", "https://host/a.zarr/labels/cells"},
+      {"https://host/p|neuroglancer-precomputed://", "https://host/p"},
+      {"s3+https://host:9000/bucket/a", "s3://bucket/a?endpoint=https://host:9000"},
+      {"HTTPS://host/a", "https://host/a"},
+      {"http://[::1]:8080/a", "http://[::1]:8080/a"},
+      {"file:///data/a%20b.zarr", "/data/a b.zarr"},
+      {"file://localhost/data/a", "/data/a"},
+      {"zarr://file:///data/a", "/data/a"},
+      {"zarr:///data/a", "/data/a"},
+      {"precomputed://data/a", "data/a"},
+  };
+  for (const auto& [text, path] : cases) {
+    const Result<SourceText> source = ParseSourceText(text);
+    ASSERT_TRUE(source.ok()) << text << ": " << source.status().message();
+    EXPECT_EQ(source->path, path);
+    EXPECT_EQ(ParseSourceText(std::string(text) + "?time=3")->path, path);
+    EXPECT_EQ(ParseSourceText(std::string(text) + "?time=3")->options.time, (TimeRange{3, 3}));
+  }
+  const Result<SourceText> piped = ParseSourceText("https://host/a.zarr?sig=x|zarr3:,time=1");
+  EXPECT_EQ(piped->path, "https://host/a.zarr");
+  EXPECT_EQ(piped->options.query, "sig=x");
+  const std::pair<const char*, const char*> wrong[] = {
+      {"az://container/a", "write https://ACCOUNT.blob.core.windows.net/container/a"},
+      {"abfss://container@account.dfs.core.windows.net/a", "write https://account.blob.core.windows.net/container/a"},
+      {"ftp://host/a", "'ftp' is none of the schemes http, https, s3, gs and file"},
+      {"file://data/a", "an absolute path"},
+      {"https://host/a.zip|zip:", "'zip' is no format that is read from an address"},
+      {"https://host/viewer?source=https://host/a.zarr", "the page of a viewer"},
+      {"https://host/a.zarr?tine=3", "'tine' is no option"},
+  };
+  for (const auto& [text, why] : wrong) {
+    const Status status = ParseSourceText(text).status();
+    EXPECT_EQ(status.code(), StatusCode::kInvalidArgument) << text;
+    EXPECT_THAT(status.message(), HasSubstr(why));
+  }
 }
 
 TEST(SourceText, MayBeAFileWithAQuestionMark) {
@@ -66,6 +158,7 @@ TEST(SourceText, SaysWhatIsWrong) {
       {"v?endian=middle", "endian 'middle' must be little or big"},
       {"v?offset=-1", "offset '-1' must be a whole number of bytes"},
       {"v?dataset=", "dataset '' must be the path of a dataset"},
+      {"v?follow-links=perhaps", "follow-links 'perhaps' must be yes or no"},
       {"v?channel=red", "channel 'red' must be luminance or a whole number"},
   };
   for (const auto& [text, why] : cases) {

@@ -12,7 +12,7 @@ FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"{}\" header_type=\"{}\"{}>\n"
       "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n",
       spec.big_endian ? "BigEndian" : "LittleEndian", options.wide_header ? "UInt64" : "UInt32",
-      options.block > 0 ? " compressor=\"vtkZLibDataCompressor\"" : "", spec.points, spec.cells);
+      options.block > 0 ? " compressor=\"vtk" + options.compressor + "DataCompressor\"" : "", spec.points, spec.cells);
   const bool appended = options.format == "appended";
   FileBytes samples;
   for (const char* section : {"PointData", "CellData", "Points", "Cells"}) {
@@ -31,6 +31,7 @@ FileBytes VtuFile(const VtuSpec& spec, const VtiOptions& options) {
       } else {
         text += "\n" + stored + "\n";
       }
+      if (array.components > 1) text += "<InformationKey name=\"L2_NORM_FINITE_RANGE\"><Value index=\"0\">1</Value></InformationKey>\n";
       text += "</DataArray>\n";
     }
     text += fmt::format("</{}>\n", section);

@@ -1,6 +1,9 @@
 // Metadata that are wrong: each gives one line that names the object, the field, and what must be there.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <cstring>
 
 #include "data/zarr/ome.h"
 #include "data/zarr/zarr_layout.h"
@@ -74,10 +77,13 @@ TEST(ZarrMetadataTest, Version2NamesTheFieldThatIsWrong) {
                  {"/order", "\"A\"", "order is \"A\""},
                  {"/order", "", "order is missing"},
                  {"/dimension_separator", "\"-\"", "dimension_separator is \"-\""},
-                 {"/compressor/id", "\"bz2\"", "compressor.id is \"bz2\", must be one of zlib, gzip, zstd, blosc, lz4"},
+                 {"/compressor/id", "\"zfpy\"", "compressor.id is \"zfpy\", must be one of zlib, gzip, zstd, blosc, lz4"},
                  {"/compressor", "\"zstd\"", "compressor.id is missing"},
                  {"/filters", "{}", "filters is {}"},
-                 {"/filters/0/id", "\"delta\"", "filters[0].id is \"delta\""},
+                 {"/filters/0/id", "\"pcodec\"", "filters[0].id is \"pcodec\""},
+                 {"/filters/0", R"({"id": "delta", "dtype": "<i4"})", "filters[0].dtype is \"<i4\", must be uint16"},
+                 {"/filters/0", R"({"id": "packbits"})", "filters[0] is {\"id\":\"packbits\"}, must be left out"},
+                 {"/filters/0", R"({"id": "fixedscaleoffset", "scale": 0, "offset": 1})", "filters[0].scale is 0"},
                  {"/filters/0/elementsize", "0", "filters[0].elementsize is 0"}},
                 [](const ZarrJson& metadata) { return zarr::ParseLayout2(Field("object", metadata)).status(); });
 }
@@ -114,8 +120,8 @@ TEST(ZarrMetadataTest, Version3NamesTheFieldThatIsWrong) {
                  {sharding + "/chunk_shape", "[1]", named + "chunk_shape is [1]"},
                  {sharding + "/codecs/0/configuration/endian", "\"middle\"", named + "codecs[0].configuration.endian is \"middle\""},
                  {sharding + "/codecs/0/configuration", "{}", named + "codecs[0].configuration.endian is missing"},
-                 {sharding + "/codecs/1/name", "\"bz2\"", named + "codecs[1].name is \"bz2\""},
-                 {sharding + "/codecs/1/name", "\"numcodecs.bz2\"", named + "codecs[1].name is \"numcodecs.bz2\""},
+                 {sharding + "/codecs/1/name", "\"zfpy\"", named + "codecs[1].name is \"zfpy\""},
+                 {sharding + "/codecs/1/name", "\"numcodecs.zfpy\"", named + "codecs[1].name is \"numcodecs.zfpy\""},
                  {sharding + "/codecs/0/name", "\"sharding_indexed\"", named + "codecs[1].name is \"gzip\", must be left out"},
                  {sharding + "/index_codecs", "", named + "index_codecs is missing"},
                  {sharding + "/index_codecs/1", "\"gzip\"", named + "index_codecs[1] is \"gzip\", must be crc32c"},
@@ -150,12 +156,13 @@ TEST(ZarrMetadataTest, ImagesNameTheFieldThatIsWrong) {
                  {image + "/version", "\"0.9\"", named + "version is \"0.9\""},
                  {image + "/axes", "[]", named + "axes is []"},
                  {image + "/axes/1/name", "\"x\"", named + "axes[3] is "},
-                 {image + "/axes/1/name", "\"depth\"", named + "axes[1].name is \"depth\""},
+                 {image + "/axes/0/type", "\"space\"", named + "axes[0] is "},
                  {image + "/axes/3/name", "7", named + "axes[3].name is 7"},
                  {image + "/axes/3", "\"q\"", named + "axes is "},
                  {image + "/datasets", "[]", named + "datasets is []"},
                  {level + "/path", "", of_level + "path is missing"},
-                 {transformations + "/0/type", "\"affine\"", first + ".type is \"affine\""},
+                 {transformations + "/0/type", "\"byDimension\"", first + ".type is \"byDimension\""},
+                 {transformations + "/0/type", "\"affine\"", first + ".affine[0] is missing"},
                  {transformations + "/0/scale", "[1, 2]", first + ".scale is [1,2]"},
                  {transformations + "/0/scale/3", "0", first + ".scale[3] is 0"},
                  {transformations + "/0/scale/3", "-1", first + ".scale[3] is -1"},
@@ -163,18 +170,152 @@ TEST(ZarrMetadataTest, ImagesNameTheFieldThatIsWrong) {
                  {transformations + "/1/translation/3", "null", of_level + "coordinateTransformations[1].translation[3] is null"},
                  {transformations + "/0/scale/3", "1e308", named + "coordinateTransformations[0].scale[3] is 10"},
                  {image + "/coordinateTransformations", "3", named + "coordinateTransformations is 3"}},
-                [](const ZarrJson& metadata) { return zarr::ParseOmeImage(Field("object", metadata), 2).status(); });
+                [](const ZarrJson& metadata) { return zarr::ParseOmeImage(Field("object", metadata)).status(); });
 }
 
 TEST(ZarrMetadataTest, AnImageHasTheTransformationsOfItsLevelAndThenItsOwn) {
   const ZarrJson metadata = RightImage();
-  const Result<zarr::OmeImage> image = zarr::ParseOmeImage(Field("object", metadata), 2);
+  const Result<zarr::OmeImage> image = zarr::ParseOmeImage(Field("object", metadata));
   ASSERT_TRUE(image.ok());
-  EXPECT_THAT(image->levels[0].scale, testing::ElementsAre(1, 20, 5, 5));
-  EXPECT_THAT(image->levels[0].translation, testing::ElementsAre(0, 10, 20, 30));
+  EXPECT_THAT(image->levels[0].place.scale, testing::ElementsAre(1, 20, 5, 5));
+  EXPECT_THAT(image->levels[0].place.translation, testing::ElementsAre(0, 10, 20, 30));
   EXPECT_EQ(image->axes[1].unit, LengthUnit::kMicrometre);
   EXPECT_EQ(image->channels[0].name, "DAPI");
   EXPECT_EQ(image->channels[0].window, (ValueRange{5, 200}));
+}
+
+// As ngff-zarr writes 0.6: axes of named coordinate systems, and sequences.
+TEST(ZarrMetadataTest, CoordinateSystemsAndSequencesOf06AreRead) {
+  ZarrJson metadata = ZarrJson::parse(R"({"ome": {"version": "0.6", "multiscales": [{
+    "coordinateSystems": [{"name": "other", "axes": [{"name": "q"}]},
+                          {"name": "intrinsic", "axes": [{"name": "z", "type": "space", "unit": "micrometer"},
+                           {"name": "y", "type": "space", "unit": "micrometer"}, {"name": "x", "type": "space", "unit": "micrometer"}]}],
+    "datasets": [{"path": "s0", "coordinateTransformations": [{"type": "sequence", "input": {"path": "s0"}, "output": {"name": "intrinsic"},
+      "transformations": [{"type": "scale", "scale": [3, 2, 1]}, {"type": "identity"}, {"type": "mapAxis", "mapAxis": [0, 1, 2]},
+                          {"type": "translation", "translation": [10, 20, 30]}]}]}]}]}})");
+  ZarrJson& image = metadata["ome"]["multiscales"][0];
+  const auto read = [&] { return zarr::ParseOmeImage(Field("object", metadata)); };
+  ASSERT_TRUE(read().ok()) << read().status().message();
+  EXPECT_THAT(read()->levels[0].place.scale, testing::ElementsAre(3, 2, 1));
+  EXPECT_THAT(read()->levels[0].place.translation, testing::ElementsAre(10, 20, 30));
+  EXPECT_EQ(read()->axes[0].unit, LengthUnit::kMicrometre);
+  EXPECT_THAT(read()->notes, testing::IsEmpty());
+
+  // Further coordinate systems are not those of the image.
+  image["coordinateTransformations"] = {{{"type", "affine"}, {"affine", "somewhere"}, {"output", "world"}}};
+  EXPECT_THAT(read()->levels[0].place.scale, testing::ElementsAre(3, 2, 1));
+  EXPECT_THAT(read()->notes, testing::ElementsAre(HasSubstr("its transformations to others are not applied")));
+
+  ZarrJson& one = image["datasets"][0]["coordinateTransformations"][0];
+  one = {{"type", "affine"}, {"output", "intrinsic"}, {"affine", {{3, 0, 0, 10}, {0, 2, 0, 20}, {0, 0, 1, 30}}}};
+  EXPECT_THAT(read()->levels[0].place.scale, testing::ElementsAre(3, 2, 1));
+  EXPECT_THAT(read()->levels[0].place.translation, testing::ElementsAre(10, 20, 30));
+  one["affine"][0][1] = 0.5;
+  EXPECT_THAT(read().status().message(), HasSubstr("affine[0][1] is 0.5, must be 0: transformations that turn or shear"));
+  one = {{"type", "mapAxis"}, {"output", {{"name", "intrinsic"}}}, {"mapAxis", {2, 1, 0}}};
+  EXPECT_THAT(read().status().message(), HasSubstr("mapAxis[0] is 2"));
+  one = {{"type", "identity"}};
+  for (int nested = 0; nested < 9; ++nested) one = {{"type", "sequence"}, {"transformations", ZarrJson::array({one})}};
+  one["output"] = "intrinsic";
+  EXPECT_THAT(read().status().message(), HasSubstr("in at most 4 sequences"));
+}
+
+// spatialdata leads from pixels to several coordinate systems.
+TEST(ZarrMetadataTest, TransformationsToOtherSystemsDoNotMoveTheImage) {
+  ZarrJson metadata = RightImage();
+  ZarrJson& all = metadata["multiscales"][0]["coordinateTransformations"];
+  const auto read = [&] { return zarr::ParseOmeImage(Field("object", metadata)); };
+  all = {{{"type", "identity"}, {"output", {{"name", "global"}}}}};
+  EXPECT_THAT(read()->notes, testing::IsEmpty());
+  all.push_back({{"type", "affine"}, {"affine", {{0, 1}, {1, 0}}}, {"output", {{"name", "other"}}}});
+  ASSERT_TRUE(read().ok()) << read().status().message();
+  EXPECT_THAT(read()->levels[0].place.scale, testing::ElementsAre(1, 2, 0.5, 0.5));
+  EXPECT_THAT(read()->notes, testing::ElementsAre(HasSubstr("are not applied")));
+}
+
+TEST(ZarrMetadataTest, VersionsWithEndingsAreKnown) {
+  ZarrJson metadata = RightImage();
+  for (const char* const version : {"0.1", "0.4-dev-spatialdata", "0.5.2", "0.5-dev-spatialdata", "0.6.dev3"}) {
+    metadata["multiscales"][0]["version"] = version;
+    const Result<zarr::OmeImage> image = zarr::ParseOmeImage(Field("object", metadata));
+    ASSERT_TRUE(image.ok()) << image.status().message();
+    EXPECT_EQ(image->version, version);
+  }
+  for (const char* const version : {"0.7", "0.45", "1.4", "latest", ""}) {
+    metadata["multiscales"][0]["version"] = version;
+    EXPECT_FALSE(zarr::ParseOmeImage(Field("object", metadata)).ok()) << version;
+  }
+}
+
+// Zarr 3 has a member "ome" for what lay beside it before; some writers left it there.
+TEST(ZarrMetadataTest, AttributesOf04CountBesideOme) {
+  const ZarrJson old = RightImage();
+  const auto labels = [&](const ZarrJson& ome) {
+    ZarrJson both = old;
+    both["ome"] = ome;
+    return zarr::ParseOmeImage(Field("object", both))->axes.size();
+  };
+  EXPECT_EQ(labels({{"version", "0.5"}}), 4U);
+  ZarrJson other = old;
+  other["multiscales"][0]["axes"] = {"z", "y", "x"};
+  other["multiscales"][0].erase("coordinateTransformations");
+  other["multiscales"][0]["datasets"] = {{{"path", "0"}}};
+  EXPECT_EQ(labels(other), 3U);
+}
+
+TEST(ZarrMetadataTest, AxesOfSpaceWithOtherNamesAreTakenByTheirOrder) {
+  ZarrJson metadata = RightImage();
+  const auto kinds = [&](const std::vector<std::string>& names) {
+    for (std::size_t i = 0; i < 3; ++i) metadata["multiscales"][0]["axes"][i + 1] = {{"name", names[i]}, {"type", "space"}};
+    std::vector<AxisKind> read;
+    for (const zarr::OmeAxis& axis : zarr::ParseOmeImage(Field("object", metadata))->axes) read.push_back(axis.kind);
+    return read;
+  };
+  using enum AxisKind;
+  EXPECT_THAT(kinds({"depth", "lat", "lon"}), testing::ElementsAre(kChannel, kZ, kY, kX));
+  EXPECT_THAT(kinds({"k", "j", "i"}), testing::ElementsAre(kChannel, kZ, kY, kX));
+  EXPECT_THAT(kinds({"X", "t", "Z"}), testing::ElementsAre(kChannel, kX, kY, kZ));
+}
+
+TEST(ZarrMetadataTest, FillValuesMayBeTexts) {
+  const auto fill = [](const ZarrJson& value, SampleType type) {
+    ZarrJson metadata = MetadataOf({.shape = {4}, .chunk = {4}, .type = type});
+    metadata["fill_value"] = value;
+    const Result<zarr::ZarrLayout> layout = zarr::ParseLayout2(Field("object", metadata));
+    if (!layout.ok()) return std::string("refused");
+    return VisitSampleType(type, [&](const auto* null) {
+      std::remove_cvref_t<decltype(*null)> element;
+      std::memcpy(&element, layout->shape.fill.data(), sizeof element);
+      return fmt::format("{}", double(element));
+    });
+  };
+  for (const SampleType type : {SampleType::kUint8, SampleType::kInt64, SampleType::kFloat16, SampleType::kFloat64}) {
+    EXPECT_EQ(fill("0", type), "0");
+    EXPECT_EQ(fill("0.0", type), "0");
+    EXPECT_EQ(fill("12", type), "12");
+    EXPECT_EQ(fill(nullptr, type), "0");
+    EXPECT_EQ(fill(true, type), "1");
+    EXPECT_EQ(fill("none", type), "refused");
+    EXPECT_EQ(fill("", type), "refused");
+  }
+  EXPECT_EQ(fill("-7", SampleType::kInt16), "-7");
+  EXPECT_EQ(fill("-7", SampleType::kUint16), "refused");
+  EXPECT_EQ(fill("0.5", SampleType::kUint16), "refused");
+  EXPECT_EQ(fill("NaN", SampleType::kUint16), "refused");
+  EXPECT_EQ(fill("NaN", SampleType::kFloat32), "nan");
+  EXPECT_EQ(fill("-Infinity", SampleType::kFloat16), "-inf");
+  EXPECT_EQ(fill("0x3c00", SampleType::kFloat16), "1");
+  EXPECT_EQ(fill("0x3f800000", SampleType::kFloat32), "1");
+}
+
+TEST(ZarrMetadataTest, NumbersThatPythonWritesAreTexts) {
+  const Result<metadata::Json> json =
+      metadata::ParseJson("object", R"({"a": NaN, "b": [-Infinity, Infinity, 1], "NaN": "NaN \" Infinity", "c\\": -1})");
+  ASSERT_TRUE(json.ok());
+  EXPECT_EQ(*json, metadata::Json::parse(R"({"a": "NaN", "b": ["-Infinity", "Infinity", 1], "NaN": "NaN \" Infinity", "c\\": -1})"));
+  for (const char* const text : {"{\"a\": NaNs}", "NaN NaN", "{NaN}", "-NaN", "\"NaN", "[nan]"}) {
+    EXPECT_EQ(metadata::ParseJson("object", text).status().code(), StatusCode::kDataLoss) << text;
+  }
 }
 
 TEST(ZarrMetadataTest, WhatIsNoJsonIsDamaged) {

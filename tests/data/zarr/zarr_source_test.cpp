@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 
@@ -305,6 +306,86 @@ TEST(ZarrSourceTest, SeriesOfImagesOpenTheFirst) {
   }
 }
 
+TEST(ZarrSourceTest, PlatesAndWellsNameTheirImages) {
+  const TemporaryDirectory folder;
+  for (const int version : {2, 3}) {
+    const std::string path = folder / std::to_string(version);
+    const auto group = [&](const std::string& at, const ZarrJson& attributes) {
+      WriteZarrGroup(path + at, version, version == 3 ? ZarrJson{{"ome", attributes}} : attributes);
+    };
+    group("", {{"plate", {{"wells", {{{"path", "A/1"}}, {{"path", "B/2"}}}}}}});
+    group("/A/1", {{"well", {{"images", {{{"path", "0"}}, {{"path", "1"}}}}}}});
+    group("/B/2", {{"well", {{"images", {{{"path", "field"}}}}}}});
+    WriteImage(path + "/A/1/1", "zyx", version);
+    WriteImage(path + "/B/2/field", "zyx", version);
+    EXPECT_THAT(OpenText(path).status().message(),
+                HasSubstr(": a plate of 2 wells, of which ?array= takes an image, such as A/1/0: A/1, B/2"));
+    EXPECT_THAT(OpenText(path + "?array=A/1").status().message(),
+                HasSubstr("/A/1: a well of 2 images, of which ?array= takes one: A/1/0, A/1/1"));
+    EXPECT_THAT(OpenText(path + "/A/1").status().message(), HasSubstr(": a well of 2 images, of which ?array= takes one: 0, 1"));
+    EXPECT_EQ(ValuesOf(**OpenText(path + "?array=A/1/1")), Volume(0, 0));
+    EXPECT_EQ(ValuesOf(**OpenText(path + "?array=B/2")), Volume(0, 0)) << "its only image";
+  }
+}
+
+TEST(ZarrSourceTest, AGroupOfLabelImagesNamesThem) {
+  const TemporaryDirectory folder;
+  WriteZarrGroup(folder / "labels", 2, {{"labels", {"cells", "nuclei"}}});
+  EXPECT_THAT(OpenText(folder / "labels").status().message(), HasSubstr("2 images, of which ?array= takes one: cells, nuclei"));
+  WriteZarrGroup(folder / "labels", 2, {{"labels", {"cells"}}});
+  WriteImage(folder / "labels/cells", "zyx", 2);
+  EXPECT_EQ(ValuesOf(**OpenText(folder / "labels")), Volume(0, 0));
+}
+
+TEST(ZarrSourceTest, LabelImagesSayHowTheirLabelsLook) {
+  const TemporaryDirectory folder;
+  WriteImage(folder / "a", "zyx", 2);
+  ZarrJson attributes = ImageAttributes("zyx", 2, {{1, 1, 1}});
+  attributes["image-label"] = {{"colors",
+                                {{{"label-value", 3}, {"rgba", {255, 0, 51, 255}}},
+                                 {{"label-value", 1}, {"rgba", {0, 300, 0}}},
+                                 {{"label-value", 2}},
+                                 {{"label-value", -1}, {"rgba", {0, 0, 0}}}}},
+                               {"properties", {{{"label-value", 3}, {"class", "nerve"}}, {{"label-value", 9}, {"name", "bone"}}}}};
+  WriteZarrGroup(folder / "a", 2, attributes);
+  EXPECT_THAT((*OpenText(folder / "a"))->info().looks,
+              ElementsAre(StatedLabel{1, {{0, 1, 0}}, ""}, StatedLabel{3, {{1, 0, 0.2F}}, "nerve"}, StatedLabel{9, std::nullopt, "bone"}));
+}
+
+TEST(ZarrSourceTest, ChunksInFoldersAreFoundEvenIfTheMetadataDoNotSaySo) {
+  const TemporaryDirectory folder;
+  for (const char separator : {'.', '/'}) {
+    const std::string path = folder / (separator == '.' ? "flat" : "nested");
+    ZarrSpec spec = SpecOf("zyx", 2);
+    spec.separator = separator;
+    WriteZarrArray(path, spec, ElementsOf("zyx"), [](auto index) { return index[0] == 0 && index[2] == 0; });
+    ZarrJson metadata = MetadataOf(spec);
+    metadata.erase("dimension_separator");
+    WriteJson(path + "/.zarray", metadata);
+    const std::vector<double> values = ValuesOf(**OpenText(path)), all = Volume(0, 0);
+    for (std::size_t i = 0; i < all.size(); ++i) EXPECT_EQ(values[i], i % kX < 3 && i < 3 * kX * kY ? 0 : all[i]) << i;
+  }
+}
+
+TEST(ZarrSourceTest, OneLineTellsThatNoChunkIsThere) {
+  const TemporaryDirectory folder;
+  const auto said = [&](const IsMissing& missing) {
+    std::filesystem::remove_all(folder / "a");
+    WriteZarrArray(folder / "a", SpecOf("czyx", 2), ElementsOf("czyx"), missing);
+    const auto source = OpenText(folder / "a?channel=0");
+    testing::internal::CaptureStderr();
+    ValuesOf(**source);
+    ValuesOf(**source);
+    return testing::internal::GetCapturedStderr();
+  };
+  const std::string line = said([](auto) { return true; });
+  EXPECT_THAT(line, HasSubstr("/a: no chunk was found, so that all voxels have the fill value; looked for " + folder.path() +
+                              "/a/0/0/0/0 and 7 others"));
+  EXPECT_EQ(std::ranges::count(line, '\n'), 1);
+  EXPECT_EQ(said([](auto index) { return index[1] + index[2] + index[3] < 3; }), "") << "a sparse volume has some";
+  EXPECT_THAT(said([](auto index) { return index[0] == 0; }), HasSubstr("no chunk was found")) << "of the channel that is shown";
+}
+
 TEST(ZarrSourceTest, SignedAndWideSamplesKeepTheirValues) {
   const TemporaryDirectory folder;
   for (int type = 0; type <= int(SampleType::kFloat64); ++type) {
@@ -348,6 +429,10 @@ TEST(ZarrSourceTest, KnowsItsFolders) {
   std::filesystem::create_directories(folder / "plain/sub");
   WriteImage(folder / "plain/sub", "zyx", 3);
   EXPECT_EQ(FindSourceFormat(folder / "plain"), nullptr);
+  // Some writers leave out .zgroup.
+  WriteImage(folder / "bare", "zyx", 2);
+  std::filesystem::remove(folder / "bare/.zgroup");
+  EXPECT_EQ(ValuesOf(**OpenText(folder / "bare")), Volume(0, 0));
   ASSERT_NE(FindSourceFormat(folder / "plain/sub"), nullptr);
   EXPECT_EQ(FindSourceFormat(folder / "plain/sub")->name, "Zarr");
   EXPECT_EQ(OpenText(folder / "none.zarr").status().code(), StatusCode::kNotFound);

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <sstream>
 
 #include "data/sources/memory_source.h"
@@ -30,7 +31,9 @@ struct Case {
   SourceInfo info;
   OmeZarrOptions options;
 
-  std::shared_ptr<VolumeSource> source() const { return MakeMemorySource(volume, info); }
+  std::shared_ptr<ExactSamples> exact = nullptr;
+
+  std::shared_ptr<VolumeSource> source() const { return MakeMemorySource(volume, info, exact); }
 };
 
 Case RandomCase(Random& random, const Index3& size) {
@@ -64,6 +67,12 @@ Case RandomCase(Random& random, const Index3& size) {
       if (zeros.Contains(v)) sample = T(-description.mapping.offset);
     }
   });
+  if (description.type == ScalarType::kFloat32 && made.info.labels) {
+    const SampleType type = is_signed ? SampleType::kInt32 : SampleType::kUint32;
+    made.exact = std::make_shared<ExactSamples>(ExactSamples{{type}, AlignedVector<std::byte>(made.volume->block.bytes.size())});
+    std::ranges::transform(std::span(made.volume->block.samples<float>(), CountIn(size)),
+                           reinterpret_cast<std::uint32_t*>(made.exact->bytes.data()), [](float id) { return std::uint32_t(id); });
+  }
   made.options.chunk_side = 8;
   made.options.shard_side = 8 * random.Integer(1, 3);
   made.options.version = random.Chance(0.5) ? OmeZarrVersion::k04 : OmeZarrVersion::k05;
@@ -205,6 +214,40 @@ TEST(OmeZarrWriterTest, KeepsTheWorldAndTheMapping) {
       const Vec3 centre = fine.ToWorld({0.5, 0, 0}), found = coarse.ToWorld({0, 0, 0});  // only x is halved
       for (int axis = 0; axis < 3; ++axis) EXPECT_DOUBLE_EQ(found[axis], centre[axis]);
     }
+  }
+}
+
+// Ids that float32 rounds to one, and ones above 2^32.
+TEST(OmeZarrWriterTest, LabelsOf64BitsAreExactAtEveryLevel) {
+  const TemporaryDirectory directory;
+  Random random(8);
+  SCOPED_TRACE(random.trace());
+  const Index3 size = {21, 18, 17};
+  const std::vector<std::uint64_t> ids = {0, 12857642016, 12857642017, 13046505472, std::uint64_t{1} << 63 | 1};
+  Case made;
+  made.volume->description = {.geometry = {.size = size}, .type = ScalarType::kFloat32};
+  made.volume->block = MakeVoxelBlock({{0, 0, 0}, size}, ScalarType::kFloat32);
+  made.info = {.file_type = "uint64", .labels = true};
+  made.exact = std::make_shared<ExactSamples>(ExactSamples{{SampleType::kUint64}, AlignedVector<std::byte>(CountIn(size) * 8)});
+  const std::span samples(reinterpret_cast<std::uint64_t*>(made.exact->bytes.data()), CountIn(size));
+  for (std::uint64_t& sample : samples) sample = ids[random.Integer<std::size_t>(0, ids.size() - 1)];
+  for (const OmeZarrVersion version : {OmeZarrVersion::k04, OmeZarrVersion::k05}) {
+    made.options = {.version = version, .chunk_side = 8, .shard_side = 16};
+    const std::string folder = directory / std::string(ToString(version));
+    const Status status = WriteOmeZarr(*made.source(), folder, made.options);
+    ASSERT_TRUE(status.ok()) << status.message();
+    const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).value();
+    EXPECT_EQ(read->info().exact.type, SampleType::kUint64);
+    EXPECT_TRUE(read->info().labels);
+    const auto level = [&](int number) {
+      const Box box = read->info().levels[std::size_t(number)].description.geometry.bounds();
+      std::vector<std::uint64_t> found(std::size_t(box.voxel_count()));
+      EXPECT_TRUE(read->ReadNow(number, box, BoxRoom::Dense(box, reinterpret_cast<std::byte*>(found.data()), true)).ok());
+      return found;
+    };
+    EXPECT_TRUE(std::ranges::equal(level(0), samples));
+    ASSERT_GT(read->info().levels.size(), 1U);
+    for (const std::uint64_t id : level(1)) EXPECT_TRUE(std::ranges::count(ids, id) == 1) << id;
   }
 }
 

@@ -47,6 +47,18 @@ TEST(ReduceTest, TheMostFrequentLabelWinsAndOfSeveralTheSmallest) {
   EXPECT_EQ(label({5, 5}), 5);
 }
 
+TEST(ReduceTest, SixtyFourBitsAreExact) {
+  constexpr std::uint64_t kId = 12857642016;
+  using Ids = std::vector<std::uint64_t>;
+  EXPECT_EQ(One(SampleType::kUint64, Reduction::kMostFrequent, Ids{kId + 1, kId, kId + 1, 7}), kId + 1);
+  EXPECT_EQ(One(SampleType::kUint64, Reduction::kMostFrequent, Ids{kId + 1, kId, kId + 1, kId}), kId);
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  EXPECT_EQ(One(SampleType::kUint64, Reduction::kMean, Ids{kMost, kMost, kMost, kMost - 4}), kMost - 1);
+  constexpr std::int64_t kLeast = std::numeric_limits<std::int64_t>::min();
+  EXPECT_EQ(One(SampleType::kInt64, Reduction::kMean, std::vector<std::int64_t>{kLeast, kLeast, kLeast + 1, kLeast + 1}), kLeast);
+  EXPECT_EQ(One(SampleType::kFloat64, Reduction::kMean, std::vector<double>{0.1, 0.3}), 0.2);
+}
+
 TEST(ReduceTest, TheLastVoxelsHoldWhatIsLeft) {
   const std::vector<std::uint8_t> from = {1, 3, 10};
   std::vector<std::uint8_t> to(6, 99);

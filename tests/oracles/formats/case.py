@@ -14,7 +14,7 @@ class Case:
     voxels: np.ndarray
     affine: np.ndarray
     options: str = ""
-    notes: tuple = ()  # words that a line of `info` must hold
+    tolerance: float = 2e-6  # relative, of floats: more than float32 rounds
 
 
 @dataclasses.dataclass

@@ -16,7 +16,7 @@ SYNTAXES = [ImplicitVRLittleEndian, ExplicitVRLittleEndian, ExplicitVRBigEndian,
 
 def series(random, folder, number):
     syntax = SYNTAXES[number % len(SYNTAXES)]
-    rows, columns, slices = (int(n) for n in random.integers(8, 20, 3))
+    rows, columns, slices = *(int(n) for n in random.integers(32, 50, 2)), int(random.integers(3, 9))
     bits, signed = int(random.choice([8, 12, 16])), bool(random.integers(2))
     least = -(1 << bits - 1) if signed else 0
     dtype = np.dtype(("i" if signed else "u") + ("1" if bits == 8 else "2"))

@@ -16,8 +16,6 @@ def cases(random, folder, count, skipped):
         path = os.path.join(folder, f"{number}{end}")
         with mrcfile.new(path) as file:
             file.set_data(voxels)
-            if stack:
-                file.set_volume_stack()
             file.voxel_size = spacing
             spacing = float(file.voxel_size.x)
         part = voxels[-1] if stack else voxels

@@ -1,4 +1,4 @@
-#include "data/zarr/axis_choice.h"
+#include "data/sources/axis_choice.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/raw_volume.h"
 
-namespace slabstream::zarr {
+namespace slabstream {
 namespace {
 
 Status Wrong(const std::string& array, const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", array, why)); }
@@ -22,13 +22,10 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
   const auto count = [&](AxisKind kind) { return std::ranges::count(kinds, kind); };
   const bool twice = std::ranges::any_of(kinds, [&](AxisKind kind) { return kind != AxisKind::kOther && count(kind) > 1; });
   if (twice) std::ranges::fill(kinds, AxisKind::kOther);
-  if (count(AxisKind::kX) != 1 || count(AxisKind::kY) != 1) {
-    std::array<AxisKind, 3> rest = {AxisKind::kX, AxisKind::kY, AxisKind::kZ};
-    auto next = rest.begin();
-    for (auto kind = kinds.rbegin(); kind != kinds.rend(); ++kind) {
-      if (*kind == AxisKind::kTime || *kind == AxisKind::kChannel) continue;
-      *kind = next == rest.end() ? AxisKind::kOther : *next++;
-    }
+  // The last axes that are left take the letters that are.
+  for (const AxisKind kind : {AxisKind::kX, AxisKind::kY, AxisKind::kZ}) {
+    const auto last = std::find(kinds.rbegin(), kinds.rend(), AxisKind::kOther);
+    if (count(kind) == 0 && last != kinds.rend()) *last = kind;
   }
   // What is left over before them.
   const auto unknown = count(AxisKind::kOther);
@@ -66,6 +63,7 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   if (!channel.ok()) return channel.status();
   choice.times = int(times);
   choice.channels = int(channels);
+  choice.time = int(*time);
   choice.channel = *channel;
   for (std::size_t axis = 0; axis < kinds.size(); ++axis) {
     if (kinds[axis] == AxisKind::kTime) choice.at[axis] = std::uint64_t(*time);
@@ -74,4 +72,4 @@ Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKi
   return choice;
 }
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream

@@ -1,4 +1,6 @@
 // Which axes of an array are x, y and z, and which index of the others is shown.
+//
+// Pure.
 #pragma once
 
 #include <array>
@@ -7,16 +9,16 @@
 #include <vector>
 
 #include "common/base/status.h"
+#include "data/sources/axis_kind.h"
 #include "data/volume_io/read_options.h"
-#include "data/zarr/ome.h"
 
-namespace slabstream::zarr {
+namespace slabstream {
 
 struct AxisChoice {
   std::array<int, 3> axes = {-1, -1, -1};  // x, y and z; -1: there is none
   std::vector<std::uint64_t> at;           // index along each axis; 0 along x, y and z
   int times = 1, channels = 1;             // how many there are
-  int channel = 0;
+  int time = 0, channel = 0;
 };
 
 // The kinds of the axes of a plain array, by their names ("" where there is none) and, where these do not say it, by their order.
@@ -28,4 +30,4 @@ Result<std::vector<AxisKind>> KindsOfPlainAxes(const std::string& array, const s
 Result<AxisChoice> ChooseAxes(const std::string& array, const std::vector<AxisKind>& kinds, const std::vector<std::uint64_t>& sizes,
                               const ReadOptions& options, std::vector<std::string> names = {});
 
-}  // namespace slabstream::zarr
+}  // namespace slabstream

@@ -1,0 +1,18 @@
+// ExactValue: a data value that double alone may not hold.
+#pragma once
+
+#include <cstdint>
+
+namespace slabstream {
+
+// Of GNU C++ and clang: what sums and differences of integers of 64 bits need.
+__extension__ using Int128 = __int128;
+
+// The data value is value + rest. The rest is what the nearest double leaves of a whole number of 64 bits: in [-1024, 1024], mostly 0.
+struct ExactValue {
+  double value = 0;
+  std::int64_t rest = 0;
+  friend bool operator==(const ExactValue&, const ExactValue&) = default;
+};
+
+}  // namespace slabstream

@@ -1,0 +1,159 @@
+#include "data/hdf5/hdf5_image.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/printable.h"
+#include "data/hdf5/hdf5_array.h"
+#include "data/hdf5/hdf5_layouts.h"
+#include "data/sources/axis_choice.h"
+#include "data/volume_io/length_names.h"
+#include "data/volume_io/raw_volume.h"
+#include "data/volume_io/world_placement.h"
+
+namespace slabstream {
+namespace {
+
+const std::array<ImageLayout, 4>& Layouts() {
+  static const std::array<ImageLayout, 4> layouts = {ItkImage(), Minc(), VtkHdf(), Nexus()};
+  return layouts;
+}
+
+// Datasets, for messages: "'/a' of 100 x 20 x 30 uint16".
+std::string Listed(const std::shared_ptr<Hdf5File>& file, const std::vector<std::string>& paths) {
+  constexpr std::size_t kMost = 16, kMostBytes = 800;
+  std::string list;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (i == kMost || list.size() > kMostBytes) return list + fmt::format(" and {} more", paths.size() - i);
+    const Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(paths[i]);
+    const std::string what =
+        dataset.ok() ? fmt::format("of {} {}", fmt::join((*dataset)->size(), " x "), ToString((*dataset)->type())) : "which cannot be read";
+    list += fmt::format("{}'{}' {}", list.empty() ? "" : ", ", paths[i], what);
+  }
+  return list;
+}
+
+// No dataset of three axes or more: what there is instead.
+Status NoVolume(const std::shared_ptr<Hdf5File>& file, const Hdf5File::Found& found) {
+  for (const std::string& path : found.closed) {
+    if (const Status status = file->Dataset(path).status(); !status.ok()) return status;
+  }
+  const std::vector<std::string> pictures = file->Datasets(2).paths;
+  return Status::InvalidArgument(file->path() + ": has no dataset of three axes or more" +
+                                 (pictures.empty() ? "" : "; --dataset takes one of two: " + Listed(file, pictures)));
+}
+
+Result<std::string> ChosenDataset(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options) {
+  if (!options.dataset.empty()) return options.dataset.starts_with('/') ? options.dataset : "/" + options.dataset;
+  std::vector<std::string> paths;
+  for (const ImageLayout& layout : Layouts()) {
+    Result<std::vector<std::string>> images = layout.images(*file);
+    if (!images.ok()) return images.status();
+    paths = *std::move(images);
+    if (!paths.empty()) break;
+  }
+  if (paths.empty()) {
+    Hdf5File::Found found = file->Datasets(3);
+    if (found.paths.empty()) return NoVolume(file, found);
+    paths = std::move(found.paths);
+  }
+  if (paths.size() == 1) return paths[0];
+  return Status::InvalidArgument(
+      fmt::format("{}: has {} datasets, of which --dataset takes one: {}", file->path(), paths.size(), Listed(file, paths)));
+}
+
+Result<ImageDescription> Described(Hdf5File& file, const Hdf5Dataset& dataset) {
+  for (const ImageLayout& layout : Layouts()) {
+    Result<std::optional<ImageDescription>> image = layout.describe(file, dataset);
+    if (!image.ok()) return image.status();
+    if (image->has_value()) return **std::move(image);
+  }
+  return DescribeByAttributes(file, dataset);
+}
+
+// The volume of the chosen axes as RawHeader has it: its stored axes are the dataset's x, y and z.
+RawHeader HeaderOf(const ImageDescription& image, const AxisChoice& choice, const std::vector<std::uint64_t>& sizes) {
+  RawHeader header{.size = {1, 1, 1}, .world = image.world, .origin = image.origin, .matrix = "the directions of its axes"};
+  std::array<const ImageAxis*, 3> axes{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (choice.axes[i] < 0) continue;
+    const auto number = std::size_t(choice.axes[i]);
+    axes[i] = &image.axes[number];
+    header.size[int(i)] = std::int32_t(std::min(sizes[number], std::uint64_t{kMaxVolumeSide} + 1));
+  }
+  // Lengths have a unit if all of them have one: that of x.
+  const bool have_units = std::ranges::all_of(axes, [](const ImageAxis* axis) { return axis == nullptr || axis->unit; });
+  if (have_units) header.unit = axes[0]->unit;
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (axes[i] == nullptr) continue;
+    const double factor = have_units ? MetresIn(*axes[i]->unit) / MetresIn(*header.unit) : 1;
+    const Vec3 direction = axes[i]->direction.value_or(Normalized(header.steps[i]));
+    header.steps[i] = factor * axes[i]->step * direction;
+    header.origin = header.origin + factor * axes[i]->start * direction;
+  }
+  return header;
+}
+
+std::string NoteOfAxes(const ImageDescription& image, const std::vector<AxisKind>& kinds) {
+  std::vector<std::string_view> names;
+  for (const AxisKind kind : kinds) names.push_back(NameOf(kind));
+  return fmt::format("axes of the dataset: {} (by {})", fmt::join(names, ", "), image.axes_from.empty() ? "their order" : image.axes_from);
+}
+
+Result<Pyramid> Read(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options, const SourceContext& context) {
+  const Result<std::string> path = ChosenDataset(file, options);
+  if (!path.ok()) return path.status();
+  Result<std::shared_ptr<Hdf5Dataset>> dataset = file->Dataset(*path);
+  if (!dataset.ok()) return dataset.status();
+  Result<ImageDescription> image = Described(*file, **dataset);
+  if (!image.ok()) return image.status();
+  const std::string named = file->Named(*path);
+  std::vector<std::string> names;
+  for (const ImageAxis& axis : image->axes) names.push_back(axis.name);
+  const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(named, names, options);
+  if (!kinds.ok()) return kinds.status();
+  const std::vector<std::uint64_t> sizes = (*dataset)->size();
+  const Result<AxisChoice> choice = ChooseAxes(named, *kinds, sizes, options);
+  if (!choice.ok()) return choice.status();
+  if (choice->axes[0] < 0 || choice->axes[1] < 0) return Status::InvalidArgument(named + " has no axes x and y");
+  const Result<WorldPlacement> placed = PlaceInWorld(HeaderOf(*image, *choice, sizes), named);
+  if (!placed.ok()) return placed.status();
+  if (placed->slant) return Status::InvalidArgument(named + " has axes that are not at right angles, which is not supported in HDF5 files");
+
+  const std::string stored_type(ToString((*dataset)->type()));
+  Result<std::shared_ptr<ChunkedArray>> array = MakeHdf5Array(*std::move(dataset), context, image->type);
+  if (!array.ok()) return array.status();
+  Pyramid pyramid{.orientation = placed->geometry.orientation, .rescale = image->meaning.mappings.front()};
+  if (!image->meaning.linear()) {
+    array = MakeMappedArray(*std::move(array), std::move(image->meaning));
+    pyramid.rescale = {};
+  }
+  PyramidLevel level{.array = *array,
+                     .mirrored = placed->turn.flipped,
+                     .at = choice->at,
+                     .spacing = placed->geometry.spacing,
+                     .origin = placed->geometry.orientation.origin};
+  for (std::size_t i = 0; i < 3; ++i) level.axes[i] = choice->axes[std::size_t(placed->turn.from[i])];
+  pyramid.levels.push_back(std::move(level));
+  pyramid.info = {.format = image->format,
+                  .file_type = stored_type,
+                  .labels = image->labels,
+                  .channel = choice->channel,
+                  .times = choice->times,
+                  .time = choice->time,
+                  .notes = std::move(image->notes),
+                  .files = {file->path()}};
+  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
+  pyramid.info.notes.insert(pyramid.info.notes.begin(), NoteOfAxes(*image, *kinds));
+  return pyramid;
+}
+
+}  // namespace
+
+Hdf5Layout AnyHdf5() {
+  return {[](Hdf5File&) { return true; }, Read};
+}
+
+}  // namespace slabstream

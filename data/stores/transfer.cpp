@@ -1,0 +1,276 @@
+#include "data/stores/transfer.h"
+
+#include <arpa/inet.h>
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <iterator>
+#include <new>
+#include <utility>
+
+#include "common/base/version.h"
+
+namespace slabstream {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr std::size_t kMostOfPage = 4096;
+
+// What only this machine or its link sees.
+bool IsLocal(const sockaddr* address) {
+  const auto is_local_v4 = [](std::uint32_t host_order) {
+    return host_order >> 24 == 127 || host_order >> 24 == 0 || host_order >> 16 == 0xA9FE;  // 127/8, 0/8, 169.254/16
+  };
+  if (address->sa_family == AF_INET) {
+    sockaddr_in v4{};
+    std::memcpy(&v4, address, sizeof v4);
+    return is_local_v4(ntohl(v4.sin_addr.s_addr));
+  }
+  if (address->sa_family != AF_INET6) return true;
+  sockaddr_in6 v6{};
+  std::memcpy(&v6, address, sizeof v6);
+  const in6_addr& at = v6.sin6_addr;
+  if (IN6_IS_ADDR_V4MAPPED(&at) || IN6_IS_ADDR_V4COMPAT(&at)) {
+    std::uint32_t v4 = 0;
+    std::memcpy(&v4, at.s6_addr + 12, sizeof v4);
+    return is_local_v4(ntohl(v4));
+  }
+  return IN6_IS_ADDR_LOOPBACK(&at) || IN6_IS_ADDR_LINKLOCAL(&at) || IN6_IS_ADDR_UNSPECIFIED(&at);
+}
+
+std::size_t TakeBody(char* data, std::size_t, std::size_t bytes, void* transfer) {
+  return static_cast<Transfer*>(transfer)->OnBody(std::as_bytes(std::span(data, bytes))) ? bytes : 0;
+}
+
+int TakeProgress(void* transfer, curl_off_t, curl_off_t bytes, curl_off_t, curl_off_t) {
+  return static_cast<Transfer*>(transfer)->OnProgress(std::uint64_t(bytes)) ? 0 : 1;
+}
+
+curl_socket_t OpenSocket(void* data, curlsocktype, curl_sockaddr* address) {
+  auto& transfer = *static_cast<Transfer*>(data);
+  if (transfer.elsewhere() && IsLocal(&address->addr)) {
+    transfer.stopped = Status::Unavailable(fmt::format("leads to {}, which is an address of this machine or its link", transfer.host));
+    return CURL_SOCKET_BAD;
+  }
+  return ::socket(address->family, address->socktype | SOCK_CLOEXEC, address->protocol);
+}
+
+const std::string& UserAgent() {
+  static const std::string agent = fmt::format("slabstream/{}", Version());
+  return agent;
+}
+
+// What such names hold is compressed by its writer, whatever a server that goes by names says of it.
+bool NamesCompressed(std::string_view url) {
+  return url.ends_with(".gz") || url.ends_with(".br") || url.ends_with(".zst") || url.ends_with(".zstd");
+}
+
+std::string UrlOf(const HttpGet& get) {
+  return get.access == nullptr || get.access->query.empty() ? get.url : fmt::format("{}?{}", get.url, get.access->query);
+}
+
+}  // namespace
+
+std::string PartOf(const std::string& url, CURLUPart part, unsigned flags) {
+  const std::unique_ptr<CURLU, void (*)(CURLU*)> parsed(curl_url(), curl_url_cleanup);
+  char* text = nullptr;
+  if (parsed == nullptr || curl_url_set(parsed.get(), CURLUPART_URL, url.c_str(), 0) != CURLUE_OK ||
+      curl_url_get(parsed.get(), part, &text, flags) != CURLUE_OK) {
+    return {};
+  }
+  std::string value(text);
+  curl_free(text);
+  return value;
+}
+
+std::string HostAndPort(const std::string& url) {
+  return fmt::format("{}:{}", PartOf(url, CURLUPART_HOST), PartOf(url, CURLUPART_PORT, CURLU_DEFAULT_PORT));
+}
+
+std::string InRegion(const std::string& url, const std::string& region) {
+  constexpr std::string_view kAmazon = ".amazonaws.com", kService = "s3";
+  const std::string host = PartOf(url, CURLUPART_HOST);
+  if (!host.ends_with(kAmazon)) return url;
+  // "s3", "s3.REGION" or "s3-REGION" stands behind the bucket, if that is in the name.
+  const std::string front = host.substr(0, host.size() - kAmazon.size());
+  std::size_t service = front.rfind('.');
+  service = service == std::string::npos ? 0 : service + 1;
+  if (front.compare(service, kService.size(), kService) != 0 && service >= 2) {
+    service = front.rfind('.', service - 2);
+    service = service == std::string::npos ? 0 : service + 1;
+  }
+  const std::string_view name = std::string_view(front).substr(service);
+  if (name != kService && !name.starts_with("s3.") && !name.starts_with("s3-")) return url;
+  std::string other = url;
+  return other.replace(url.find(host), host.size(), fmt::format("{}s3.{}{}", front.substr(0, service), region, kAmazon));
+}
+
+Transfer::Transfer(HttpGet what, HttpTransfers::Done done) : get(std::move(what)) {
+  askers.push_back({get.span, std::move(done)});
+  Lead(UrlOf(get));
+}
+
+bool Transfer::elsewhere() const { return PartOf(url, CURLUPART_HOST) != PartOf(InRegion(get.url, region), CURLUPART_HOST); }
+
+bool Transfer::trusted() const {
+  const std::string own = HostAndPort(InRegion(get.url, region));
+  const auto is_at = [](std::string_view server, std::string_view port) { return server.ends_with(port); };
+  // The same server may lead from HTTP to HTTPS.
+  return host == own || (!elsewhere() && is_at(own, ":80") && is_at(host, ":443") && url.starts_with("https:"));
+}
+
+long Transfer::status() const {
+  long code = 0;
+  curl_easy_getinfo(easy, CURLINFO_RESPONSE_CODE, &code);
+  return code;
+}
+
+std::optional<std::uint64_t> Transfer::length() const {
+  curl_off_t bytes = -1;
+  curl_easy_getinfo(easy, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &bytes);
+  return bytes < 0 ? std::nullopt : std::optional(std::uint64_t(bytes));
+}
+
+std::string Transfer::header(const char* name) const {
+  curl_header* found = nullptr;
+  return curl_easy_header(easy, name, 0, CURLH_HEADER, -1, &found) == CURLHE_OK ? found->value : "";
+}
+
+bool Transfer::is_encoded() const {
+  const std::string encoding = header("Content-Encoding");
+  return !encoding.empty() && encoding != "identity";
+}
+
+bool Transfer::says_html() const { return header("Content-Type").starts_with("text/html"); }
+
+std::string Transfer::Between(std::string_view begin, std::string_view end) const {
+  const std::size_t from = page.find(begin), to = from == std::string::npos ? from : page.find(end, from);
+  return to == std::string::npos ? "" : page.substr(from + begin.size(), to - from - begin.size());
+}
+
+bool Transfer::TakesAlong(const Transfer& other) const {
+  const auto is_plain = [](const Transfer& each) { return each.get.span && !each.get.only_size && each.tries == 0 && each.redirects == 0; };
+  if (!is_plain(*this) || !is_plain(other) || get.url != other.get.url) return false;
+  if (get.known != other.get.known || get.access != other.get.access) return false;
+  const std::uint64_t end = get.span->begin + get.span->bytes, other_end = other.get.span->begin + other.get.span->bytes;
+  return other.get.span->begin >= end && other.get.span->begin - end <= HttpTransfers::kMostBetween &&
+         other_end - get.span->begin <= HttpTransfers::kMostTogether;
+}
+
+void Transfer::TakeAlong(Transfer other) {
+  get.span->bytes = other.get.span->begin + other.get.span->bytes - get.span->begin;
+  get.most = get.span->bytes;
+  std::ranges::move(other.askers, std::back_inserter(askers));
+}
+
+void Transfer::Lead(std::string where) {
+  url = std::move(where);
+  host = HostAndPort(url);
+}
+
+void Transfer::ReadStart() {
+  constexpr std::uint64_t kStart = 64;  // enough to tell a page from an object
+  reads_start = true;
+  get.span = ByteSpan{0, kStart};
+  get.most = kStart;
+}
+
+void Transfer::Prepare(CURL* handle, const HttpTransfers::Timing& timing) {
+  easy = handle;
+  tried = MonotonicNow();
+  patience = timing.patience;
+  if (begun == Time()) begun = tried;
+  ++tries;
+  body = {};
+  page.clear();
+  stopped.reset();
+  reason[0] = 0;
+  headers.reset();
+  curl_easy_setopt(easy, CURLOPT_PRIVATE, this);
+  curl_easy_setopt(easy, CURLOPT_URL, url.c_str());
+  curl_easy_setopt(easy, CURLOPT_PROTOCOLS_STR, "http,https");
+  curl_easy_setopt(easy, CURLOPT_USERAGENT, UserAgent().c_str());
+  if (const char* const authorities = std::getenv("SSL_CERT_FILE")) curl_easy_setopt(easy, CURLOPT_CAINFO, authorities);
+  curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(easy, CURLOPT_PIPEWAIT, 1L);  // one connection for all, if the server speaks HTTP/2
+  curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(std::chrono::ceil<milliseconds>(timing.connecting).count()));
+  curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
+  curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, long(std::chrono::ceil<seconds>(timing.stalled).count()));
+  curl_easy_setopt(easy, CURLOPT_ERRORBUFFER, reason);
+  curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, TakeBody);
+  curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
+  curl_easy_setopt(easy, CURLOPT_NOPROGRESS, 0L);
+  curl_easy_setopt(easy, CURLOPT_XFERINFOFUNCTION, TakeProgress);
+  curl_easy_setopt(easy, CURLOPT_XFERINFODATA, this);
+  curl_easy_setopt(easy, CURLOPT_OPENSOCKETFUNCTION, OpenSocket);
+  curl_easy_setopt(easy, CURLOPT_OPENSOCKETDATA, this);
+  curl_easy_setopt(easy, CURLOPT_NOBODY, get.only_size && !reads_start ? 1L : 0L);
+  if (get.span) {
+    curl_easy_setopt(easy, CURLOPT_RANGE, fmt::format("{}-{}", get.span->begin, get.span->begin + get.span->bytes - 1).c_str());
+  } else if (!as_sent && !NamesCompressed(get.url)) {
+    // Nothing encoded is asked for, but what comes encoded all the same is decoded. Parts of it would be no parts of the object.
+    curl_easy_setopt(easy, CURLOPT_ACCEPT_ENCODING, "");
+    AddHeader("Accept-Encoding:");
+  }
+  if (!get.known.empty()) AddHeader("If-None-Match: " + get.known);
+  if (get.access != nullptr && trusted()) {
+    for (const std::string& line : get.access->headers) AddHeader(line);
+    if (get.access->s3) Sign(*get.access->s3);
+  }
+  curl_easy_setopt(easy, CURLOPT_HTTPHEADER, headers.get());
+}
+
+// Signature version 4 of Amazon Web Services. libcurl 7.88 leaves the header with the payload's digest to us.
+void Transfer::Sign(const S3Access& s3) {
+  curl_easy_setopt(easy, CURLOPT_AWS_SIGV4, fmt::format("aws:amz:{}:s3", region.empty() ? s3.region : region).c_str());
+  curl_easy_setopt(easy, CURLOPT_USERNAME, s3.key.c_str());
+  curl_easy_setopt(easy, CURLOPT_PASSWORD, s3.secret.c_str());
+  AddHeader("x-amz-content-sha256: UNSIGNED-PAYLOAD");
+  if (!s3.token.empty()) AddHeader("x-amz-security-token: " + s3.token);
+}
+
+void Transfer::AddHeader(const std::string& line) { headers.reset(curl_slist_append(headers.release(), line.c_str())); }
+
+bool Transfer::OnBody(std::span<const std::byte> bytes) {
+  const long code = status();
+  if (code != 200 && code != 206) {
+    const std::size_t more = std::min(bytes.size(), kMostOfPage - page.size());
+    page.append(reinterpret_cast<const char*>(bytes.data()), more);
+    return true;
+  }
+  // A server that sends whole objects alone may be asked for an object that is no longer than the part.
+  const std::uint64_t said = is_encoded() ? 0 : length().value_or(0), least = std::max<std::uint64_t>(body.size() + bytes.size(), said);
+  if (get.span && code == 200 && (get.span->begin > 0 || least > get.span->bytes)) {
+    stopped = Status::Unavailable("the server sends whole objects alone, no parts of them");
+  } else if (least > get.most) {
+    stopped = Status::ResourceExhausted(fmt::format("has more than {} bytes", get.most));
+  } else {
+    try {
+      if (body.empty()) body.reserve(std::max<std::size_t>(said, bytes.size()));
+      body.insert(body.end(), bytes.begin(), bytes.end());
+    } catch (const std::bad_alloc&) {
+      stopped = Status::ResourceExhausted("no memory for it");
+    }
+  }
+  return !stopped;
+}
+
+bool Transfer::OnProgress(std::uint64_t bytes) {
+  constexpr std::uint64_t kLeastBytes = 1024;  // a second
+  const Time now = MonotonicNow();
+  if (now < begun + patience) return true;
+  const auto in_seconds = [](Duration time) { return std::uint64_t(std::chrono::duration_cast<seconds>(time).count()); };
+  if (bytes > in_seconds(now - tried) * kLeastBytes) return true;
+  stopped = Status::Unavailable(fmt::format("no answer within {} s, or less than {} bytes a second; {} {}", in_seconds(patience),
+                                            kLeastBytes, tries, tries == 1 ? "try" : "tries"));
+  return false;
+}
+
+}  // namespace slabstream

@@ -1,0 +1,167 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/base/find_named.h"
+#include "common/base/trimmed.h"
+#include "common/base/url.h"
+#include "data/volume_io/other_spellings.h"
+#include "data/volume_io/read_options.h"
+
+namespace slabstream {
+namespace {
+
+constexpr std::string_view kEndpoint = kEndpointMark.substr(1, kEndpointMark.size() - 2);
+
+// The end of the option that begins at `begin`: a comma with a name and = behind it, since values may hold commas too.
+std::size_t OptionEnd(std::string_view source, std::size_t begin) {
+  const auto in_name = [](char c) { return (c >= 'a' && c <= 'z') || c == '-'; };
+  for (std::size_t comma = source.find(',', begin); comma != std::string_view::npos; comma = source.find(',', comma + 1)) {
+    std::size_t behind = comma + 1;
+    while (behind < source.size() && in_name(source[behind])) ++behind;
+    if (behind > comma + 1 && behind < source.size() && source[behind] == '=') return comma;
+  }
+  return source.size();
+}
+
+// Names in a bucket may hold question marks.
+bool MayHaveQuery(std::string_view source) { return !SchemeOf(source).empty() && !source.starts_with(kBucketScheme); }
+
+// Where the options of an address begin. Its own query stands before them.
+std::size_t OptionsOfAddress(std::string_view address) {
+  const std::size_t mark = address.find('?');
+  for (std::size_t at = mark; at != std::string_view::npos; at = address.find_first_of("?,", at + 1)) {
+    const std::string_view name = address.substr(at + 1, std::min(address.find('=', at), address.size()) - at - 1);
+    const bool is_option = name == kEndpoint || FindNamed(ReadOptionList(), name) != nullptr;
+    if (is_option || (at != mark && address[at] == '?')) return at + 1;
+  }
+  return std::string_view::npos;
+}
+
+// Where the options of `source` begin, behind a question mark or, in an address with a query of its own, a comma; npos: it has none.
+std::size_t OptionsBegin(std::string_view source) {
+  std::error_code error;
+  if (std::filesystem::exists(source, error)) return std::string_view::npos;
+  if (MayHaveQuery(source)) return OptionsOfAddress(source);
+  const std::size_t mark = source.rfind('?');
+  return mark != std::string_view::npos && source.find('=', mark) != std::string_view::npos ? mark + 1 : std::string_view::npos;
+}
+
+struct OptionText {
+  std::string name, value;
+};
+
+struct Parts {
+  std::string place;  // before the options and the query
+  std::string query;
+  std::vector<OptionText> options;
+};
+
+Parts Divide(std::string_view source) {
+  const std::size_t begin = OptionsBegin(source);
+  Parts parts{std::string(source.substr(0, begin == std::string_view::npos ? begin : begin - 1)), {}, {}};
+  if (const std::size_t mark = parts.place.find('?'); mark != std::string::npos && MayHaveQuery(source)) {
+    parts.query = parts.place.substr(mark + 1);
+    parts.place.resize(mark);
+    // Other spellings end in '|'.
+    if (const std::size_t bar = parts.query.find('|'); bar != std::string::npos) {
+      parts.place += parts.query.substr(bar);
+      parts.query.resize(bar);
+    }
+  }
+  for (std::size_t at = begin; at <= source.size();) {
+    const std::size_t end = OptionEnd(source, at), equals = std::min(source.find('=', at), end);
+    parts.options.push_back({std::string(source.substr(at, equals - at)),
+                             std::string(source.substr(std::min(equals + 1, end), end - std::min(equals + 1, end)))});
+    at = end + 1;
+  }
+  return parts;
+}
+
+// Whether a name of a query is rather an option that was misspelled: other letters at most between what both begin and end with.
+bool LooksLikeOption(std::string_view name) {
+  return std::ranges::any_of(ReadOptionList(), [&](const ReadOption& option) {
+    const std::string_view wanted = option.name;
+    const std::size_t most = std::min(name.size(), wanted.size());
+    const auto begin = std::size_t(std::ranges::mismatch(name, wanted).in1 - name.begin());
+    std::size_t end = 0;
+    while (end < most - begin && name[name.size() - 1 - end] == wanted[wanted.size() - 1 - end]) ++end;
+    return most >= 3 && begin + end + 1 >= std::max(name.size(), wanted.size());
+  });
+}
+
+std::string JoinedOptions(const std::vector<OptionText>& options) {
+  std::string text;
+  for (const auto& [name, value] : options) text += fmt::format("{}{}={}", text.empty() ? '?' : ',', name, value);
+  return text;
+}
+
+}  // namespace
+
+Result<SourceText> ParseSourceText(const std::string& text) {
+  const bool is_address = !SchemeOf(Trimmed(text)).empty();
+  Parts parts = Divide(is_address ? Trimmed(text) : std::string_view(text));
+  SourceText source{parts.place, {}, {}};
+  const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("'{}': {}", ShownSource(text), why)); };
+  const auto no_option = [&](std::string_view name) {
+    return wrong(fmt::format("'{}' is no option for reading a file, which are {}", name, NamesOf(ReadOptionList())));
+  };
+  std::error_code error;
+  if (is_address && !std::filesystem::exists(parts.place, error)) {
+    Result<std::string> plain = WithoutOtherSpellings(parts.place);
+    if (!plain.ok()) return plain.status();
+    source.path = *std::move(plain);
+    source.options.query = EncodedUrl(parts.query);
+    const std::string_view first = std::string_view(parts.query).substr(0, parts.query.find('='));
+    if (LooksLikeOption(first)) return no_option(first);
+    if (parts.query.starts_with("source=http")) return wrong("is the page of a viewer: write what stands behind 'source='");
+  }
+  for (auto option = parts.options.begin(); option != parts.options.end();) {
+    const auto& [name, value] = *option;
+    if (name == kEndpoint && source.path.starts_with(kBucketScheme)) {
+      if (source.path.find(kEndpointMark) != std::string::npos) return wrong("endpoint is given twice");
+      source.path += std::string(kEndpointMark) + value;
+      option = parts.options.erase(option);
+      continue;
+    }
+    const ReadOption* const known = FindNamed(ReadOptionList(), name);
+    if (known == nullptr) return no_option(name);
+    if (known->given(source.options) && !known->of_addresses) return wrong(fmt::format("{} is given twice", name));
+    if (Status status = known->set(source.options, fmt::format("'{}': {}", ShownSource(text), name), value); !status.ok()) return status;
+    option = known->of_addresses ? parts.options.erase(option) : option + 1;
+  }
+  source.options_text = JoinedOptions(parts.options);
+  return source;
+}
+
+bool MayBeThere(const SourceText& source) {
+  std::error_code error;
+  return IsUrl(source.path) || std::filesystem::exists(source.path, error);
+}
+
+std::string WithReadOption(const std::string& source, std::string_view name, std::string_view value) {
+  const bool has_query = MayHaveQuery(source) && source.find('?') != std::string::npos;
+  return fmt::format("{}{}{}={}", source, has_query || OptionsBegin(source) != std::string::npos ? ',' : '?', name, value);
+}
+
+std::string AtTime(const std::string& source, int time) {
+  Parts parts = Divide(source);
+  std::erase_if(parts.options, [](const OptionText& option) { return option.name == "time"; });
+  std::string others = parts.query.empty() ? parts.place : fmt::format("{}?{}", parts.place, parts.query);
+  for (const auto& [name, value] : parts.options) others = WithReadOption(others, name, value);
+  return WithReadOption(others, "time", std::to_string(time));
+}
+
+std::string ShownSource(const std::string& source) {
+  Parts parts = Divide(source);
+  for (OptionText& option : parts.options) {
+    const std::size_t colon = option.value.find(':');
+    const bool names_file = colon != std::string::npos && option.value.find(":@") == colon;
+    if (option.name == "header" && !names_file)
+      option.value = (colon == std::string::npos ? "" : option.value.substr(0, colon + 1)) + "...";
+  }
+  return Redacted(parts.place) + (parts.query.empty() ? "" : "?...") + JoinedOptions(parts.options);
+}
+
+}  // namespace slabstream

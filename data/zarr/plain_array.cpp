@@ -1,0 +1,186 @@
+#include "data/zarr/plain_array.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "common/base/printable.h"
+#include "data/sources/even_steps.h"
+#include "data/sources/mapped_array.h"
+#include "data/volume_io/length_names.h"
+#include "data/zarr/coordinates.h"
+#include "data/zarr/find_volume.h"
+
+namespace slabstream::zarr {
+namespace {
+
+using metadata::Field;
+
+template <class T>
+std::vector<T> InOrderOf(const std::vector<std::size_t>& from, const std::vector<T>& of_metadata) {
+  std::vector<T> ordered;
+  for (const std::size_t axis : from) ordered.push_back(of_metadata[axis]);
+  return ordered;
+}
+
+// Names of all axes of the metadata, "" where there is none.
+Result<std::vector<std::string>> NamesOfAxes(const ZarrArray& array, const ZarrNode& node) {
+  std::vector<std::string> names(array.from.size());
+  for (std::size_t i = 0; i < array.dimension_names.size(); ++i) names[array.from[i]] = array.dimension_names[i];
+  const Field xarray = node.attributes_field()["_ARRAY_DIMENSIONS"];
+  if (!array.dimension_names.empty() || !xarray.given()) return names;
+  if (!xarray.is_array() || xarray.size() != names.size()) return xarray.Wrong(fmt::format("a list of {} names", names.size()));
+  for (std::size_t axis = 0; axis < names.size(); ++axis) {
+    const Result<std::string> name = xarray[axis].Text();
+    if (!name.ok()) return name.status();
+    names[axis] = *name;
+  }
+  return names;
+}
+
+// Says so where an axis is not called what it is taken for.
+void NoteAxes(const std::vector<std::string>& names, const std::vector<AxisKind>& kinds, SourceInfo& info) {
+  std::vector<std::string_view> as;
+  for (const AxisKind kind : kinds) as.push_back(NameOf(kind));
+  const auto same = [](const std::string& name, AxisKind kind) { return AxisNamed(name) == kind; };
+  if (std::ranges::equal(names, kinds, same)) return;
+  const bool named = std::ranges::any_of(names, [](const std::string& name) { return !name.empty(); });
+  info.notes.push_back(named ? Printable(fmt::format("the axes {} are taken for {}", fmt::join(names, ", "), fmt::join(as, ", ")))
+                             : fmt::format("the axes have no names; in their order they are taken for {}", fmt::join(as, ", ")));
+}
+
+// Spacing, origin and unit by coordinates that lie beside the array.
+Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
+                          const AxisChoice& choice, const std::vector<std::uint64_t>& sizes, Pyramid& pyramid) {
+  const std::size_t slash = node.path.rfind('/');
+  if (node.path.empty() || context.source->only_keeps()) return Status::Ok();
+  const std::string group = slash == std::string::npos ? "" : node.path.substr(0, slash);
+  PyramidLevel& level = pyramid.levels.front();
+  std::vector<std::string> placed, units;
+  for (const Axis axis : kAxes) {
+    const int number = choice.axes[std::size_t(axis)];
+    if (number < 0) continue;
+    const std::string& name = names[std::size_t(number)];
+    const Result<std::optional<AxisCoordinates>> coordinates = ReadCoordinates(context, group, name, sizes[std::size_t(number)]);
+    if (!coordinates.ok()) return coordinates.status();
+    if (!*coordinates) continue;
+    const std::optional<EvenSteps> even = EvenStepsOf((*coordinates)->values);
+    if (!even) {
+      if ((*coordinates)->values.size() > 1)
+        pyramid.info.notes.push_back(Printable(fmt::format("the coordinates of {} are not evenly spaced, so its spacing is 1", name)));
+      continue;
+    }
+    level.mirrored[std::size_t(axis)] = even->step < 0;
+    level.spacing[axis] = std::abs(even->step);
+    level.origin[axis] = std::min((*coordinates)->values.front(), (*coordinates)->values.back());
+    placed.push_back(name);
+    units.push_back((*coordinates)->unit);
+  }
+  if (!placed.empty())
+    pyramid.info.notes.push_back(Printable(fmt::format("spacing and origin are those of the coordinates {}", fmt::join(placed, ", "))));
+  if (units.empty()) return Status::Ok();
+  if (std::ranges::count(units, units.front()) == std::ptrdiff_t(units.size())) {
+    pyramid.orientation.unit = LengthUnitNamed(units.front());
+  } else {
+    pyramid.info.notes.push_back(Printable(fmt::format("the units of the coordinates differ: {}", fmt::join(units, ", "))));
+  }
+  return Status::Ok();
+}
+
+// A number, or a list of one, as netCDF has them.
+std::optional<double> NumberOf(const Field& field) {
+  const Field one = field.is_array() && field.size() == 1 ? field[0] : field;
+  const Result<double> number = one.Number();
+  return number.ok() ? std::optional(*number) : std::nullopt;
+}
+
+// xarray writes _FillValue of floats as the bytes of a double in base64 into Zarr 3.
+std::optional<double> MissingValueOf(const Field& field) {
+  constexpr std::size_t kBytes = 8, kTextBytes = 12;
+  if (!field.is_text() || field.value().get_ref<const std::string&>().size() != kTextBytes) return NumberOf(field);
+  constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::uint64_t bits = 0, low = 0;
+  const std::string text = *field.Text();
+  for (std::size_t i = 0; i < kTextBytes - 1; ++i) {
+    const std::size_t digit = kDigits.find(text[i]);
+    if (digit == std::string_view::npos) return std::nullopt;
+    bits = i < kTextBytes - 2 ? bits << 6 | digit : bits << 4 | digit >> 2;
+  }
+  for (std::size_t i = 0; i < kBytes; ++i) low |= (bits >> (8 * (kBytes - 1 - i)) & 0xff) << (8 * i);  // stored lowest byte first
+  const auto value = std::bit_cast<double>(low);
+  return std::isnan(value) ? std::nullopt : std::optional(value);
+}
+
+// What the CF conventions say of values.
+Status UnpackValues(const ZarrNode& node, bool of_xarray, ZarrArray& array, Pyramid& pyramid) {
+  const Field attributes = node.attributes_field();
+  const Field scale = attributes["scale_factor"], offset = attributes["add_offset"];
+  if (scale.given() || offset.given()) {
+    pyramid.rescale = {NumberOf(scale).value_or(1), NumberOf(offset).value_or(0)};
+    if (scale.given() && (!NumberOf(scale) || pyramid.rescale.scale == 0)) return scale.Wrong("a number other than 0");
+    if (offset.given() && !NumberOf(offset)) return offset.Wrong("a number");
+    pyramid.info.notes.push_back(
+        fmt::format("values are scale_factor {:g} * stored + add_offset {:g}", pyramid.rescale.scale, pyramid.rescale.offset));
+  }
+  std::optional<double> missing = MissingValueOf(attributes["_FillValue"]);
+  if (!missing) missing = NumberOf(attributes["missing_value"]);
+  // xarray takes the fill value of version 2 for it; 0 is rather what the writer did not think of.
+  if (!missing && of_xarray && node.version == 2) missing = NumberOf(node.metadata_field()["fill_value"]);
+  if (!missing || (*missing == 0 && !attributes["_FillValue"].given())) return Status::Ok();
+  pyramid.info.file_type = ToString(array.array->shape().type);
+  array.array = MakeMappedArray(array.array, {.missing = {*missing}});
+  pyramid.info.notes.push_back(fmt::format("stored values of {:g} mean that there is none (NaN)", *missing));
+  return Status::Ok();
+}
+
+}  // namespace
+
+PyramidLevel LevelOf(const ZarrArray& array, const AxisChoice& choice) {
+  PyramidLevel level{.array = array.array, .at = InOrderOf(array.from, choice.at)};
+  for (std::size_t i = 0; i < level.axes.size(); ++i) {
+    const auto place = std::ranges::find(array.from, std::size_t(choice.axes[i]));
+    level.axes[i] = choice.axes[i] < 0 ? -1 : int(place - array.from.begin());
+  }
+  return level;
+}
+
+std::vector<std::uint64_t> SizesInMetadata(const ZarrArray& array) {
+  std::vector<std::uint64_t> sizes(array.from.size());
+  for (std::size_t i = 0; i < sizes.size(); ++i) sizes[array.from[i]] = array.array->shape().size[i];
+  return sizes;
+}
+
+Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node, const ReadOptions& options) {
+  const std::string name = NameOf(*context.store, node.path);
+  Result<ZarrArray> array = OpenArray(context, node);
+  if (!array.ok()) return array.status();
+  const Result<std::vector<std::string>> names = NamesOfAxes(*array, node);
+  if (!names.ok()) return names.status();
+  const Result<std::vector<AxisKind>> kinds = KindsOfPlainAxes(name, *names, options);
+  if (!kinds.ok()) return kinds.status();
+  const std::vector<std::uint64_t> sizes = SizesInMetadata(*array);
+  const Result<AxisChoice> choice = ChooseAxes(name, *kinds, sizes, options);
+  if (!choice.ok()) return choice.status();
+  Pyramid pyramid;
+  pyramid.info = {.format = fmt::format("Zarr {}", node.version), .times = choice->times, .time = choice->time};
+  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
+  pyramid.info.channel = choice->channel;
+  NoteAxes(*names, *kinds, pyramid.info);
+  if (Status status = UnpackValues(node, node.attributes_field()["_ARRAY_DIMENSIONS"].given(), *array, pyramid); !status.ok())
+    return status;
+  pyramid.levels.push_back(LevelOf(*array, *choice));
+  if (options.spacing) {
+    pyramid.levels.back().spacing = *options.spacing;
+    return pyramid;
+  }
+  if (Status status = PlaceByCoordinates(context, node, *names, *choice, sizes, pyramid); !status.ok()) return status;
+  return pyramid;
+}
+
+}  // namespace slabstream::zarr

@@ -1,0 +1,335 @@
+// Files whose groups and attributes say what a dataset's axes are, where its voxels lie and what its samples stand for. The value of each
+// element tells where in the dataset it lies; each layout's own formula tells where in the world that is.
+#include "data/hdf5/hdf5_image.h"
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "data/open/open_source.h"
+#include "tests/data/hdf5/hdf5_files.h"
+#include "tests/data/sources/opened_source.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+class Hdf5ImageTest : public testing::Test {
+ protected:
+  std::shared_ptr<VolumeSource> Open(const ReadOptions& options = {}) { return Opened(OpenSource(path_, options, context_)); }
+  void ExpectRefused(const std::string& why, const ReadOptions& options = {}) { ExpectRefusal(OpenSource(path_, options, context_), why); }
+
+  TemporaryDirectory directory_;
+  std::string path_ = directory_ / "image.h5";
+  SourceContext context_ = TestReadContext();
+};
+
+std::vector<std::int16_t> Ascending(std::size_t count) {
+  std::vector<std::int16_t> samples(count);
+  for (std::size_t i = 0; i < count; ++i) samples[i] = std::int16_t(i);
+  return samples;
+}
+
+// The data value of the voxel at a place of the world, NaN outside.
+double ValueAt(VolumeSource& source, const Vec3& place) {
+  const VolumeDescription& description = source.info().levels[0].description;
+  const VolumeGeometry& geometry = description.geometry;
+  const Vec3 away = geometry.orientation.FromWorld(place - geometry.orientation.origin);
+  Box voxel;
+  for (int axis = 0; axis < 3; ++axis) {
+    voxel.begin[axis] = int(std::lround(away[axis] / geometry.spacing[axis]));
+    voxel.end[axis] = voxel.begin[axis] + 1;
+    EXPECT_NEAR(away[axis], voxel.begin[axis] * geometry.spacing[axis], 1e-6) << "no centre of a voxel";
+  }
+  if (!geometry.bounds().Contains(voxel)) return std::nan("");
+  const AlignedVector<std::byte> bytes = ReadBox(source, 0, voxel);
+  return VisitScalarType(description.type, [&](const auto* null) {
+    std::remove_cvref_t<decltype(*null)> sample;
+    std::memcpy(&sample, bytes.data(), sizeof sample);
+    return description.mapping.FromStored(sample);
+  });
+}
+
+// The dataset "/data" of 2 x 3 x 4 x 5 samples, axes named a letter each, read at time and channel 1.
+TEST_F(Hdf5ImageTest, AxistagsAndLabelsNameTheAxesInAnyOrder) {
+  const std::array<hsize_t, 4> size = {2, 3, 4, 5};
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4 * 5);
+  for (const std::string names : {"zyxc", "czyx", "xyzc", "tzyx", "yxct", "cxyz"}) {
+    for (const bool tags : {true, false}) {
+      SCOPED_TRACE(names);
+      {
+        Hdf5Writer writer(path_);
+        writer.Write("/data", {.size = {2, 3, 4, 5}, .chunk = {1, 2, 2, 3}, .type = SampleType::kInt16}, samples.data());
+        std::string json;
+        std::vector<std::string> labels;
+        for (const char name : names) {
+          json += fmt::format("{}{{\"key\": \"{}\", \"typeFlags\": 2, \"resolution\": 0}}", json.empty() ? "" : ", ", name);
+          labels.emplace_back(1, name);
+        }
+        if (tags) writer.Text("/data", "axistags", "{\"axes\": [" + json + "]}");
+        if (!tags) writer.Texts("/data", "DIMENSION_LABELS", labels);
+      }
+      ReadOptions options;
+      if (names.find('t') != std::string::npos) options.time = TimeRange{1, 1};
+      if (names.find('c') != std::string::npos) options.channel = 1;
+      const auto source = Open(options);
+      const Index3& voxels = source->info().levels[0].description.geometry.size;
+      for (Index3 v; v.z < voxels.z; ++v.z) {
+        for (v.y = 0; v.y < voxels.y; ++v.y) {
+          for (v.x = 0; v.x < voxels.x; ++v.x) {
+            int number = 0;
+            for (std::size_t axis = 0; axis < 4; ++axis) {
+              const std::size_t along = std::string("xyz").find(names[axis]);
+              number = number * int(size[axis]) + (along == std::string::npos ? 1 : v[int(along)]);
+            }
+            ASSERT_EQ(ValueAt(*source, {double(v.x), double(v.y), double(v.z)}), number);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_THAT(Open({.describe = true})->info().notes, Contains(HasSubstr("axes of the dataset: channel, x, y, z (by labels")));
+}
+
+TEST_F(Hdf5ImageTest, AxistagsThatDoNotFitAreRefused) {
+  const std::vector<std::int16_t> samples = Ascending(24);
+  for (const auto& [tags, why] : {std::pair(R"({"axes": [{"key": "z"}]})", "a list of 3 axes"), {"{", "not JSON"}}) {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Text("/data", "axistags", tags);
+  }
+  ExpectRefused("dataset '/data': axistags");
+}
+
+TEST_F(Hdf5ImageTest, ItkImagesLieWhereTheirDirectionsSay) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  // A turn by 30 degrees about z, with y running down. Row i is the direction of axis i.
+  const double c = std::cos(0.5235987755982988), s = 0.5;
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/ITKImage/0/VoxelData", {.size = {2, 3, 4}, .chunk = {2, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/ITKImage/0/Spacing", {3}, {1, 2, 3});
+    writer.Doubles("/ITKImage/0/Origin", {3}, {10, 20, 30});
+    writer.Doubles("/ITKImage/0/Directions", {3, 3}, {c, s, 0, s, -c, 0, 0, 0, 1});
+  }
+  const auto source = Open();
+  EXPECT_EQ(source->info().format, "ITK HDF5");
+  EXPECT_EQ(source->info().levels[0].description.geometry.orientation.world, World::kPatient);
+  for (int z = 0; z < 2; ++z) {
+    for (int y = 0; y < 3; ++y) {
+      for (int x = 0; x < 4; ++x) {
+        const Vec3 lps = Vec3{10, 20, 30} + Vec3{x * c + 2 * y * s, x * s - 2 * y * c, 3.0 * z};
+        ASSERT_EQ(ValueAt(*source, {-lps.x, -lps.y, lps.z}), x + 4 * (y + 3 * z));
+      }
+    }
+  }
+}
+
+TEST_F(Hdf5ImageTest, AxesThatAreNotAtRightAnglesAreRefused) {
+  const std::vector<std::int16_t> samples = Ascending(24);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/ITKImage/0/VoxelData", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/ITKImage/0/Spacing", {3}, {1, 2, 3});
+    writer.Doubles("/ITKImage/0/Origin", {3}, {0, 0, 0});
+    writer.Doubles("/ITKImage/0/Directions", {3, 3}, {1, 0, 0, 0.6, 0.8, 0, 0, 0, 1});
+  }
+  ExpectRefused("has axes that are not at right angles");
+}
+
+TEST_F(Hdf5ImageTest, MincVolumesAreScaledSliceBySlice) {
+  const std::vector<std::int16_t> samples = Ascending(3 * 2 * 4);
+  {
+    Hdf5Writer writer(path_);
+    const std::string image = "/minc-2.0/image/0/image";
+    writer.Write(image, {.size = {3, 2, 4}, .chunk = {2, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Text(image, "dimorder", "yspace,zspace,xspace");
+    writer.Numbers(image, "valid_range", {0, 20});
+    writer.Doubles("/minc-2.0/image/0/image-min", {3}, {0, 100, 200});
+    writer.Doubles("/minc-2.0/image/0/image-max", {3}, {20, 140, 260});
+    for (const auto& [name, step, start, cosines] :
+         {std::tuple("xspace", -2.0, 5.0, std::vector<double>{1, 0, 0}), std::tuple("yspace", 3.0, -4.0, std::vector<double>{0, 0.8, 0.6}),
+          std::tuple("zspace", 1.5, 7.0, std::vector<double>{0, -0.6, 0.8})}) {
+      const std::string dimension = std::string("/minc-2.0/dimensions/") + name;
+      writer.Doubles(dimension, {1}, {0});
+      writer.Numbers(dimension, "step", {step});
+      writer.Numbers(dimension, "start", {start});
+      writer.Numbers(dimension, "direction_cosines", cosines);
+    }
+  }
+  const auto source = Open();
+  EXPECT_EQ(source->info().format, "MINC 2");
+  EXPECT_EQ(source->info().file_type, "int16");
+  for (int y = 0; y < 3; ++y) {
+    for (int z = 0; z < 2; ++z) {
+      for (int x = 0; x < 4; ++x) {
+        const Vec3 along = {5 - 2.0 * x, -4 + 3.0 * y, 7 + 1.5 * z};
+        const Vec3 place = {along.x, 0.8 * along.y - 0.6 * along.z, 0.6 * along.y + 0.8 * along.z};
+        const double sample = std::min(20, x + 4 * (z + 2 * y));  // those above the valid range are taken for its end
+        ASSERT_FLOAT_EQ(float(ValueAt(*source, place)), float(100 * y + sample * (y + 1)));
+      }
+    }
+  }
+}
+
+TEST_F(Hdf5ImageTest, VtkHdfCellsLieInTheirCentres) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  const auto write = [&](const std::string& type, const std::string& group, const std::vector<double>& extent) {
+    Hdf5Writer writer(path_);
+    writer.Write(group + "/density", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Text("/VTKHDF", "Type", type);
+    writer.Numbers("/VTKHDF", "WholeExtent", extent);
+    writer.Numbers("/VTKHDF", "Origin", {10, 20, 30});
+    writer.Numbers("/VTKHDF", "Spacing", {1, 2, 3});
+    writer.Numbers("/VTKHDF", "Direction", {0, -1, 0, 1, 0, 0, 0, 0, 1});
+  };
+  write("ImageData", "/VTKHDF/PointData", {2, 5, 0, 2, 1, 2});
+  EXPECT_EQ(ValueAt(*Open(), {10 - 2.0 * 2, 20 + 2.0 + 3, 30 + 3.0 + 3}), 3 + 4 * (2 + 3 * 1));
+  write("ImageData", "/VTKHDF/CellData", {2, 6, 0, 3, 1, 3});
+  EXPECT_EQ(ValueAt(*Open(), {10 - 2 * 2.5, 20 + 2.0 + 3.5, 30 + 3 * 2.5}), 3 + 4 * (2 + 3 * 1));
+  EXPECT_EQ(Open()->info().levels[0].description.geometry.orientation.world, World::kScene);
+  write("ImageData", "/VTKHDF/PointData", {2, 6, 0, 2, 1, 2});
+  ExpectRefused("is of 2 x 3 x 4, but WholeExtent says 2 x 3 x 5 along z, y and x");
+  write("UnstructuredGrid", "/VTKHDF/PointData", {2, 5, 0, 2, 1, 2});
+  ExpectRefused("is a VTKHDF file of type 'UnstructuredGrid', which is not supported");
+}
+
+// As netCDF-4 writes them.
+TEST_F(Hdf5ImageTest, CoordinatesPlaceTheAxesAndCfScalesTheValues) {
+  std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  samples[5] = -999;
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/temperature", {.size = {2, 3, 4}, .chunk = {2, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/height", {2}, {0.5, 1.5});
+    writer.Doubles("/lat", {3}, {50, 48, 46});
+    writer.Doubles("/lon", {4}, {-1, 0, 1, 2});
+    writer.Text("/height", "axis", "Z");
+    writer.Text("/lat", "units", "degrees_north");
+    writer.Text("/lon", "units", "degrees_east");
+    writer.Scales("/temperature", {"/height", "/lat", "/lon"});
+    writer.Numbers("/temperature", "scale_factor", {0.5});
+    writer.Numbers("/temperature", "add_offset", {270});
+    writer.Numbers("/temperature", "_FillValue", {-999});
+    writer.Numbers("/temperature", "valid_range", {-10, 20});
+  }
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
+  EXPECT_EQ(geometry.spacing, (Vec3{1, 2, 1}));
+  EXPECT_EQ(geometry.orientation.origin, (Vec3{-1, 46, 0.5}));
+  EXPECT_EQ(ValueAt(*source, {1, 48, 1.5}), 270 + 0.5 * (2 + 4 * (1 + 3)));
+  EXPECT_TRUE(std::isnan(ValueAt(*source, {0, 48, 0.5}))) << "the missing value";
+  EXPECT_TRUE(std::isnan(ValueAt(*source, {2, 46, 1.5}))) << "above the valid range";
+  EXPECT_EQ(source->info().file_type, "int16");
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("axes of the dataset: z, y, x (by dimension scales)")));
+  EXPECT_THAT(source->info().notes, Contains(HasSubstr("scale_factor")));
+}
+
+TEST_F(Hdf5ImageTest, LengthsOfSeveralUnitsAreThoseOfX) {
+  const std::vector<std::int16_t> samples = Ascending(24);
+  Hdf5Writer(path_).Write("/data", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    const std::pair<const char*, const char*> axes[] = {{"/depth", "um"}, {"/row", "nm"}, {"/column", "nm"}};
+    for (std::size_t i = 0; i < 3; ++i) {
+      std::vector<double> coordinates;
+      for (std::size_t number = 0; number < i + 2; ++number) coordinates.push_back(double(number) * 2);
+      writer.Doubles(axes[i].first, {i + 2}, coordinates);
+      writer.Text(axes[i].first, "units", axes[i].second);
+    }
+    writer.Scales("/data", {"/depth", "/row", "/column"});
+  }
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
+  EXPECT_EQ(geometry.orientation.unit, LengthUnit::kNanometre);
+  EXPECT_DOUBLE_EQ(geometry.spacing.x, 2);
+  EXPECT_DOUBLE_EQ(geometry.spacing.z, 2000);
+}
+
+TEST_F(Hdf5ImageTest, UnevenCoordinatesLeaveTheSpacingAtOne) {
+  const std::vector<std::int16_t> samples = Ascending(3 * 2 * 2);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {3, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/lev", {3}, {1000, 500, 100});
+    writer.Doubles("/y", {2}, {0, 4});
+    writer.Doubles("/x", {2}, {0, 5});
+    writer.Scales("/data", {"/lev", "/y", "/x"});
+  }
+  EXPECT_EQ(Open()->info().levels[0].description.geometry.spacing, (Vec3{5, 4, 1}));
+}
+
+TEST_F(Hdf5ImageTest, DimensionsOfNetcdfWithoutAVariablePlaceNothing) {
+  const std::vector<std::int16_t> samples = Ascending(8);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 2, 2}, .type = SampleType::kInt16}, samples.data());
+    writer.Doubles("/x", {2}, {0, 7});
+    writer.Text("/x", "NAME", "This is a netCDF dimension but not a netCDF variable.         2");
+    writer.Scales("/data", {"", "", "/x"});
+  }
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
+  EXPECT_EQ(geometry.spacing, (Vec3{1, 1, 1}));
+  EXPECT_EQ(geometry.orientation.world, World::kVoxels);
+}
+
+TEST_F(Hdf5ImageTest, UnsignedSamplesInSignedOnesAreToldByCf) {
+  const std::vector<std::int8_t> samples = {0, 1, -1, -2, 100, -128, 7, 8};
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/data", {.size = {2, 2, 2}, .type = SampleType::kInt8}, samples.data());
+    writer.Text("/data", "_Unsigned", "true");
+    writer.Numbers("/data", "_FillValue", {-1});
+  }
+  const auto source = Open();
+  EXPECT_TRUE(std::isnan(ValueAt(*source, {0, 1, 0}))) << "255";
+  EXPECT_EQ(ValueAt(*source, {1, 1, 0}), 254);
+  EXPECT_EQ(ValueAt(*source, {1, 0, 1}), 128);
+}
+
+TEST_F(Hdf5ImageTest, NexusLeadsToTheSignalAndItsAxes) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  {
+    Hdf5Writer writer(path_);
+    for (const char* const name : {"/entry/data/counts", "/entry/data/errors"}) {
+      writer.Write(name, {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    }
+    writer.Doubles("/entry/data/z", {2}, {1, 1.5});
+    writer.Text("/", "default", "entry");
+    writer.Text("/entry", "default", "data");
+    writer.Text("/entry/data", "NX_class", "NXdata");
+    writer.Text("/entry/data", "signal", "counts");
+    writer.Texts("/entry/data", "axes", {"z", ".", "."});
+  }
+  const auto source = Open();
+  EXPECT_EQ(source->info().format, "NeXus");
+  EXPECT_EQ(source->info().levels[0].description.geometry.spacing, (Vec3{1, 1, 0.5}));
+  EXPECT_EQ(source->info().levels[0].description.geometry.orientation.origin, (Vec3{0, 0, 1}));
+}
+
+TEST_F(Hdf5ImageTest, ResolutionAndOffsetAreInTheOrderOfTheAxes) {
+  const std::vector<std::int16_t> samples = Ascending(2 * 3 * 4);
+  {
+    Hdf5Writer writer(path_);
+    writer.Write("/volumes/raw", {.size = {2, 3, 4}, .type = SampleType::kInt16}, samples.data());
+    writer.Numbers("/volumes/raw", "resolution", {40, 4, 8});
+    writer.Numbers("/volumes/raw", "offset", {400, 12, 16});
+    writer.Text("/volumes/raw", "units", "nm");
+  }
+  const auto source = Open();
+  const VolumeGeometry& geometry = source->info().levels[0].description.geometry;
+  EXPECT_EQ(geometry.spacing, (Vec3{8, 4, 40}));
+  EXPECT_EQ(geometry.orientation.origin, (Vec3{16, 12, 400}));
+  EXPECT_EQ(geometry.orientation.unit, LengthUnit::kNanometre);
+}
+
+}  // namespace
+}  // namespace slabstream

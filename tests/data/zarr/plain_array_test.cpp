@@ -1,0 +1,141 @@
+// Arrays without OME-Zarr: their axes, their place, and their values by the CF conventions.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/open/open_source.h"
+#include "tests/data/sources/opened_source.h"
+#include "tests/data/zarr/read_zarr.h"
+#include "tests/data/zarr/zarr_files.h"
+#include "tests/support/temporary_directory.h"
+
+namespace slabstream {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options = {}) {
+  return OpenSource(path, options, TestContext());
+}
+
+double Number(std::span<const std::uint64_t> at) { return double(at[2] + 4 * at[1] + 12 * at[0]); }
+
+// An array "temperature" of 2 x 3 x 4 elements whose axes are called so, in a group.
+void WriteXarray(const std::string& folder, int version, const std::vector<std::string>& names,
+                 const ZarrJson& attributes = ZarrJson::object(), SampleType type = SampleType::kInt16) {
+  WriteZarrGroup(folder, version, ZarrJson::object());
+  ZarrSpec spec{.version = version, .shape = {2, 3, 4}, .chunk = {2, 2, 2}, .type = type, .separator = '/'};
+  if (version == 3) spec.names = names;
+  WriteZarrArray(folder + "/temperature", spec, Number);
+  ZarrJson all = attributes;
+  if (version == 2) all["_ARRAY_DIMENSIONS"] = names;
+  if (version == 2) return WriteJson(folder + "/temperature/.zattrs", all);
+  ZarrJson metadata = MetadataOf(spec);
+  metadata["attributes"] = all;
+  WriteJson(folder + "/temperature/zarr.json", metadata);
+}
+
+void WriteCoordinates(const std::string& folder, int version, const std::string& name, const std::vector<double>& values,
+                      const std::string& unit = "") {
+  const ZarrSpec spec{.version = version, .shape = {values.size()}, .chunk = {2}, .type = SampleType::kFloat64};
+  WriteZarrArray(folder + "/" + name, spec, [&](std::span<const std::uint64_t> at) { return at[0] < values.size() ? values[at[0]] : 0; });
+  ZarrJson attributes = ZarrJson::object();
+  if (!unit.empty()) attributes["units"] = unit;
+  if (version == 2) return WriteJson(folder + "/" + name + "/.zattrs", attributes);
+  ZarrJson metadata = MetadataOf(spec);
+  metadata["attributes"] = attributes;
+  WriteJson(folder + "/" + name + "/zarr.json", metadata);
+}
+
+TEST(PlainArrayTest, EvenCoordinatesGiveSpacingOriginAndUnit) {
+  for (const int version : {2, 3}) {
+    const TemporaryDirectory folder;
+    WriteXarray(folder.path(), version, {"depth", "y", "x"});
+    WriteCoordinates(folder.path(), version, "depth", {100, 103}, "Micrometers");
+    WriteCoordinates(folder.path(), version, "y", {-2, 0, 2}, "um");
+    WriteCoordinates(folder.path(), version, "x", {0.5, 0.75, 1, 1.25}, "um");
+    // The group has one array of three axes.
+    const auto source = Opened(Open(folder.path()));
+    const VolumeGeometry geometry = source->info().levels[0].description.geometry;
+    EXPECT_EQ(geometry.size, (Index3{4, 3, 2}));
+    EXPECT_EQ(geometry.spacing, (Vec3{0.25, 2, 3}));
+    EXPECT_EQ(geometry.orientation.origin, (Vec3{0.5, -2, 100}));
+    EXPECT_THAT(source->info().notes, Contains(HasSubstr("spacing and origin are those of the coordinates x, y, depth")));
+    EXPECT_EQ(Opened(Open(folder.path(), {.spacing = Vec3{1, 2, 5}}))->info().levels[0].description.geometry.spacing, (Vec3{1, 2, 5}));
+
+    WriteCoordinates(folder.path(), version, "depth", {100, 90}, "um");
+    WriteCoordinates(folder.path(), version, "y", {0, 1, 3}, "um");
+    const auto other = Opened(Open(folder.path()));
+    EXPECT_EQ(other->info().levels[0].description.geometry.spacing, (Vec3{0.25, 1, 10}));
+    EXPECT_EQ(other->info().levels[0].description.geometry.orientation.origin, (Vec3{0.5, 0, 90}));
+    EXPECT_EQ((*SamplesOf<std::uint16_t>(*other))[0], (*SamplesOf<std::uint16_t>(*source))[12]) << "the voxel with the lowest coordinates";
+    EXPECT_EQ(other->info().levels[0].description.geometry.orientation.unit, LengthUnit::kMicrometre);
+    EXPECT_THAT(other->info().notes, Contains(HasSubstr("coordinates of y are not evenly spaced")));
+  }
+}
+
+TEST(PlainArrayTest, CoordinatesOfAnotherSizeDoNotCount) {
+  const TemporaryDirectory folder;
+  WriteXarray(folder.path(), 2, {"z", "y", "x"});
+  WriteCoordinates(folder.path(), 2, "x", {1, 3, 5});
+  WriteObject(folder / "y/.zarray", "{");
+  EXPECT_EQ(Opened(Open(folder / "temperature"))->info().levels[0].description.geometry.spacing, (Vec3{1, 1, 1}));
+  EXPECT_EQ(Opened(Open(folder.path(), {.array = "temperature"}))->info().levels[0].description.geometry.spacing, (Vec3{1, 1, 1}));
+}
+
+TEST(PlainArrayTest, PackedValuesAreUnpacked) {
+  for (const int version : {2, 3}) {
+    const TemporaryDirectory folder;
+    WriteXarray(folder.path(), version, {"z", "y", "x"}, {{"scale_factor", 0.5}, {"add_offset", {100.0}}});
+    const auto source = Opened(Open(folder.path()));
+    const VolumeDescription& description = source->info().levels[0].description;
+    EXPECT_EQ(description.mapping.FromStored(double((*SamplesOf<std::uint16_t>(*source))[5])), 0.5 * 5 + 100);
+    EXPECT_THAT(source->info().notes, ElementsAre("values are scale_factor 0.5 * stored + add_offset 100"));
+    WriteXarray(folder.path(), version, {"z", "y", "x"}, {{"scale_factor", 0}});
+    EXPECT_THAT(Open(folder.path()).status().message(), HasSubstr("scale_factor is 0, must be a number other than 0"));
+  }
+}
+
+TEST(PlainArrayTest, MissingValuesAreNotANumber) {
+  const ZarrJson five = {{"_FillValue", 5}}, in_base64 = {{"_FillValue", "AAAAAAAAFEA="}}, by_name = {{"missing_value", 5}};
+  for (const ZarrJson& attributes : {five, in_base64, by_name}) {
+    for (const SampleType type : {SampleType::kUint8, SampleType::kInt16, SampleType::kFloat16, SampleType::kFloat64}) {
+      const TemporaryDirectory folder;
+      WriteXarray(folder.path(), 3, {"z", "y", "x"}, attributes, type);
+      const auto source = Opened(Open(folder.path()));
+      EXPECT_EQ(source->info().file_type, ToString(type));
+      EXPECT_THAT(source->info().notes, ElementsAre("stored values of 5 mean that there is none (NaN)"));
+      const std::vector<float> values = *SamplesOf<float>(*source);
+      for (std::size_t i = 0; i < values.size(); ++i) EXPECT_TRUE(i == 5 ? std::isnan(values[i]) : values[i] == float(i)) << i;
+    }
+  }
+  // NaN is none already.
+  const TemporaryDirectory folder;
+  WriteXarray(folder.path(), 3, {"z", "y", "x"}, {{"_FillValue", "AAAAAAAA+H8="}}, SampleType::kFloat32);
+  EXPECT_THAT(Opened(Open(folder.path()))->info().notes, IsEmpty());
+}
+
+TEST(PlainArrayTest, NotesTellWhichAxesWereTaken) {
+  const TemporaryDirectory folder;
+  const auto notes = [&](const std::vector<std::string>& names) {
+    WriteXarray(folder.path(), 3, names);
+    const auto source = Opened(Open(folder.path(), {.describe = true}));
+    EXPECT_EQ(source->info().levels[0].description.geometry.size, (Index3{4, 3, 2}));
+    return source->info().notes;
+  };
+  EXPECT_THAT(notes({"plane", "Lat", "LON"}), IsEmpty());
+  EXPECT_THAT(notes({"scan", "y", "x"}), ElementsAre("the axes scan, y, x are taken for z, y, x"));
+  EXPECT_THAT(notes({"x", "x", "x"}), ElementsAre("the axes x, x, x are taken for z, y, x"));
+  WriteXarray(folder.path(), 3, {"time", "y", "x"});
+  const auto series = Opened(Open(folder.path(), {.describe = true}));
+  EXPECT_EQ(series->info().times, 2);
+  EXPECT_EQ(series->info().time, 0);
+  EXPECT_EQ(Opened(Open(folder.path(), {.time = TimeRange{1, 1}}))->info().time, 1);
+}
+
+}  // namespace
+}  // namespace slabstream
