@@ -118,7 +118,7 @@ std::optional<double> MissingValueOf(const Field& field) {
 }
 
 // What the CF conventions say of values.
-Status UnpackValues(const ZarrNode& node, bool of_xarray, ZarrArray& array, Pyramid& pyramid) {
+Status UnpackValues(const ZarrNode& node, ZarrArray& array, Pyramid& pyramid) {
   const Field attributes = node.attributes_field();
   const Field scale = attributes["scale_factor"], offset = attributes["add_offset"];
   if (scale.given() || offset.given()) {
@@ -130,9 +130,8 @@ Status UnpackValues(const ZarrNode& node, bool of_xarray, ZarrArray& array, Pyra
   }
   std::optional<double> missing = MissingValueOf(attributes["_FillValue"]);
   if (!missing) missing = NumberOf(attributes["missing_value"]);
-  // xarray takes the fill value of version 2 for it; 0 is rather what the writer did not think of.
-  if (!missing && of_xarray && node.version == 2) missing = NumberOf(node.metadata_field()["fill_value"]);
-  if (!missing || (*missing == 0 && !attributes["_FillValue"].given())) return Status::Ok();
+  // The fill value of the array itself, which xarray takes for it in version 2, is what other writers store as a value, too.
+  if (!missing) return Status::Ok();
   pyramid.info.file_type = ToString(array.array->shape().type);
   array.array = MakeMappedArray(array.array, {.missing = {*missing}});
   pyramid.info.notes.push_back(fmt::format("stored values of {:g} mean that there is none (NaN)", *missing));
@@ -172,8 +171,7 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
   pyramid.info.channel = choice->channel;
   NoteAxes(*names, *kinds, pyramid.info);
-  if (Status status = UnpackValues(node, node.attributes_field()["_ARRAY_DIMENSIONS"].given(), *array, pyramid); !status.ok())
-    return status;
+  if (Status status = UnpackValues(node, *array, pyramid); !status.ok()) return status;
   pyramid.levels.push_back(LevelOf(*array, *choice));
   if (options.spacing) {
     pyramid.levels.back().spacing = *options.spacing;

@@ -7,9 +7,9 @@ import tensorstore
 from case import TYPES, Case, chunks, halved, pick, sides, sparse, values, with_options
 
 CODECS = {"raw": {"type": "raw"}, "gzip": {"type": "gzip"}, "zlib": {"type": "gzip", "useZlib": True}, "zstd": {"type": "zstd"},
+          "bzip2": {"type": "bzip2"}, "xz": {"type": "xz"},
           **{f"blosc-{inner}-{shuffle}": {"type": "blosc", "cname": inner, "shuffle": shuffle, "clevel": 5}
              for inner in ("blosclz", "lz4", "lz4hc", "zlib", "zstd") for shuffle in (0, 1, 2)}}
-REFUSED = {"bzip2": {"type": "bzip2"}, "xz": {"type": "xz"}}
 
 
 def write(path, data, block, codec):
@@ -88,11 +88,15 @@ def views(folder, random, number):
 
 
 def refused(folder, random):
-    for name, codec in REFUSED.items():
-        path = os.path.join(folder, f"refused-{name}.n5")
-        attributes(path, n5="2.5.1")
-        write(os.path.join(path, "raw"), values(random, (8, 8, 8), "uint8"), (8, 8, 8), codec)
-        yield Case(f"{name} is refused", with_options(path, array="raw"), [], refused=name)
+    path = os.path.join(folder, "refused.n5")
+    attributes(path, n5="2.5.1")
+    write(os.path.join(path, "raw"), values(random, (8, 8, 8), "uint8"), (8, 8, 8), CODECS["raw"])
+    described = os.path.join(path, "raw", "attributes.json")
+    with open(described) as file:
+        said = json.load(file)
+    with open(described, "w") as file:
+        json.dump({**said, "compression": {"type": "zfp"}}, file)
+    yield Case("an unknown compression is refused", with_options(path, array="raw"), [], refused="zfp")
 
 
 def cases(folder, random, count):

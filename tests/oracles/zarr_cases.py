@@ -173,17 +173,22 @@ def missing_chunks(folder, random, number):
     return Case(f"deleted chunks, version {array.metadata.zarr_format}", path, [data])
 
 
+def others(folder, random):
+    """Types and filters that few arrays have."""
+    for name, dtype, options in (("half", "float16", {}), ("delta", "int32", {"filters": [numcodecs.Delta(dtype="<i4")]}),
+                                 ("bz2", "int32", {"compressors": numcodecs.BZ2()})):
+        path, data = os.path.join(folder, name), random.integers(-1000, 1000, (5, 6, 7)).astype(dtype)
+        zarr.create_array(path, shape=data.shape, chunks=(4, 4, 4), dtype=dtype, zarr_format=2, **options)[...] = data
+        yield Case(name, path, [data])
+
+
 def refusals(folder):
     """What is not supported ends in an error that names it."""
     def write(name, **options):
         path = os.path.join(folder, name)
         zarr.create_array(path, shape=(4, 4, 4), chunks=(4, 4, 4), **options)[...] = 1
         return path
-    yield Case("float16 is refused", write("half", dtype="float16"), [], refused="float16")
     yield Case("complex64 is refused", write("complex", dtype="complex64"), [], refused="complex64")
-    delta = [numcodecs.Delta(dtype="<i4")]
-    yield Case("delta is refused", write("delta", dtype="int32", zarr_format=2, filters=delta), [], refused="delta")
-    yield Case("bz2 is refused", write("bz2", dtype="int32", zarr_format=2, compressors=numcodecs.BZ2()), [], refused="bz2")
     nested = ShardingCodec(chunk_shape=(2, 2, 2), codecs=[ShardingCodec(chunk_shape=(1, 1, 1), codecs=[BytesCodec()])])
     path = write("nested", dtype="uint8", serializer=nested, compressors=None)
     yield Case("shards in shards are refused", path, [], refused="sharding_indexed")
@@ -205,4 +210,5 @@ def cases(folder, random, count):
         yield version_3(folder, random, next(number))
     for _ in range(5):
         yield missing_chunks(folder, random, next(number))
+    yield from others(folder, random)
     yield from refusals(folder)
