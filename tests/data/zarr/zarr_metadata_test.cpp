@@ -268,7 +268,8 @@ TEST(ZarrMetadataTest, AxesOfSpaceWithOtherNamesAreTakenByTheirOrder) {
   const auto kinds = [&](const std::vector<std::string>& names) {
     for (std::size_t i = 0; i < 3; ++i) metadata["multiscales"][0]["axes"][i + 1] = {{"name", names[i]}, {"type", "space"}};
     std::vector<AxisKind> read;
-    for (const zarr::OmeAxis& axis : zarr::ParseOmeImage(Field("object", metadata))->axes) read.push_back(axis.kind);
+    const auto image = zarr::ParseOmeImage(Field("object", metadata));
+    for (const zarr::OmeAxis& axis : image->axes) read.push_back(axis.kind);
     return read;
   };
   using enum AxisKind;
