@@ -275,9 +275,6 @@ void Executor::Perform(StartCombine&& action) {
         return Status::Ok();
       }
       if (!combine.incoming) combine.incoming.emplace();
-      if (!fresh && image->format != combine.incoming->header.format) {
-        return Status::InvalidArgument("PartialImage.image.format is not that of the frame");
-      }
       return WithAllThreads(lane.arena, [&] {
         return combine.incoming->shared ? CombineBorrowed(*image, fresh, combine, pixels, peer_memory_)
                                         : CombineIncoming(*image, fresh, combine, pixels);
