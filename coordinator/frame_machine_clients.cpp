@@ -20,6 +20,11 @@ std::optional<PicturesAddress> AddressOf(const std::optional<PicturesDoor>& door
   return PicturesAddress{fmt::format("tcp://{}:{}", host, door->port), door->key};
 }
 
+FrameKind KindOf(const FrameRequest& frame) {
+  return std::hash<std::string>()(
+      fmt::format("{}\n{}\n{}\n{} {} {}", frame.dataset, frame.renderer, frame.level, frame.detail, frame.size.width, frame.size.height));
+}
+
 }  // namespace
 
 void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& message) {
@@ -34,6 +39,8 @@ void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& m
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
   if (message.frame.previews) QueueCoarse(request);
   request.use = ++last_use;
+  request.kind = KindOf(message.frame);
+  forecast_due = true;
   queue.Push(std::move(request));
   actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, std::make_shared<const FrameRequest>(message.frame)});
 }
@@ -117,8 +124,9 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const CancelFrame& m
   }
 }
 
-void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& message) {
-  clients.Read(client, message.received_bytes);
+void FrameMachine::State::OnPing(const FromClient& event, const ClientPing& message) {
+  const PeerToken client = event.from;
+  clients.Read(client, message.received_bytes, event.unsent_bytes);
   ClientPong pong{.epoch = config.epoch, .nonce = message.nonce};
   for (const RequestId request : message.open) {
     Answer* answer = clients.FindAnswer(client, request);

@@ -77,7 +77,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   if (frame->planned()->teaches()) actions.emplace_back(FrameMeasured{frame->planned(), reply.statistics.reports});
   EndRequest(request.client, request.submit.request, std::move(reply), std::move(payload));
   ++frames_done;
-  EndFrame(message.frame, "done");
+  EndFrame(message.frame, "done", DeadlineForecast::Ended::kDone);
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message) {

@@ -260,7 +260,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     std::visit(
         [&, from = client_peers.Heard(incoming->identity, MonotonicNow())]<class Message>(Message& each) {
           if constexpr (std::constructible_from<ClientToFrames, Message>) {
-            HandleEvent(FromClient{from, std::move(each), incoming->host});
+            HandleEvent(FromClient{from, std::move(each), incoming->host, clients.UnsentBytes(incoming->identity)});
           } else if constexpr (std::constructible_from<ClientToDatasets, Message>) {
             HandleEvent(ClientHeard{from, std::is_same_v<Message, AddVolume>});
             HandleEvent(ClientAsked{from, std::move(each), incoming->payload()});

@@ -63,6 +63,9 @@ struct ImagesKeys {
   std::string plane;
 };
 
+// What pictures that clients do not take may take of a worker's memory. `memory_bytes` 0: no limit was given.
+std::uint64_t UnsentShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? std::uint64_t{256} << 20 : memory_bytes / 16; }
+
 constexpr Duration kPeerPatience = std::chrono::seconds(3);  // less than a handshake may take
 
 }  // namespace
@@ -78,7 +81,7 @@ struct WorkerService::Impl {
         images(std::move(images_socket)),
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
-        pictures(service_context, keys ? std::optional(keys->own) : std::nullopt),
+        pictures(service_context, keys ? std::optional(keys->own) : std::nullopt, UnsentShare(options.machine.memory_bytes)),
         executor(std::in_place, outbox, options.machine.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw,
                  int(options.machine.threads), options.make_renderer, options.task_hook) {}
 

@@ -74,6 +74,9 @@ class Socket {
   // Unavailable: nobody with this identity (router); ResourceExhausted: the high-water mark is reached.
   Status Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload = {});
 
+  // Bytes of payloads that Send has taken and that have not left this process: to `identity`; of dealers, all.
+  std::uint64_t UnsentBytes(const std::string& identity = {}) const;
+
   // Dealers: whether the other end has refused this socket's key; it does not try again.
   bool refused() const;
 
