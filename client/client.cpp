@@ -16,6 +16,7 @@
 #include "common/base/overloaded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
+#include "common/wire/other_version.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -118,7 +119,8 @@ struct Client::Impl {
   void SubmitAgain(OpenRequest& lost);
   void End(RequestId request, decltype(Event::what) end);  // nothing happens if it has ended
   bool ExpireQuestions(Time now);                          // true: some have ended
-  void FailAll(const std::string& reason);
+  void FailAll(const Status& reason);
+  Status OtherRelease() const { return Status::InvalidArgument("the service at " + endpoint + " " + TextOfOtherVersion(*other_version)); }
 
   // The reason, once the service counts as gone.
   std::optional<std::string> Loss(Time now) const;
@@ -129,7 +131,8 @@ struct Client::Impl {
   Socket socket;
   ClientTiming timing;
   const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
-  bool unreachable = false;  // the last ping could not be queued
+  bool unreachable = false;                    // the last ping could not be queued
+  std::optional<std::uint32_t> other_version;  // that the service speaks, if it is not ours
   Wakeup wakeup;
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
@@ -177,7 +180,7 @@ bool Client::Impl::Pump(Time limit) {
   if (!open.empty() || !questions.empty()) {
     if (now >= next_ping) SendPing(now);
     if (const std::optional<std::string> loss = Loss(now)) {
-      FailAll("the service at " + endpoint + " " + *loss);
+      FailAll(Status::Unavailable("the service at " + endpoint + " " + *loss));
       return false;
     }
     limit = std::min(limit, next_ping);
@@ -201,9 +204,14 @@ bool Client::Impl::Receive() {
     const Bytes payload = incoming->payload();
     Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(incoming->header(), payload.size());
     if (!message.ok()) {
+      if ((other_version = OtherVersion(incoming->header()))) {
+        FailAll(OtherRelease());
+        continue;
+      }
       LogWarning("client plane: dropped a message: " + message.status().message());
       continue;
     }
+    other_version.reset();
     unanswered_since.reset();
     received_bytes += payload.size();
     Handle(*message, payload);
@@ -292,7 +300,7 @@ void Client::Impl::Handle(DirectPictures::Reply complete) {
 
 void Client::Impl::Handle(const ClientPong& pong) {
   const auto ping = pinged.find(pong.nonce);
-  if (pong.senders && direct) direct->Admit(*pong.senders);
+  if (pong.senders && direct) direct->Admit(*pong.senders, MonotonicNow());
   if (ping == pinged.end()) return;
   const std::vector<RequestId> asked = std::move(ping->second);
   pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
@@ -342,9 +350,9 @@ bool Client::Impl::ExpireQuestions(Time now) {
   return questions.size() < asked;
 }
 
-void Client::Impl::FailAll(const std::string& reason) {
-  while (!questions.empty()) End(questions.begin()->first, Status::Unavailable(reason));
-  while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
+void Client::Impl::FailAll(const Status& reason) {
+  while (!questions.empty()) End(questions.begin()->first, reason);
+  while (!open.empty()) End(open.begin()->first, reason);
   pinged.clear();
   if (direct) direct->Clear();
   unanswered_since.reset();
@@ -362,6 +370,7 @@ Result<Client> Client::Connect(Context& context, const ServiceAddress& service, 
     const Time now = MonotonicNow();
     if (now >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
     client.impl_->Pump(give_up ? std::min(end, now + kEachLook) : end);
+    if (client.impl_->other_version) return client.impl_->OtherRelease();
   }
   return client;
 }

@@ -22,6 +22,7 @@
 #include "common/transport/authenticator.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
+#include "common/wire/other_version.h"
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
@@ -125,9 +126,10 @@ struct WorkerService::Impl {
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
-  Status ended;           // set before `stopped`
-  bool stop_now = false;  // set by the machine
-  LimitedLog complaints;  // about messages
+  Status ended;                                // set before `stopped`
+  bool stop_now = false;                       // set by the machine
+  std::optional<std::uint32_t> other_version;  // of the coordinator's messages, if it is not ours
+  LimitedLog complaints;                       // about messages
   WorkerMetrics metrics{options.machine.memory_bytes};
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
@@ -183,6 +185,9 @@ Status WorkerService::Impl::Loop() {
     peers.CloseIdle(now);
     pictures.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
+    if (other_version) {
+      return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " " + TextOfOtherVersion(*other_version));
+    }
     if (control.refused()) {
       return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
     }
@@ -204,6 +209,7 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
     Bytes payload = incoming->payload();
     Result<Messages> decoded = Guarded("decoding", [&] { return Decode<Messages>(incoming->header(), payload.size()); });
     if (!decoded.ok()) {
+      if (plane == Plane::kControl) other_version = OtherVersion(incoming->header());
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + decoded.status().message());
       continue;
     }
