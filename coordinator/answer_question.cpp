@@ -1,5 +1,6 @@
 #include "coordinator/answer_question.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <map>
@@ -8,7 +9,6 @@
 
 #include "common/planning/frame_plan.h"
 #include "common/planning/shown_zones.h"
-#include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/percentiles.h"
@@ -150,15 +150,28 @@ Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked
   return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
 
+// Adds the pieces of a box that the region may keep, halving it again and again: a volume may say that it has any number of voxels.
+void AddKept(const ClipRegion& region, const Box& box, Box& kept) {
+  constexpr std::int32_t kPiece = 64;
+  if (kept.Contains(box) || !region.MayKeep(box)) return;
+  const Index3 size = box.size();
+  const Axis longest = *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return size[axis]; });
+  if (size[longest] <= kPiece) {
+    kept = Hull(kept, box);
+    return;
+  }
+  Box low = box, high = box;
+  low.end[longest] = high.begin[longest] = (box.begin[longest] + size[longest] / 2 + kPiece - 1) / kPiece * kPiece;
+  AddKept(region, low, kept);
+  AddKept(region, high, kept);
+}
+
 Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
   const VolumeDescription& description = asked.summary->description;
   const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
   if (!region.ok()) return region.status();
-  constexpr std::int32_t kPiece = 64;
   Box needed;
-  for (const Box& piece : CutAtBlocks(description.geometry.bounds(), Uniform(kPiece))) {
-    if (region->MayKeep(piece)) needed = Hull(needed, piece);
-  }
+  AddKept(*region, description.geometry.bounds(), needed);
   if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce});
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
