@@ -15,6 +15,7 @@
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/base/url.h"
+#include "common/volume/memory_budget.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -155,6 +156,11 @@ class Level : public std::enable_shared_from_this<Level> {
       reading->BeginPart();
     }
     const std::uint64_t bytes = 2 * level_.array->shape().chunk_bytes();  // packed and decoded
+    // More than chunks may take together: one may be under way all the same, if there is memory for it.
+    constexpr std::uint64_t kLarge = std::uint64_t{128} << 20;
+    if (Status fits = bytes > kLarge ? CheckFitsMemory(std::int64_t(bytes), name_ + ": a chunk") : Status::Ok(); !fits.ok()) {
+      return End(chunk, TakeFlight(chunk), fits);
+    }
     try {
       context_->Admit(bytes, [self = shared_from_this(), chunk, bytes] { self->Begin(chunk, bytes); });
     } catch (const std::exception& error) {

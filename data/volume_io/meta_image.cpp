@@ -161,6 +161,9 @@ Status Write(const FileSamples& samples, const std::string& path) {
   header->Append(HeaderOf(samples, std::filesystem::path(data_path).filename().string()));
   // Store both files before either takes its place.
   if (Status status = header->Close(); !status.ok()) return status;
+  // The header of a volume that was there does not stand beside the voxels of this one, not even if the program ends in between.
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(path, ignored))) std::filesystem::remove(path, ignored);
   if (Status status = data->Finish(); !status.ok()) return status;
   return header->Finish();
 }
