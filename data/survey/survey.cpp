@@ -25,6 +25,12 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   for (const Axis axis : kAxes) {
     while (CountIn(block) * BytesPerSample(level.description.type) < kLeastBytes && block[axis] < bounds.end[axis]) block[axis] *= 2;
   }
+  // Of a block that is larger than the sample, a part is enough.
+  for (const auto bytes = [&] { return std::int64_t(CountIn(block) * BytesPerSample(level.description.type)); };
+       bytes() > std::max(most, 2 * kPieceBytes);) {
+    std::int32_t& longest = block[*std::ranges::max_element(kAxes, {}, [&](Axis axis) { return block[axis]; })];
+    longest = (longest + 1) / 2;
+  }
   // They are counted and not listed: a volume may say that it has any number of them.
   const Index3 counts = (bounds.end + block - Uniform(1)) / block;
   const std::size_t all = CountIn(counts);
