@@ -122,8 +122,9 @@ struct HttpTransfers::Impl {
     std::deque<Owned> waiting;
     std::map<CURL*, Owned> active;
     std::size_t open = 0;           // requests: these and those that pause
-    Time heard;                     // last time that an answer ended or enough had come; if none is open, nothing
+    Time heard;                     // last time that an answer ended or enough had come, later by what it was not asked since
     std::uint64_t heard_bytes = 0;  // from then on
+    Time left_alone;                // since when it is not asked, if nothing is active
     Time asked_again;               // not before, since it was silent
   };
 
@@ -182,7 +183,7 @@ struct HttpTransfers::Impl {
   void Open(const std::string& name) {
     Host& host = hosts[name];
     if (host.open++ > 0) return;
-    host.heard = MonotonicNow();
+    host.heard = host.left_alone = MonotonicNow();
     host.heard_bytes = 0;
   }
   void Close(const std::string& name) { --hosts.at(name).open; }
@@ -222,6 +223,7 @@ struct HttpTransfers::Impl {
     if (!idle.empty()) idle.pop_back();
     transfer.Prepare(easy, timing);
     transfer.heard_bytes = &host.heard_bytes;
+    if (host.active.empty()) host.heard += transfer.tried - host.left_alone;
     host.active.emplace(easy, std::move(owned));
     curl_multi_add_handle(multi, easy);
   }
@@ -241,6 +243,7 @@ struct HttpTransfers::Impl {
   // Ends a try. The handle still knows what came.
   Owned Take(Host& host, CURL* easy) {
     Owned owned = std::move(host.active.extract(easy).mapped());
+    if (host.active.empty()) host.left_alone = MonotonicNow();
     Count(owned->host, [&](WebTraffic& count) {
       ++count.requests;
       count.retries += owned->tries > 1 ? 1 : 0;
@@ -254,21 +257,21 @@ struct HttpTransfers::Impl {
 
   void LeaveSilentHosts(Time now) {
     constexpr Duration kStoodStill = seconds(5);  // a process that was stopped has heard nobody
-    const Duration since = now - std::exchange(looked, now), stood_still = since > kStoodStill ? since : Duration(0);
-    const std::uint64_t enough = kLeastBytes * std::uint64_t(std::chrono::ceil<seconds>(timing.patience).count());
+    const Duration since = now - std::exchange(looked, now);
+    const std::uint64_t enough = kLeastBytes * std::uint64_t(std::chrono::ceil<seconds>(timing.silence).count());
     for (auto& [name, host] : hosts) {
-      host.heard += stood_still;
+      if (since > kStoodStill) host.heard += since;
       if (host.heard_bytes >= enough) {
         host.heard = now;
         host.heard_bytes = 0;
       }
-      if (host.open > 0 && now > host.heard + timing.patience) Leave(name, host, now);
+      if (!host.active.empty() && now > host.heard + timing.silence) Leave(name, host, now);
     }
     std::erase_if(hosts, [&](const auto& each) { return each.second.open == 0 && now >= each.second.asked_again; });
   }
 
   void Leave(const std::string& name, Host& host, Time now) {
-    host.asked_again = now + timing.silence;
+    host.asked_again = now + timing.rest;
     std::vector<Owned> left;
     while (!host.active.empty()) {
       CURL* const easy = host.active.begin()->first;
@@ -288,7 +291,7 @@ struct HttpTransfers::Impl {
 
   void FailSilent(Owned owned) {
     const std::string why = fmt::format("no answer from {} within {} s, or less than {} bytes a second", owned->host,
-                                        std::chrono::ceil<seconds>(timing.patience).count(), kLeastBytes);
+                                        std::chrono::ceil<seconds>(timing.silence).count(), kLeastBytes);
     Fail(std::move(owned), StatusCode::kUnavailable, why);
   }
 

@@ -16,8 +16,8 @@
 // its own server is: at this machine, or in a private network (address_reach.h). So no server on the internet makes this process ask what
 // only this machine sees. The address counts, not the name.
 //
-// A host is silent if, for kPatience, no answer of it ends and it sends less than kLeastBytes a second in all, although it is asked. Then
-// all requests of it fail, those that wait, too, and so do others that come in the next kSilence.
+// A host is silent if, for kSilence, no answer of it ends and it sends less than kLeastBytes a second in all, although it is asked. Then
+// all requests of it fail, those that wait, too, and so do others that come in the next kRest.
 //
 // Certificates must be signed by an authority that the system knows, or that is in the file SSL_CERT_FILE of the environment.
 #pragma once
@@ -78,12 +78,14 @@ class HttpTransfers {
   // So long after its first try a request fails, unless at least so many bytes a second come.
   static constexpr Duration kPatience = std::chrono::seconds(60);
   static constexpr std::uint64_t kLeastBytes = 1024;
-  static constexpr Duration kSilence = std::chrono::seconds(10);
+  // Of a host. Two processes may try one after the other, a worker and the coordinator, and a minute is the promise for both.
+  static constexpr Duration kSilence = std::chrono::seconds(30), kRest = std::chrono::seconds(10);
   // Of an answer: headers and trailers, and what is no object, such as the page of an error.
   static constexpr std::uint64_t kMostOfHead = std::uint64_t{256} << 10, kMostOfPage = std::uint64_t{1} << 20;
 
   struct Timing {
-    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled, patience = kPatience, silence = kSilence;
+    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled, patience = kPatience, silence = kSilence,
+             rest = kRest;
     int tries = kTries;  // at least 1
   };
 

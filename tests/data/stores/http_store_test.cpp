@@ -317,8 +317,7 @@ TEST_F(HttpStoreTest, QueryAndHeadersGoToThisServerAlone) {
 
 // More requests than may be under way at a time: those that wait do not wait for a turn each.
 TEST_F(HttpStoreTest, ASilentServerIsLeftInTimeByAllWhoWait) {
-  HttpTransfers impatient(
-      {.first_pause = milliseconds(1), .stalled = seconds(20), .patience = seconds(1), .silence = std::chrono::hours(1)});
+  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .silence = seconds(1), .rest = std::chrono::hours(1)});
   std::promise<void> end;
   const std::shared_future<void> ended(end.get_future());
   const ScriptedServer server([&](const ServerRequest&) {
@@ -346,8 +345,16 @@ TEST_F(HttpStoreTest, ASilentServerIsLeftInTimeByAllWhoWait) {
   end.set_value();
 }
 
+TEST_F(HttpStoreTest, AServerThatSaysWhenToComeBackIsNotSilentUntilThen) {
+  HttpTransfers impatient({.first_pause = milliseconds(1), .silence = milliseconds(100)});
+  std::atomic<int> count = 0;
+  const ScriptedServer server(
+      [&](const ServerRequest&) { return ++count == 1 ? AnswerText("503 x", "", "Retry-After: 1\r\n") : AnswerText("200 OK", kTen); });
+  EXPECT_EQ(Read(**HttpStore(server.url(), impatient), "object").value(), kTen);
+}
+
 TEST_F(HttpStoreTest, AServerThatWasSilentIsAskedAgain) {
-  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .patience = seconds(1), .silence = milliseconds(0)});
+  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .silence = seconds(1), .rest = milliseconds(0)});
   std::promise<void> end;
   const std::shared_future<void> ended(end.get_future());
   std::atomic<int> count = 0;
