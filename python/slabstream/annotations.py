@@ -11,6 +11,7 @@ from typing import Any, Sequence
 import numpy
 
 from .errors import InvalidArgument, NotFound, Unavailable
+from .options import in_keywords
 from .programs import find_program
 from .runs import Floats
 
@@ -91,7 +92,7 @@ def draw(rgba: Floats, annotations: Annotations, panes: Sequence[Any], key: dict
     done = subprocess.run([program, "annotate"], input=json.dumps(order).encode() + b"\n" + pixels.tobytes(), capture_output=True)
     if done.returncode != 0:
         sentence = done.stderr.decode(errors="replace").strip().removeprefix("slabstream annotate: ")
-        raise (InvalidArgument if done.returncode == 2 else Unavailable)(sentence or "slabstream annotate failed")
+        raise (InvalidArgument if done.returncode == 2 else Unavailable)(in_keywords(sentence) or "slabstream annotate failed")
     if len(done.stdout) != pixels.nbytes:
         raise Unavailable(f"slabstream annotate gave {len(done.stdout)} bytes of {pixels.nbytes}")
     return numpy.frombuffer(done.stdout, numpy.float32).reshape(pixels.shape)

@@ -6,6 +6,10 @@ of Python's own that fits, so that `except ValueError` or `except TimeoutError` 
 from __future__ import annotations
 
 import concurrent.futures
+import sys
+import warnings
+
+from .options import in_keywords
 
 
 class SlabstreamError(Exception):
@@ -61,5 +65,5 @@ _BY_CODE: dict[int, type[SlabstreamError]] = {
 
 
 def error_of(code: int, message: str) -> SlabstreamError:
-    """The exception for a Status of the wire."""
-    return _BY_CODE.get(code, Internal)(message)
+    """The exception for a Status of the wire. The service's sentence names fields and options of the command line: here they are keywords."""
+    return _BY_CODE.get(code, Internal)(in_keywords(message))

@@ -75,14 +75,19 @@ COMMANDS = _load()
 _LAYER_HELP = {"labels": "Shows the dataset's labels as usual", "overlay": "Shows the dataset's overlay as usual"}
 
 
-def _in_keywords(text: str, command: str) -> str:
-    """Options of this command as one writes them here."""
+_BY_PATH = {option.path: option.name for options in COMMANDS.values() for option in options.values() if "." in option.path}
+
+
+def in_keywords(text: str, command: str | None = None) -> str:
+    """Options of this command, or of all, as one writes them here, in place of --options and of the fields of a request."""
+    commands = COMMANDS.values() if command is None else [COMMANDS[command]]
 
     def keyword(found: re.Match[str]) -> str:
         name = _keyword(found[1])
-        return name if name in COMMANDS[command] else found[0]
+        return name if any(name in known for known in commands) else found[0]
 
-    return re.sub(r"--([a-z]+(?:-[a-z]+)*)", keyword, text)
+    text = re.sub(r"--([a-z]+(?:-[a-z]+)*)(?![a-z-]*[/.])", keyword, text)
+    return re.sub(r"\b[a-z_]+(?:\.[a-z_]+)+\b", lambda found: _BY_PATH.get(found[0], found[0]), text)
 
 
 def _limits_of(option: Option) -> list[str]:
@@ -97,7 +102,7 @@ def _help_of(command: str, names: Iterable[str]) -> str:
         if option.group != group:
             group = option.group
             lines += ["", f"{group.partition(' (')[0]}:"]
-        head, *rest = _in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
+        head, *rest = in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
         limits = _limits_of(option)
         head += f" ({'; '.join(limits)})" if limits else ""
         lines.append(f"  {name}: {option.type if option.type and name not in _LAYER_HELP else 'bool'}")

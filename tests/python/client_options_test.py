@@ -22,6 +22,7 @@ from client_support import ROOT, WithAService
 import slabstream as ss  # noqa: E402
 from slabstream import drafts, schema  # noqa: E402
 from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
+from slabstream.errors import error_of  # noqa: E402
 from slabstream.options import COMMANDS  # noqa: E402
 from slabstream.volumes import check_spacing  # noqa: E402
 
@@ -303,6 +304,16 @@ class Drift(unittest.TestCase):
         words = " ".join(ss.render.__doc__.split())
         self.assertIn("Look at a side, instead of azimuth and elevation", words)
         self.assertIn("(default: 1; from 0.001 to 10000)", words)
+
+
+    def test_texts_of_the_service_say_keywords(self) -> None:
+        for text, expected in (
+            ("view.up needs view.eye; without an eye, view.roll_degrees turns the picture", "up needs eye; without an eye, roll turns the picture"),
+            ("--clip-box '1' is not X0:X1,Y0:Y1,Z0:Z1", "clip_box '1' is not X0:X1,Y0:Y1,Z0:Z1"),
+            ("clipping.clip_planes[0].normal is 0,0,0", "clip_plane[0].normal is 0,0,0"),
+            ("--labels needs --local; see --keys, a.nrrd and docs/x.md", "labels needs --local; see --keys, a.nrrd and docs/x.md"),
+        ):
+            self.assertEqual(str(error_of(1, text)), expected)
 
 
 class Requests(unittest.TestCase):
