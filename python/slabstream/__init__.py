@@ -20,6 +20,7 @@ from .errors import (
     NotFound,
     ResourceExhausted,
     SlabstreamError,
+    SlabstreamWarning,
     Unavailable,
     UnknownOption,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "Service",
     "SlabstreamError",
     "Source",
+    "SlabstreamWarning",
     "Statistics",
     "Status",
     "TransferFunction",

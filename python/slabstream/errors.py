@@ -16,6 +16,18 @@ class SlabstreamError(Exception):
     """Any failure of this package. Its text is one line."""
 
 
+class SlabstreamWarning(UserWarning):
+    """What a picture does not show as one may expect. Its text is one line."""
+
+
+def warn(text: str) -> None:
+    """A SlabstreamWarning at the line of the caller's that led here."""
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == __package__:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, SlabstreamWarning, stacklevel=level)
+
+
 class InvalidArgument(SlabstreamError, ValueError):
     """A value, name or combination that is not allowed. The text names it, and the limit."""
 

@@ -16,7 +16,7 @@ from .local import lock, running
 from .options import takes_options_of
 from .service import Service
 from .viewer import Viewer
-from .volumes import Grid, check_spacing, on_grid, volume_of, write_nrrd
+from .volumes import Grid, check_spacing, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
 
 _TAKE_AWAY_SECONDS = 5.0
@@ -92,8 +92,8 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
 
-    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
-    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
+    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax, xarray.DataArray, an
+    image of nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.
@@ -135,7 +135,10 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
             text = written(checked)
         for what, layer in (("labels", labels), ("overlay", overlay)):
             if layer is not None:
-                path = path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
+                if _is_path(layer):
+                    path = path_text(layer, what)
+                else:
+                    path = written(on_grid(labels_of(layer) if what == "labels" else volume_of(layer), grid))
                 text += f",{what}={path}"
         where.add_data(f"{name}={text}")
     except BaseException:

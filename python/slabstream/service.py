@@ -23,7 +23,7 @@ from .status import Dataset, Status, dataset_of, status_of
 from .uploads import upload_of
 from .values import integer, number, point
 from .viewer import Viewer
-from .volumes import on_grid, volume_of
+from .volumes import layers_of, on_grid, volume_of
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
@@ -173,7 +173,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
         until remove_data(), or until the coordinator ends. Arrays as load() takes them, layers on the same grid; dask and zarr arrays are sent
         chunk by chunk. Needs the role admin where the service has keys."""
         checked = volume_of(volume, spacing, origin, direction, world)
-        layers = [None if layer is None else on_grid(volume_of(layer), checked.grid) for layer in (labels, overlay)]
+        layers = [None if layer is None else on_grid(layer, checked.grid) for layer in layers_of(labels, overlay)]
         order, parts = upload_of(name, checked, *layers)
         reply = self._connection.upload(order, parts)
         return next(dataset_of(dataset) for dataset in reply.datasets if dataset.name == name)
