@@ -24,6 +24,7 @@ class Draft:
 
     frame: Any = dataclasses.field(default_factory=schema.FrameRequest)
     format: PictureFormat = PictureFormat()
+    colors: transfer.Colors | None = None  # that take the place of those of the preset, once the dataset's values are known
     # Of slices.
     plane: str = ""
     at: values.Vector | None = None
@@ -141,7 +142,7 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     holder = functools.reduce(getattr, outer, draft.frame)
     field = holder.DESCRIPTOR.fields_by_name[name]
     if name == "preset":
-        transfer.choose(option.name, value, holder)
+        _transfer(draft, option, value, holder)
     elif field.message_type is None:
         setattr(holder, name, _scalar(field, option, value))
     elif field.message_type.name == "Vec3" and field.label != FieldDescriptor.LABEL_REPEATED:
@@ -149,6 +150,21 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     else:
         put = _lights if field.message_type.name == "Vec3" else _MESSAGES[field.message_type.name]
         put(getattr(holder, name), option.name, value)
+
+
+_PRESET_OF_MAPS = "viridis"  # it spans values and has opacities as all colour maps do
+
+
+def _transfer(draft: Draft, option: Option, value: Any, choice: Any) -> None:
+    colors = transfer.color_map(value)
+    if colors is None:
+        transfer.choose(option.name, value, choice)
+    elif option.path.startswith("transfer."):
+        draft.colors, choice.preset = colors, _PRESET_OF_MAPS
+    else:  # an overlay's: its values are not known here, so it is stretched over all of them
+        choice.function.CopyFrom(transfer.mapped(colors, 0, 1, transfer.TransferFunction(opacities=[(0, 0), (1, 1)]).message().opacities))
+        if not choice.HasField("scalar_range"):
+            choice.scalar_range.min, choice.scalar_range.max, choice.scalar_range.percentiles = 0, 100, True
 
 
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
@@ -366,6 +382,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         draft.format = dataclasses.replace(planes.format, annotations=annotations)
         frame = draft.frame
         frame.MergeFrom(planes.frame)
+        draft.colors = planes.colors
         frame.renderer = _renderer_with("labels", "overlay") if layers else _renderer_with("projection-mode")
         if layers:
             frame.shading.model = schema.SHADING_MODEL_NONE

@@ -31,6 +31,7 @@ _QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
+from .transfer import TransferFunction, mapped
 
 def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
     """Frame i is turned by i / frames of all turns, from the azimuth of `draft` on."""
@@ -73,7 +74,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
         service. `deadline` is in seconds, up to a day.
         """
         draft = draft_of(dataset, options)
-        self._add_keys([draft])
+        self._settle([draft])
         draft.frame.previews = previews or on_preview is not None
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
@@ -90,7 +91,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
             raise InvalidArgument(
                 "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
             )
-        self._add_keys([draft])
+        self._settle([draft])
         return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
 
     @property
@@ -110,7 +111,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """Planes or thick slabs of a volume; several are put side by side."""
         drafts = slice_drafts_of(dataset, options)
-        self._add_keys(drafts)
+        self._settle(drafts)
         return side_by_side(list(self._pipelined(iter(drafts), 3, deadline)))
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
@@ -135,7 +136,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def pick(self, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
         """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
         shows nothing there. docs/rendering.md says which point of the ray that is."""
-        frame = draft_of(dataset, options).frame
+        draft = draft_of(dataset, options)
+        self._settle([draft])
+        frame = draft.frame
         query = schema.PickQuery(frame=frame, x=number("x", x, 0, frame.size.width), y=number("y", y, 0, frame.size.height))
         reply = self._connection.ask("pick_query", query, timeout)
         return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
@@ -145,7 +148,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         """Says that the picture with these options may be asked for soon. For a second, the service fetches what it shows from the dataset's web
         server, a few blocks at a time, and keeps it on disk (`--cache`). False: the dataset lies behind no web server, or the service
         keeps nothing on disk."""
-        query = schema.PrefetchQuery(frame=draft_of(dataset, options).frame)
+        draft = draft_of(dataset, options)
+        self._settle([draft])
+        query = schema.PrefetchQuery(frame=draft.frame)
         return bool(self._connection.ask("prefetch_query", query, timeout).fetches)
 
     def status(self, timeout: float = ANSWER_SECONDS) -> Status:
@@ -199,19 +204,30 @@ class Service(contextlib.AbstractContextManager["Service"]):
         transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
         return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout)
 
-    def _add_keys(self, drafts: list[Draft]) -> None:
-        """What colour bar and legend say, to pictures of one dataset that have them."""
+    def _settle(self, drafts: list[Draft]) -> None:
+        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans, and what colour bar and legend say."""
         draft = drafts[0]
-        if not draft.format.annotations.need_key():
-            return
+        if draft.colors is not None:
+            preset = self._transfer_of(draft).transfer
+            ends = preset.colors[0].value, preset.colors[-1].value
+            # Where nothing lies behind, colours are as they are (ResolveLook in the service).
+            opacities = TransferFunction(opacities=[(ends[0], 1)]).message().opacities if draft.frame.clipping.HasField("slab") else preset.opacities
+            for each in drafts:
+                each.frame.transfer.function.CopyFrom(mapped(draft.colors, *ends, opacities))
+                each.frame.transfer.ClearField("scalar_range")
+        if draft.format.annotations.need_key():
+            key = key_of(draft.frame, self._transfer_of(draft))
+            for each in drafts:
+                each.format = dataclasses.replace(each.format, key=key)
+
+    def _transfer_of(self, draft: Draft) -> Any:
+        """The dataset's summary under the transfer function of the draft."""
         query = schema.SummaryQuery(dataset=draft.frame.dataset, transfer=draft.frame.transfer)
         if query.transfer.WhichOneof("choice") is None:
             query.transfer.preset = "auto"
         if not query.transfer.HasField("opacity_distance"):
             query.transfer.opacity_distance = 1
-        key = key_of(draft.frame, self._connection.ask("summary_query", query, _QUESTION_SECONDS))
-        for each in drafts:
-            each.format = dataclasses.replace(each.format, key=key)
+        return self._connection.ask("summary_query", query, _QUESTION_SECONDS)
 
     def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
         if len(items) > _MOST_ITEMS:

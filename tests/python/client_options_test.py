@@ -369,6 +369,7 @@ class Requests(unittest.TestCase):
             ({"background": "#12345"}, "background '#12345' is neither #rrggbb nor #rrggbbaa"),
             ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
             ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
+            ({"transfer": 3}, "transfer 3 is neither the name of a preset nor a colour map of ParaView or matplotlib"),
             ({"transfer": {"Points": []}}, "transfer: not a colour map: RGBPoints is missing"),
             ({"transfer": {"Regions": [{"Values": [0, 1], "Color": [1, 1, 1]}]}}, "transfer: Regions[0] must have either Corners or Values and Slopes"),
             ({"transfer": {"Regions": [{"Corners": [0, 1], "Color": [1, 1, 1]}]}},

@@ -81,6 +81,21 @@ class AtAService(WithAService):
         with self.assertRaisesRegex(ss.InvalidArgument, "at '1,2' is not X,Y,Z"):
             self.service.value("head", at="1,2")
 
+    def test_colour_maps_of_matplotlib_look_like_presets(self) -> None:
+        try:
+            import matplotlib
+        except ImportError:
+            self.skipTest("install python3-matplotlib")
+        preset = np.asarray(self.service.render("head", transfer="viridis", size=40, background="black")).astype(int)
+        same = np.asarray(self.service.render("head", transfer=matplotlib.colormaps["viridis"], size=40, background="black"))
+        self.assertLessEqual(np.abs(preset - same).max(), 3, "our table of it has fewer colours")
+        other = np.asarray(self.service.render("head", transfer="RdBu", size=40, background="black"))
+        self.assertGreater(np.abs(preset - other).max(), 30)
+        np.testing.assert_array_equal(np.asarray(self.service.slice("head", transfer=matplotlib.colormaps["viridis"], plane="z", size=20))[..., 3],
+                                      np.asarray(self.service.slice("head", transfer="viridis", plane="z", size=20))[..., 3])
+        with self.assertRaisesRegex(ss.SlabstreamError, "nonesuch"):
+            self.service.render("head", transfer="nonesuch")
+
     def test_a_pixel_shows_the_point_that_its_depth_says(self) -> None:
         options = dict(renderer="zbuffer", size=(50, 40), azimuth=40, elevation=25, zoom=1.3)
         image = self.service.render("head", **options)
