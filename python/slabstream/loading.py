@@ -9,13 +9,14 @@ import tempfile
 import weakref
 from typing import Any, Callable, Iterator
 
+from .drafts import draft_of
 from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
 from .frame import Frame
 from .image import Image
 from .local import lock, running
 from .options import takes_options_of
 from .service import Service
-from .viewer import Viewer
+from .viewer import VIEWER_OPTIONS, Viewer
 from .volumes import Grid, check_spacing, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
 
@@ -148,6 +149,11 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
     return Volume(where, name, shows, files)
 
 
+def _check(options: dict[str, Any], others: tuple[str, ...]) -> None:
+    """A wrong option is refused before a service is started, or anything is written for it. `others`: that are none of pictures."""
+    draft_of("volume", {name: value for name, value in options.items() if name not in others})
+
+
 _numbers = itertools.count(1)  # of volumes, for their names
 
 
@@ -156,6 +162,7 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
            overlay: Any = None, service: Service | None = None, **options: Any) -> Image:
     """A picture of an array or a file: load() and render() in one. For several pictures of one array, load() it once. Files stay loaded, and
     are read again when they change."""
+    _check(options, ("deadline",))
     given: dict[str, Any] = {"spacing": spacing, "origin": origin, "direction": direction, "world": world, "labels": labels,
                              "overlay": overlay, "service": service}
     if service is None and all(layer is None or _is_path(layer) for layer in (volume, labels, overlay)):
@@ -174,5 +181,6 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
 def show(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
          overlay: Any = None, service: Service | None = None, **options: Any) -> Viewer:
     """The viewer of an array or a file, for a notebook: load() and show() in one. The volume stays as long as the viewer."""
+    _check(options, VIEWER_OPTIONS)
     return load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay,
                 service=service).show(**options)

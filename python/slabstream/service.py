@@ -99,13 +99,15 @@ class Service(contextlib.AbstractContextManager["Service"]):
         return self._connection.address
 
     @takes_options_of("render")
-    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None, keep: Any = None,
-             **options: Any) -> Viewer:
+    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None,
+             behind_proxy: str | None = None, keep: Any = None, **options: Any) -> Viewer:
         """The viewer of a dataset, for a notebook: the value of a cell. It starts a gateway on this machine, which ends with this process. Where
         the browser does not reach it (JupyterHub), or there is none, a picture with these options is shown; `embed=False` asks for it,
-        `embed=True` for the viewer. `keep` stays as long as the viewer."""
+        `embed=True` for the viewer. Where a page cannot be framed (Visual Studio Code), its address stands below the picture.
+        `behind_proxy`: the address of a proxy through which the browser reaches this machine, with {port} for the gateway's port. `keep`
+        stays as long as the viewer."""
         draft_of(dataset, options)  # a wrong one is refused here
-        return Viewer(self, dataset, keep, width, height, embed, options)
+        return Viewer(self, dataset, keep, width, height, embed, behind_proxy, options)
 
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:

@@ -469,6 +469,15 @@ class OwnService(InAFolder):
         found = ss.render(f"{self.folder}/a.raw?dims=28,24,20,type=uint8", spacing=(2, 1.5, 1.25), size=30)
         np.testing.assert_array_equal(np.asarray(found), np.asarray(ss.render(values, spacing=(2, 1.5, 1.25), size=30)))
 
+    def test_a_wrong_option_is_told_before_anything_is_started(self) -> None:
+        ss.shutdown()
+        with unittest.mock.patch("slabstream.loading.running", side_effect=AssertionError("it is started")):
+            for call in (ss.render, ss.show):
+                with self.assertRaisesRegex(ss.UnknownOption, "there is no option 'azimut'; is 'azimuth' meant"):
+                    call(volume_arrays()[0], azimut=3)
+                with self.assertRaisesRegex(ss.InvalidArgument, "zoom 0 is out of range"):
+                    call("none.nrrd", zoom=0)
+
     def test_what_is_wrong_is_told(self) -> None:
         with self.assertRaisesRegex(ss.NotFound, "volume '.*none.nrrd' does not exist"):
             ss.render(self.folder / "none.nrrd")
