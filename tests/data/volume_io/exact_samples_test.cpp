@@ -110,6 +110,7 @@ TEST(ExactSamples, AreRoundedOnlyWhereTheVolumeDoesNotHoldThem) {
   EXPECT_FALSE(rounded({0, 1 << 24}));
   EXPECT_TRUE(rounded({0, (1 << 24) + 1}));
   EXPECT_FALSE(rounded({1 << 30, (1 << 30) + 65535})) << "uint16 with an offset";
+  EXPECT_TRUE(rounded({(std::uint64_t{1} << 53) + 1, (std::uint64_t{1} << 53) + 1})) << "the offset itself is rounded";
   EXPECT_TRUE(rounded({std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 1})) << "an offset that double does not add to";
 }
 
