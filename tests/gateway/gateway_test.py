@@ -378,6 +378,12 @@ class HttpTest(WithService):
             self.assertEqual(self.gateway.request(path, token=False, headers={"Authorization": "Bearer wrong"})[0], 401)
         for path in ("/", "/assets/page.js", "/livez", "/readyz", "/api/v1/openapi.json"):
             status, headers, _ = self.gateway.request(path, token=False)
+    def test_an_option_is_given_once(self):
+        for target, body in (("/api/v1/command?dataset=a&size=20&size=30", None), ("/api/v1/command", '{"dataset": "a", "size": 20, "size": 30}'),
+                             ("/api/v1/command?size=20", '{"dataset": "a", "size": 30}'), ("/api/v1/pick?dataset=a&x=1&x=2&y=3", None)):
+            status, answer = self.gateway.json(target, **({} if body is None else {"method": "POST", "body": body}))
+            self.assertEqual(status, 400, (target, body, answer))
+
             self.assertEqual(status, 200, path)
             self.assertNotIn("unsafe", headers["Content-Security-Policy"])
             self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
@@ -446,6 +452,8 @@ class HttpTest(WithService):
         for _ in range(100):
             altered = bytearray(whole_request)
             for _ in range(chance.randrange(1, 6)):
+        for twice in (f"Host: {own}\r\nHost: evil.example", f"Host: {own}\r\nHost: {own}", f"Host: {own}\r\nOrigin: http://{own}\r\nOrigin: http://evil.example"):
+            self.assertIn(b" 400 ", self.gateway.raw(f"GET /livez HTTP/1.1\r\n{twice}\r\nConnection: close\r\n\r\n".encode()), twice)
                 altered[chance.randrange(len(altered))] = chance.randrange(256)
             with self.gateway.connect() as connection:
                 connection.sendall(altered)

@@ -133,6 +133,13 @@ TEST(PictureFieldsTest, JsonHasNumbersBooleansAndLists) {
     EXPECT_FALSE(FieldsOfJson(Json::parse(wrong)).ok()) << wrong;
 }
 
+TEST(PictureFieldsTest, AFieldOfJsonIsGivenOnce) {
+  for (const char* text : {R"({"size": 30, "azimuth": 1, "size": 40})", R"({"transfer": {"RGBPoints": [], "RGBPoints": []}})"}) {
+    EXPECT_THAT(ParseJson(text).status().message(), HasSubstr("' is given twice")) << text;
+  }
+  EXPECT_TRUE(ParseJson(R"({"a": {"x": 1}, "b": {"x": 1}, "c": [{"x": 1}, {"x": 2}]})").ok());
+}
+
 TEST(PictureFieldsTest, SlicesHaveAFrameForEachPlane) {
   const auto slice = ParseSliceFields({{"dataset", "head"}, {"plane", "anatomical"}, {"size", "64x32"}, {"window", "80"}});
   ASSERT_TRUE(slice.ok()) << slice.status().message();
