@@ -16,6 +16,7 @@
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
 #include "common/view/named_view.h"
+#include "common/view/world_limits.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -157,7 +158,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
       "Number of the slice, counted from 0, instead of a point")
       ->type_name("K")
       ->excludes(at);
-  AddNumber(app, "--thickness", slice.thickness, {0, kMaxWorldCoordinate},
+  AddNumber(app, "--thickness", slice.thickness, {0, kMaxCoordinate},
             "Show the largest values of a slab of this thickness, in the unit of the world (mm of a patient); 0: the values in the plane");
 
   app.option_defaults()->group("Look");

@@ -14,6 +14,7 @@
 #include "common/planning/picture_extent.h"
 #include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/view/world_limits.h"
 #include "common/volume/grid_map.h"
 #include "common/volume/light_volume.h"
 
@@ -137,7 +138,7 @@ void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& l
   const GridMap map = MapBetween(finest, level);
   for (const Axis axis : kAxes) {
     for (double* const bound : {&box.low[axis], &box.high[axis]}) {
-      if (std::abs(*bound) == kMaxWorldCoordinate) continue;
+      if (std::abs(*bound) == kMaxCoordinate) continue;
       const double voxels = box.unit == ClipUnit::kPercent ? *bound / 100 * finest.size[axis] : *bound;
       *bound = map.To(voxels - 0.5, axis) + 0.5;
     }

@@ -109,6 +109,15 @@ Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]};
 // multiple of the view direction, to which right is perpendicular).
 double ScaleOf(const Camera& camera) { return Dot(Linear(camera.x_row) / camera.spacing, camera.right); }
 
+// Points of the world may be anywhere, but renderers compute in single precision. From farther away nothing would be seen.
+Status CheckNear(const char* field, const char* what, const Vec3& away, const VolumeGeometry& geometry) {
+  constexpr double kMostRadii = 1e9;
+  const double farthest = kMostRadii * BoundingRadius(geometry), distance = std::hypot(away.x, away.y, away.z);
+  if (distance <= farthest) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is {:.6g} from {}, but must be at most {:.6g}, {:g} times half the volume's diagonal",
+                                             field, distance, what, farthest, kMostRadii));
+}
+
 }  // namespace
 
 ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
@@ -132,6 +141,12 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
         "right, top and bottom are possible");
   }
   const Look look = LookOf(view, geometry);
+  const Vec3 centre = geometry.ToWorld(geometry.centre());
+  Status near = CheckNear("view.look_at", "the volume's centre", look.target, geometry);
+  if (near.ok() && view.eye)
+    near = CheckNear("view.eye", "the point that it looks at", view.look_at.value_or(centre) - *view.eye, geometry);
+  if (near.ok()) near = CheckNear("view.distance: the eye", "the point that it looks at", {view.distance, 0, 0}, geometry);
+  if (!near.ok()) return near;
   const Vec3& forward = look.frame.forward;
   if (!std::isfinite(Length(forward))) return Status::InvalidArgument("view.eye is at the point that it looks at");
   const Vec3 up = view.up ? geometry.orientation.FromWorld(Normalized(*view.up)) : Vec3{};

@@ -34,7 +34,6 @@ constexpr std::string_view NameOf(Projection projection) { return projection == 
 
 inline constexpr double kMaxVoxelsPerPixel = 2;
 inline constexpr double kMaxZoom = 1e4;
-inline constexpr double kMaxWorldCoordinate = 1e9;                      // of points and distances, either sign
 inline constexpr int kMaxImageSide = 16384;                             // pixels
 inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 26;  // 8192 x 8192: about 2.5 GB of working memory a worker
 inline constexpr int kMaxSupersample = 1024;

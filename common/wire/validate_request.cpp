@@ -139,7 +139,8 @@ Status CheckSchema(const char* path, const T& value) {
 // The squared length must be usable, too: it normalises the direction.
 Status CheckDirection(const std::string& field, const Vec3& v) {
   if (std::isnormal(Dot(v, v))) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is {},{},{}, but must be a direction other than 0,0,0", field, v.x, v.y, v.z));
+  return Status::InvalidArgument(
+      fmt::format("{} is {},{},{}, but must be a direction other than 0,0,0, with a length in [1e-150, 1e150]", field, v.x, v.y, v.z));
 }
 
 Status CheckRules(const ViewParameters& view) {

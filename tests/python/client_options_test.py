@@ -370,6 +370,7 @@ class Requests(unittest.TestCase):
             ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
             ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
             ({"transfer": 3}, "transfer 3 is neither the name of a preset nor a colour map of ParaView or matplotlib"),
+            ({"look_at": (1e301, 0, 0)}, "look_at 1e+301 is out of range [-1e+300, 1e+300]"),
             ({"transfer": {"Points": []}}, "transfer: not a colour map: RGBPoints is missing"),
             ({"transfer": {"Regions": [{"Values": [0, 1], "Color": [1, 1, 1]}]}}, "transfer: Regions[0] must have either Corners or Values and Slopes"),
             ({"transfer": {"Regions": [{"Corners": [0, 1], "Color": [1, 1, 1]}]}},

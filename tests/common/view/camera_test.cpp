@@ -1,5 +1,6 @@
 #include "common/view/camera.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,6 +15,8 @@
 
 namespace slabstream {
 namespace {
+
+using testing::HasSubstr;
 
 const VolumeGeometry kGeometry = {{40, 31, 17}, {1, 0.5, 2}};
 
@@ -368,6 +371,21 @@ TEST(Camera, FitsABall) {
   EXPECT_EQ(seen, 40);
 }
 
+TEST(Camera, PointsOfALargeWorldAreLikeThoseOfASmallOne) {
+  for (const double scale : {1e-20, 1e22, 1e120}) {
+    const VolumeGeometry scaled = {kGeometry.size, scale * kGeometry.spacing};
+    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+      const ViewParameters view{.projection = projection, .look_at = Vec3{3, 4, 5}, .eye = Vec3{100, -200, 300}};
+      ViewParameters large = view;
+      large.look_at = scale * *view.look_at;
+      large.eye = scale * *view.eye;
+      ASSERT_TRUE(Validate(large).ok() && CheckView(large, scaled).ok()) << CheckView(large, scaled).message();
+      const Camera expected = MakeCamera(view, {64, 48}, kGeometry), found = MakeCamera(large, {64, 48}, scaled);
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(found.eye[int(i)], expected.eye[int(i)], 1e-9);
+    }
+  }
+}
+
 TEST(Camera, SaysWhichViewsCannotBeHad) {
   const auto refusal = [](const ViewParameters& view) {
     Status status = Validate(view);
@@ -382,7 +400,10 @@ TEST(Camera, SaysWhichViewsCannotBeHad) {
   EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .eye = Vec3{1, 2, 3}}), "view.eye is at the point that it looks at");
   EXPECT_EQ(refusal({.look_at = Vec3{0, 0, 0}, .eye = Vec3{0, 0, 90}, .up = Vec3{0, 0, -2}}), "view.up points along the direction of view");
   EXPECT_EQ(refusal({.look_at = Vec3{1, std::numeric_limits<double>::quiet_NaN(), 3}}),
-            "view.look_at.y is nan, but must lie in [-1000000000, 1000000000]");
+            "view.look_at.y is nan, but must lie in [-1e+300, 1e+300]");
+  EXPECT_THAT(refusal({.look_at = Vec3{1e300, 0, 0}}), HasSubstr("view.look_at is 1e+300 from the volume's centre, but must be at most"));
+  EXPECT_THAT(refusal({.eye = Vec3{0, 0, 1e13}}), HasSubstr("view.eye is 1e+13 from the point that it looks at, but must be at most"));
+  EXPECT_THAT(refusal({.projection = Projection::kPerspective, .distance = 1e200}), HasSubstr("view.distance: the eye is 1e+200 from"));
   EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .fit = true}), "view.fit and view.look_at cannot both be given");
   // The volume is 15.5 deep along y, so its middle must be more than 7.75 away.
   EXPECT_EQ(

@@ -1,4 +1,5 @@
 #include "tests/common/wire/samples.h"
+#include "common/view/world_limits.h"
 #include "tests/common/view/view_limits.h"
 #include "tests/support/renderers.h"
 
@@ -342,8 +343,8 @@ std::vector<SubmitFrame> SamplesOf() {
   full.parameters = {{"projection-mode", "minimum"}};
   full.size = {kMaxImageSide, 1};
   full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
-  full.clipping = {.box = ClipBox{{-kMaxWorldCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
-                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxWorldCoordinate},
+  full.clipping = {.box = ClipBox{{-kMaxCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
+                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxCoordinate},
                    .planes = std::vector<ClipPlane>(kMaxClipPlanes, {{0, -1, 1e9}, -1e18}),
                    .mode = ClipMode::kCutAway};
   full.transfer = {Curve(), 1e-6, ScalarRange{-1e300, 1e-300}};
