@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/report/value_text.h"
 #include "common/base/printable.h"
 #include "common/volume/exact_value.h"
 
@@ -34,10 +35,10 @@ Json ValueJson(const VolumeSample& sample) {
   return OrNull(sample.value);
 }
 
-std::string ValueText(const VolumeSample& sample) {
+std::string TextOfValue(const VolumeSample& sample) {
   if (!sample.value) return "value not finite";
   if (const std::optional<Int128> whole = WholeValue(sample)) return fmt::format("value {}", *whole);
-  return fmt::format("value {:g}", *sample.value);
+  return "value " + ValueText(*sample.value);
 }
 
 }  // namespace
@@ -104,13 +105,13 @@ Json PickJson(const PickReply& picked) {
 }
 
 std::string SampleText(const VolumeSample& sample) {
-  std::string text = fmt::format("{:g} {:g} {:g}", sample.at.x, sample.at.y, sample.at.z);
+  std::string text = fmt::format("{} {} {}", ValueText(sample.at.x), ValueText(sample.at.y), ValueText(sample.at.z));
   if (!sample.inside) return text + "  outside the volume";
   text += fmt::format("  voxel {} {} {}", sample.voxel.x, sample.voxel.y, sample.voxel.z);
-  text += "  " + ValueText(sample);
+  text += "  " + TextOfValue(sample);
   if (sample.label)
     text += fmt::format("  label {}{}{}", sample.label->value, sample.label->name.empty() ? "" : " ", Printable(sample.label->name));
-  if (sample.overlay) text += fmt::format("  overlay {:g}", *sample.overlay);
+  if (sample.overlay) text += "  overlay " + ValueText(*sample.overlay);
   return text;
 }
 

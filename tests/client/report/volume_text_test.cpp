@@ -13,6 +13,7 @@ namespace slabstream {
 namespace {
 
 using testing::EndsWith;
+using testing::StartsWith;
 
 TEST(VolumeText, TellsWholeNumbersToTheLastDigit) {
   const auto texts = [](double value, std::int64_t rest = 0) {
@@ -32,6 +33,16 @@ TEST(VolumeText, TellsWholeNumbersToTheLastDigit) {
   EXPECT_EQ(texts(0.25).second, "0.25");
   EXPECT_EQ(texts(1e300).second, "1e+300");
   EXPECT_THAT(SampleText({.inside = true}), EndsWith("  value not finite"));
+}
+
+TEST(VolumeText, TellsEveryDigitOfAValueAndOfAPoint) {
+  const auto told = [](double value) { return SampleText({.at = {2000000003, 3e22, -0.5}, .inside = true, .value = value}); };
+  EXPECT_THAT(told(double(0.1F)), EndsWith("  value 0.1"));
+  EXPECT_THAT(told(double(1234.5678F)), EndsWith("  value 1234.5677"));
+  EXPECT_THAT(told(double(1e-30F)), EndsWith("  value 1e-30"));
+  EXPECT_THAT(told(0.1), EndsWith("  value 0.1"));
+  EXPECT_THAT(told(1.0 / 3), EndsWith("  value 0.3333333333333333"));
+  EXPECT_THAT(told(1), StartsWith("2000000003 3e+22 -0.5  voxel"));
 }
 
 }  // namespace
