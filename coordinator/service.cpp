@@ -78,7 +78,7 @@ struct CoordinatorService::Impl {
   void ReceiveFromClients();
   void ReceiveFromWorkers();
   // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
-  std::optional<Role> RoleOf(const Incoming& incoming) const { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
+  std::optional<Role> RoleOf(const Incoming& incoming) { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
   bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
   // The same to each of them. Who cannot be told is Gone.
   template <class Gone>

@@ -343,7 +343,7 @@ void DeclareStatus(const CommandLine& line) {
 }
 
 void DeclareKeys(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("keys", "List, change and revoke the keys that a service admits; for admins");
+  CLI::App* sub = line.app.add_subcommand("keys", "List, issue, change and revoke the keys that a service admits; for admins");
   sub->require_subcommand(1);
   const auto declare = [&](const char* name, const char* purpose, KeysAction action) {
     CLI::App* order = sub->add_subcommand(name, purpose);
@@ -353,14 +353,26 @@ void DeclareKeys(const CommandLine& line) {
     RunWith(*order, line.run, options, RunKeys);
     return std::pair(order, options);
   };
-  declare("list", "List the public keys, their roles and when they were made", KeysAction::kList);
+  declare("list", "List the keys: id, role, when they were made, public key, name, and when each was heard last", KeysAction::kList);
+  const auto [issue, issue_options] = declare("issue", "Make a key for one person, and write a service file with it", KeysAction::kIssue);
+  issue->add_option("--name", issue_options->order.name, "Whose key it is; `status`, `keys list` and `keys revoke` know it by this name")
+      ->required()
+      ->type_name("NAME");
+  AddChoice<Role, 2>(*issue, "--role", issue_options->order.role, {NameOf(Role::kClient), NameOf(Role::kAdmin)},
+                     {Role::kClient, Role::kAdmin}, "What its holder may do: client or admin")
+      ->default_str("client");
+  issue->add_option("-o,--output", issue_options->output, "The service file, which must not exist yet")
+      ->type_name("FILE")
+      ->default_str("NAME.json");
   const auto [rotate, rotate_options] =
       declare("rotate", "Put a new key into the service file of a role; old keys stay valid until they are revoked", KeysAction::kRotate);
   AddChoice<Role, kRoles.size()>(*rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
                                  kRoles, "client, worker or admin")
       ->required();
   const auto [revoke, revoke_options] = declare("revoke", "Revoke a key and end its connections", KeysAction::kRevoke);
-  revoke->add_option("KEY", revoke_options->order.key, "The id of a key, or the public key itself, as `slabstream keys list` shows them")
+  revoke
+      ->add_option("KEY", revoke_options->order.key,
+                   "The name or the id of a key, or the public key itself, as `slabstream keys list` shows them")
       ->required();
 }
 

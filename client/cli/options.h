@@ -160,6 +160,7 @@ struct StatusOptions {
 struct KeysOptions {
   ServiceChoice service;
   KeysOrder order;
+  std::string output;  // of kIssue: the service file; empty: NAME.json
 };
 
 struct DataOptions {

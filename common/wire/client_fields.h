@@ -246,9 +246,11 @@ v1::KeysOrder ProtoOf(const KeysOrder&);
 void Fields(auto& io, Is<KeysOrder> auto& m) {
   using P = v1::KeysOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
-  io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kRevoke);
-  if (m.action == KeysAction::kRotate) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kIssue);
+  const bool of_role = m.action == KeysAction::kRotate || m.action == KeysAction::kIssue;
+  if (of_role) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Bytes("key", m.key, &P::key, &P::mutable_key, 0, kMaxKeyBytes);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxKeyBytes);
 }
 
 void Fields(auto& io, Is<AdmittedKey> auto& m) {
@@ -256,6 +258,8 @@ void Fields(auto& io, Is<AdmittedKey> auto& m) {
   io.Bytes("key", m.public_key, &P::key, &P::mutable_key, kKeyTextBytes, kKeyTextBytes);
   io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Text("made", m.made, &P::made, &P::mutable_made, 0, kMaxKeyBytes);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxKeyBytes);
+  io.Optional("silent_ms", m.silent_ms, &P::has_silent_ms, &P::silent_ms, &P::set_silent_ms);
 }
 
 v1::KeysReply ProtoOf(const KeysReply&);

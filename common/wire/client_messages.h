@@ -213,13 +213,14 @@ struct ShutDownReply {
   friend bool operator==(const ShutDownReply&, const ShutDownReply&) = default;
 };
 
-enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3 };
+enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3, kIssue = 4 };
 
 struct KeysOrder {
   std::uint64_t nonce = 0;
   KeysAction action = KeysAction::kList;
-  Role role = Role::kClient;  // kRotate: whose file gets a new key; does not travel with other actions
-  std::string key;            // kRevoke: a public one
+  Role role = Role::kClient;  // kRotate: whose file gets a new key; kIssue: what its holder may do; does not travel with other actions
+  std::string key = {};       // kRevoke: a public one, its id or its name; kIssue: a public one
+  std::string name = {};      // kIssue: of the holder; as KeyFolder::Issue takes it
   friend bool operator==(const KeysOrder&, const KeysOrder&) = default;
 };
 

@@ -271,6 +271,26 @@ TEST_F(KeysOfServiceTest, ARevokedKeyIsRefusedAndItsConnectionsEnd) {
   EXPECT_TRUE(new_client.Render(TestRequest(Splatting(), 20)).ok());
 }
 
+TEST_F(KeysOfServiceTest, AKeyOfAPersonIsAdmittedAtOnceAndRevokedAlone) {
+  Client admin = ConnectAs(Role::kAdmin), other = ConnectAs(Role::kClient);
+  ServiceFile annas = FileOf(Role::kClient);
+  annas.own = MakeKeyPair();
+  const KeysOrder issue{.action = KeysAction::kIssue, .role = Role::kClient, .key = annas.own.public_key, .name = "anna"};
+  EXPECT_EQ(other.OrderKeys(issue).status().code(), StatusCode::kInvalidArgument);
+  Result<std::vector<AdmittedKey>> keys = admin.OrderKeys(issue);
+  ASSERT_TRUE(keys.ok()) << keys.status().message();
+  EXPECT_EQ(keys->back().name, "anna");
+  EXPECT_FALSE(keys->back().silent_ms) << "nobody has come with it";
+  Client anna = ConnectWith(annas).value();
+  ASSERT_TRUE(anna.QueryStatus().ok());
+  keys = admin.OrderKeys({});
+  ASSERT_TRUE(keys.ok());
+  EXPECT_TRUE(keys->back().silent_ms);
+  ASSERT_TRUE(admin.OrderKeys({.action = KeysAction::kRevoke, .key = "anna"}).ok());
+  EXPECT_FALSE(anna.QueryStatus(seconds(2)).ok());
+  EXPECT_TRUE(other.QueryStatus().ok());
+}
+
 TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndEnds) {
   StartWorkers(2);
   Client admin = ConnectAs(Role::kAdmin);

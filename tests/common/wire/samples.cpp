@@ -463,15 +463,16 @@ std::vector<KeysOrder> SamplesOf() {
   return {{},
           {kMax64, KeysAction::kRotate, Role::kAdmin, ""},
           {1, KeysAction::kRevoke, Role::kClient, std::string(kKeyTextBytes, 'a')},
-          {1, KeysAction::kRevoke, Role::kClient, ""}};
+          {1, KeysAction::kRevoke, Role::kClient, ""},
+          {1, KeysAction::kIssue, Role::kAdmin, std::string(kKeyTextBytes, 'a'), "Zo\u00eb"}};
 }
 
 template <>
 std::vector<KeysReply> SamplesOf() {
-  return {
-      {},
-      {kMax64,
-       {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"}, {std::string(kKeyTextBytes, 'b'), Role::kAdmin, ""}}}};
+  return {{},
+          {kMax64,
+           {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"},
+            {std::string(kKeyTextBytes, 'b'), Role::kAdmin, "", kUmlaut, kMax64}}}};
 }
 
 template <>
