@@ -464,10 +464,8 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
   return std::move(reply->samples);
 }
 
-Result<BoxStatistics> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline) {
-  Result<StatisticsReply> reply = impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box}, deadline));
-  if (!reply.ok()) return reply.status();
-  return reply->statistics;
+Result<StatisticsReply> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, bool labels, Duration deadline) {
+  return impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box, .labels = labels}, deadline));
 }
 
 Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Await<StatusReply>(impl_->Ask(StatusQuery{}, timeout)); }

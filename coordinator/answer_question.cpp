@@ -1,9 +1,12 @@
 #include "coordinator/answer_question.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "common/planning/frame_plan.h"
@@ -21,7 +24,18 @@ struct Dataset {
   const ProbeVolume& volume;
   std::shared_ptr<const VolumeSummary> summary;
   DatasetId id;
+  std::optional<WholeNumbers> exact = {};  // where stored samples round them
 };
+
+WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
+  WholeNumbers found;
+  found.mapping = exact.of.mapping;
+  VisitSampleType(exact.of.type, [&]<class T>(const T*) {
+    const std::span<const T> samples(reinterpret_cast<const T*>(exact.bytes.data()), exact.bytes.size() / sizeof(T));
+    if constexpr (requires { found.samples = samples; }) found.samples = samples;
+  });
+  return found;
+}
 
 Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
@@ -47,10 +61,23 @@ Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
   return QuestionReply(std::move(reply));
 }
 
+Status NoLabels(const StatisticsQuery& query) {
+  return Status::InvalidArgument(
+      fmt::format("dataset \"{}\" has no labels to measure: --data NAME=FILE,labels=FILE gives it some", query.dataset));
+}
+
 Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
-  Result<BoxStatistics> statistics = StatisticsIn(*dataset.volume.voxels.held(), dataset.summary->description, query.box);
+  const MeasuredVolume measured{*dataset.volume.voxels.held(), dataset.summary->description, dataset.exact};
+  const Result<BoxStatistics> statistics = StatisticsIn(measured, query.box);
   if (!statistics.ok()) return statistics.status();
-  return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = *statistics});
+  StatisticsReply reply{.nonce = query.nonce, .statistics = *statistics, .description = dataset.summary->description};
+  if (!query.labels) return QuestionReply(std::move(reply));
+  if (dataset.volume.labels == nullptr) return NoLabels(query);
+  const std::vector<Label>& labels = dataset.summary->label_table->labels;
+  const Result<std::vector<BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, *dataset.volume.labels, labels.size());
+  if (!of_labels.ok()) return of_labels.status();
+  for (std::size_t i = 0; i < labels.size(); ++i) reply.labels.push_back({labels[i], (*of_labels)[i]});
+  return QuestionReply(std::move(reply));
 }
 
 Result<QuestionReply> AnswerJointHistogram(const JointHistogramQuery& query, const VolumeSummary& summary, const ReadJointBox& read) {
@@ -152,6 +179,7 @@ Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked
 
 Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
   const VolumeDescription& description = asked.summary->description;
+  if (query.labels) return NoLabels(query);  // who reads in parts has no layers
   const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
   if (!region.ok()) return region.status();
   constexpr std::int32_t kPiece = 64;
@@ -159,7 +187,7 @@ Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuest
   for (const Box& piece : CutAtBlocks(description.geometry.bounds(), Uniform(kPiece))) {
     if (region->MayKeep(piece)) needed = Hull(needed, piece);
   }
-  if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce});
+  if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = {}, .description = description});
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
   const ProbeVolume volume{.voxels = VoxelBricks(*block)};
@@ -200,7 +228,8 @@ Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::S
       return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
     };
   }
-  const Dataset dataset{volume, asked.summary, asked.dataset};
+  Dataset dataset{volume, asked.summary, asked.dataset};
+  if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
 }
 

@@ -109,7 +109,7 @@ void DeclareValue(const CommandLine& line) {
 }
 
 void DeclareMeasure(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles and boxes in a dataset or a volume file");
+  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles, boxes and labels in a dataset or a volume file");
   auto options = std::make_shared<MeasureOptions>();
   AddSource(*sub, options->source, options->connection);
   sub->option_defaults()->group("Measures, in the unit of the world (mm of a patient); each may be repeated");
@@ -121,8 +121,19 @@ void DeclareMeasure(const CommandLine& line) {
   AddRepeated(*sub, "--box", options->boxes,
               "Mean, standard deviation and extremes of the voxels with their centres in a box, given as for --clip-box of `render`")
       ->type_name("X0:X1,Y0:Y1,Z0:Z1");
+  sub->add_option(
+         "--labels", CLI::callback_t([options](const CLI::results_t& texts) {
+           options->labels = true;
+           if (!texts.back().empty()) SetLabelFiles(texts.back(), options->layers);
+           return true;
+         }),
+         "Volume, mean, standard deviation and extremes of each label: of the dataset's labels, or with --local of those in FILE, which "
+         "are laid onto the voxels of SOURCE")
+      ->type_name("[FILE]")
+      ->expected(0, 1);
   sub->option_defaults()->group("Options");
-  sub->add_flag("--json", options->json, "Print JSON");
+  CLI::Option* const json = sub->add_flag("--json", options->json, "Print JSON");
+  sub->add_flag("--csv", options->csv, "Print the table of --labels as comma-separated values")->excludes(json);
   RunWith(*sub, line.run, options, RunMeasure);
 }
 

@@ -391,20 +391,39 @@ void Fields(auto& io, Is<StatisticsQuery> auto& m) {
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
   io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Any(m.labels, &P::labels, &P::set_labels);
 }
 inline void Read(const v1::StatisticsQuery& in, StatisticsQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
 
-v1::StatisticsReply ProtoOf(const StatisticsReply&);
-void Fields(auto& io, Is<StatisticsReply> auto& m) {
-  using P = v1::StatisticsReply;
-  auto& [voxels, non_finite, mean, deviation, least, largest] = m.statistics;
-  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+// Two messages have these fields.
+template <class P>
+void BoxStatisticsFields(auto& io, auto& statistics) {
+  auto& [voxels, non_finite, mean, deviation, least, largest] = statistics;
   io.Any(voxels, &P::voxels, &P::set_voxels);
   io.Any(non_finite, &P::non_finite, &P::set_non_finite);
   io.Finite("mean", mean, &P::mean, &P::set_mean);
   io.Between("deviation", deviation, &P::deviation, &P::set_deviation, 0, std::numeric_limits<double>::max());
   io.Finite("least", least, &P::least, &P::set_least);
   io.Finite("largest", largest, &P::largest, &P::set_largest);
+}
+
+void Fields(auto& io, Is<LabelStatistics> auto& m) {
+  using P = v1::LabelStatistics;
+  io.Message("label", m.label, &P::label, &P::mutable_label);
+  BoxStatisticsFields<P>(io, m.statistics);
+}
+
+v1::StatisticsReply ProtoOf(const StatisticsReply&);
+void Fields(auto& io, Is<StatisticsReply> auto& m) {
+  using P = v1::StatisticsReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  BoxStatisticsFields<P>(io, m.statistics);
+  io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Messages("labels", m.labels, &P::labels, &P::mutable_labels, kMaxLabels);
+  io.Check([&](Checker& check) {
+    for (std::size_t i = 1; i < m.labels.size(); ++i)
+      check.That(m.labels[i - 1].label.value < m.labels[i].label.value, "labels", "values do not rise");
+  });
 }
 
 v1::JointHistogramQuery ProtoOf(const JointHistogramQuery&);

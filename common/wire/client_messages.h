@@ -300,17 +300,20 @@ struct SampleReply {
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
-// The values in a box (coordinator/probe/box_statistics.h).
+// The values in a box, and those of each label there (coordinator/probe/box_statistics.h).
 struct StatisticsQuery {
   std::uint64_t nonce = 0;
   std::string dataset;  // 1 ... kMaxNameBytes
   ClipBox box;
+  bool labels = false;  // those of each label, too
   friend bool operator==(const StatisticsQuery&, const StatisticsQuery&) = default;
 };
 
 struct StatisticsReply {
   std::uint64_t nonce = 0;
   BoxStatistics statistics;
+  VolumeDescription description = {};        // of the voxels that were counted
+  std::vector<LabelStatistics> labels = {};  // of each label of the dataset, if the query says so; values rise; at most kMaxLabels
   friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
 };
 

@@ -29,7 +29,7 @@ from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render, show
 from .local import shutdown
 from .presets import presets
-from .probe import Histogram, JointHistogram, Label, Sample
+from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import Service, connect
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Status, WebTraffic, Worker
@@ -52,6 +52,7 @@ __all__ = [
     "InvalidArgument",
     "JointHistogram",
     "Label",
+    "LabelStatistics",
     "Level",
     "NotFound",
     "Progress",
@@ -60,8 +61,8 @@ __all__ = [
     "Sample",
     "Service",
     "SlabstreamError",
-    "Source",
     "SlabstreamWarning",
+    "Source",
     "Statistics",
     "Status",
     "TransferFunction",

@@ -63,7 +63,7 @@ def _scalar_range(scalar_range: Any, name: str, value: Any) -> None:
     scalar_range.min, scalar_range.max, scalar_range.percentiles = values.scalar_range(name, value)
 
 
-def _clip_box(box: Any, name: str, value: Any) -> None:
+def set_clip_box(box: Any, name: str, value: Any) -> None:
     low, high, unit = values.clip_box(name, value)
     _set_vector(box.low, low)
     _set_vector(box.high, high)
@@ -106,7 +106,7 @@ def _label_ranges(ranges: Any, name: str, value: Any) -> None:
 
 #: By the type of the field's messages.
 _MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
-    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": _clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
+    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": set_clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
     "GradientOpacityPoint": _gradient_opacities, "LabelOpacity": _label_opacities, "LabelRange": _label_ranges,
 }
 

@@ -13,13 +13,25 @@ from . import schema
 from .address import Address, find_service
 from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
-from .drafts import Draft, draft_of, slice_drafts_of
+from .drafts import Draft, draft_of, set_clip_box, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
 from .options import takes_options_of
-from .probe import Histogram, JointHistogram, Label, Sample, histogram_of, joint_histogram_of, labels_of, sample_of
+from .probe import (
+    Histogram,
+    JointHistogram,
+    Label,
+    LabelStatistics,
+    Sample,
+    histogram_of,
+    joint_histogram_of,
+    label_statistics_of,
+    labels_of,
+    sample_of,
+)
 from .status import Dataset, Status, dataset_of, status_of
+from .transfer import TransferFunction, mapped
 from .uploads import upload_of
 from .values import integer, number, point
 from .viewer import Viewer
@@ -31,7 +43,6 @@ _QUESTION_SECONDS = 120.0  # volumes may have to be loaded first
 _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
-from .transfer import TransferFunction, mapped
 
 def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
     """Frame i is turned by i / frames of all turns, from the azimuth of `draft` on."""
@@ -127,6 +138,13 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def labels(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> list[Label]:
         """The labels that occur in a dataset, by value; empty: it has no labels."""
         return labels_of(self._summary(dataset, timeout))
+
+    def label_statistics(self, dataset: str, *, clip_box: Any = None, timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
+        """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
+        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it."""
+        query = schema.StatisticsQuery(dataset=dataset, labels=True)
+        set_clip_box(query.box, "clip_box", ":,:,:" if clip_box is None else clip_box)
+        return label_statistics_of(self._connection.ask("statistics_query", query, timeout))
 
     def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""

@@ -3,8 +3,10 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import csv
 import gzip
 import http.client
+import io
 import json
 import os
 import random
@@ -295,8 +297,26 @@ class HttpTest(WithService):
         self.assertEqual((box["voxels"], box["non_finite"], box["least"], box["largest"]), (8, 0, min(values), max(values)))
         self.assertAlmostEqual(box["mean"], mean, 9)
         self.assertAlmostEqual(box["deviation"], (sum((value - mean) ** 2 for value in values) / len(values)) ** 0.5, 9)
+        self.assertEqual(self.ask("statistics", dataset="b")["voxels"], 20 ** 3, "without a box: all")
         empty = self.ask("statistics", dataset="b", box="100:101,0:1,0:1")
         self.assertEqual(empty, {"voxels": 0, "non_finite": 0, "mean": None, "deviation": None, "least": None, "largest": None})
+
+    def test_labels_are_measured(self):
+        found = self.ask("statistics", dataset="c", labels="true")
+        self.assertEqual((found["unit"], [(each["value"], each["voxels"], each["volume"]) for each in found["labels"]]),
+                         ("voxels^3", [(3, 64, 64), (70, 64, 64)]))
+        corner = self.ask("statistics", dataset="c", box="0:3,0:3,0:3")
+        self.assertEqual({name: found["labels"][0][name] for name in corner}, corner)
+        self.assertEqual(found["labels"][0]["name"], 'Corner "low"')
+        boxed = self.ask("statistics", dataset="c", labels="true", box="0:3,0:3,-0.5:0.5")
+        self.assertEqual([each["voxels"] for each in boxed["labels"]], [16, 0])
+        self.assertIsNone(boxed["labels"][1]["mean"])
+        status, headers, body = self.get("/api/v1/statistics", dataset="c", labels="true", format="csv")
+        self.assertEqual((status, headers["Content-Type"]), (200, "text/csv; charset=utf-8"))
+        lines = list(csv.DictReader(io.StringIO(body.decode(), newline="")))
+        self.assertEqual([(line["value"], line["name"], line["voxels"]) for line in lines],
+                         [("3", 'Corner "low"', "64"), ("70", "Größte Ecke", "64")])
+        self.assertEqual(float(lines[0]["mean"]), corner["mean"])
 
     def test_pixels_show_points(self):
         # The ball's surface, seen along +y: from its geometry by hand.
@@ -341,7 +361,9 @@ class HttpTest(WithService):
             ("profile", {"dataset": "a", "from": "0,0,0"}, 400, "to is missing"),
             ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
             ("joint-histogram", {"dataset": "nonesuch"}, 404, "nonesuch"),
-            ("statistics", {"dataset": "a"}, 400, "box is missing"),
+            ("statistics", {"dataset": "a", "labels": "maybe"}, 400, "labels 'maybe' is neither true nor false"),
+            ("statistics", {"dataset": "a", "format": "csv"}, 400, "format 'csv' is the table of labels"),
+            ("statistics", {"dataset": "a", "labels": "true"}, 400, "has no labels"),
             ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),
             ("statistics", {"dataset": "nonesuch", "box": "0:1,0:1,0:1"}, 404, "nonesuch"),
             ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
@@ -355,6 +377,12 @@ class HttpTest(WithService):
             self.assertIn(why, body["error"])
             self.assertNotIn("\n", body["error"])
         self.assertEqual(self.gateway.request("/api/v1/histogram", method="POST", body="{}")[0], 405)
+
+    def test_an_option_is_given_once(self):
+        for target, body in (("/api/v1/command?dataset=a&size=20&size=30", None), ("/api/v1/command", '{"dataset": "a", "size": 20, "size": 30}'),
+                             ("/api/v1/command?size=20", '{"dataset": "a", "size": 30}'), ("/api/v1/pick?dataset=a&x=1&x=2&y=3", None)):
+            status, answer = self.gateway.json(target, **({} if body is None else {"method": "POST", "body": body}))
+            self.assertEqual(status, 400, (target, body, answer))
 
     def test_a_render_that_nobody_waits_for_is_cancelled(self):
         heavy = {"dataset": "a", "renderer": "raycast", "sampling-rate": 16, "size": 4000, "opacity-distance": 1000, "termination": 0}
@@ -378,12 +406,6 @@ class HttpTest(WithService):
             self.assertEqual(self.gateway.request(path, token=False, headers={"Authorization": "Bearer wrong"})[0], 401)
         for path in ("/", "/assets/page.js", "/livez", "/readyz", "/api/v1/openapi.json"):
             status, headers, _ = self.gateway.request(path, token=False)
-    def test_an_option_is_given_once(self):
-        for target, body in (("/api/v1/command?dataset=a&size=20&size=30", None), ("/api/v1/command", '{"dataset": "a", "size": 20, "size": 30}'),
-                             ("/api/v1/command?size=20", '{"dataset": "a", "size": 30}'), ("/api/v1/pick?dataset=a&x=1&x=2&y=3", None)):
-            status, answer = self.gateway.json(target, **({} if body is None else {"method": "POST", "body": body}))
-            self.assertEqual(status, 400, (target, body, answer))
-
             self.assertEqual(status, 200, path)
             self.assertNotIn("unsafe", headers["Content-Security-Policy"])
             self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
@@ -430,6 +452,8 @@ class HttpTest(WithService):
                 with self.assertRaisesRegex(Refused, "403"):
                     Page(self.gateway, headers=headers)
         self.assertIn(b" 403 ", self.gateway.raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n"))  # no Host
+        for twice in (f"Host: {own}\r\nHost: evil.example", f"Host: {own}\r\nHost: {own}", f"Host: {own}\r\nOrigin: http://{own}\r\nOrigin: http://evil.example"):
+            self.assertIn(b" 400 ", self.gateway.raw(f"GET /livez HTTP/1.1\r\n{twice}\r\nConnection: close\r\n\r\n".encode()), twice)
         with self.assertRaisesRegex(Refused, "401"):
             Page(self.gateway, protocols=["slabstream.view.v1"])
         with self.assertRaisesRegex(Refused, "400"):
@@ -452,8 +476,6 @@ class HttpTest(WithService):
         for _ in range(100):
             altered = bytearray(whole_request)
             for _ in range(chance.randrange(1, 6)):
-        for twice in (f"Host: {own}\r\nHost: evil.example", f"Host: {own}\r\nHost: {own}", f"Host: {own}\r\nOrigin: http://{own}\r\nOrigin: http://evil.example"):
-            self.assertIn(b" 400 ", self.gateway.raw(f"GET /livez HTTP/1.1\r\n{twice}\r\nConnection: close\r\n\r\n".encode()), twice)
                 altered[chance.randrange(len(altered))] = chance.randrange(256)
             with self.gateway.connect() as connection:
                 connection.sendall(altered)

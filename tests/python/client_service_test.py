@@ -81,6 +81,23 @@ class AtAService(WithAService):
         with self.assertRaisesRegex(ss.InvalidArgument, "at '1,2' is not X,Y,Z"):
             self.service.value("head", at="1,2")
 
+    def test_labels_are_measured(self) -> None:
+        values, labels, _ = volume_arrays()
+        found = self.service.label_statistics("head")
+        self.assertEqual([(each.label.value, each.label.name) for each in found], [(1, "left_1"), (2, "left_2"), (3, "right_2")])
+        for each in found:
+            there = values[labels == each.label.value].astype(float)
+            self.assertEqual((each.voxels, each.non_finite, each.least, each.largest), (there.size, 0, there.min(), there.max()))
+            self.assertEqual((each.mean, each.unit), (there.sum() / there.size, "ml"))
+            self.assertAlmostEqual(each.deviation, there.std(), 9)
+            self.assertAlmostEqual(each.volume, there.size * 2 * 1.5 * 1.25 / 1000, 12)
+        z = -10 + 2 * 4  # of the slice with index 4
+        boxed = self.service.label_statistics("head", clip_box=((None, None), (None, None), (z - 0.5, z + 0.5)))
+        self.assertEqual([each.voxels for each in boxed], [int((labels[4] == value).sum()) for value in (1, 2, 3)])
+        self.assertTrue(all((each.mean is None) == (each.voxels == 0) for each in boxed))
+        with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
+            self.service.label_statistics("nothing")
+
     def test_colour_maps_of_matplotlib_look_like_presets(self) -> None:
         try:
             import matplotlib

@@ -555,11 +555,11 @@ TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
     constexpr std::uint64_t kNoLimit = 0;
     Start(path, 1, kNoLimit);
     const std::vector<VolumeSample> held = client_->SampleAt("ball", points).value();
-    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value();
+    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value().statistics;
     const SummaryReply summary = client_->Summarize("ball").value();
     Start(path, 1);
     EXPECT_EQ(client_->SampleAt("ball", points).value(), held);
-    EXPECT_EQ(client_->StatisticsIn("ball", box).value(), statistics);
+    EXPECT_EQ(client_->StatisticsIn("ball", box).value().statistics, statistics);
     const SummaryReply in_parts = client_->Summarize("ball").value();
     EXPECT_EQ(in_parts.description, summary.description);
     EXPECT_EQ(in_parts.range, summary.range);

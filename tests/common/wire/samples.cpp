@@ -529,12 +529,14 @@ std::vector<SampleReply> SamplesOf() {
 
 template <>
 std::vector<StatisticsQuery> SamplesOf() {
-  return {{.dataset = "a", .box = {{}, {1, 1, 1}}}, {kMax64, kLongName, {{-1e9, 0, 1}, {1e9, 0.5, 2}, ClipUnit::kPercent}}};
+  return {{.dataset = "a", .box = {{}, {1, 1, 1}}}, {kMax64, kLongName, {{-1e9, 0, 1}, {1e9, 0.5, 2}, ClipUnit::kPercent}, true}};
 }
 
 template <>
 std::vector<StatisticsReply> SamplesOf() {
-  return {{}, {kMax64, {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300}}};
+  const BoxStatistics full = {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300};
+  const Label first{1, {1, 0, 0.5F}, "left"}, last{kMaxLabelValue, {}, std::string(kMaxLabelNameBytes, 'n')};
+  return {{.statistics = {}, .description = Description()}, {kMax64, full, Description(), {{first, {}}, {last, full}}}};
 }
 
 std::vector<std::uint64_t> LargeCounts() {
