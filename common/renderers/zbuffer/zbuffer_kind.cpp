@@ -57,7 +57,7 @@ class ZBufferKind : public RendererKind {
     for (float& opacity : table.opacity) opacity = opacity >= least ? opacity : 0;
     for (const Isosurface& surface : transfer.isosurfaces) {
       for (std::size_t bin = 0; bin < table.opacity.size(); ++bin) {
-        if (table.ValueOf(int(bin), description.mapping) < surface.value) continue;
+        if (table.value[bin] < surface.value) continue;
         table.opacity[bin] = 1;
         table.color[bin] = surface.color;
       }
