@@ -77,7 +77,7 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
     reply.sample =
         SampleAtVoxel(dataset.volume, *dataset.summary, dataset.summary->description.geometry.ToWorld(picked->at), picked->voxel);
-    reply.depth = picked->depth;
+    reply.depth = picked->depth * setup->unit;
   }
   return QuestionReply(std::move(reply));
 }

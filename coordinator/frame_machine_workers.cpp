@@ -64,7 +64,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .group_count = message.group_count,
                    .shares = std::move(shares),
                    .statistics = {},
-                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry)};
+                   .geometry = PictureGeometryOf(frame->plan().setup)};
   for (const PictureShare& share : reply.shares) {
     if (share.direct) clients.Sent(request.client, share.runs.encoded_bytes);
   }

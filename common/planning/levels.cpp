@@ -38,7 +38,7 @@ int CoarsestFor(double width, const VolumeLevels& levels, int count) {
   return level;
 }
 
-// Of the pixels that show the nearest point; orthographic: of all pixels.
+// Of the pixels that show the nearest point, in the camera's unit; orthographic: of all pixels.
 double WidthAt(const Camera::ImageExtent& extent, const Camera& camera) {
   const bool perspective = camera.projection == Projection::kPerspective;
   return camera.PixelSizeAt(perspective ? std::max(extent.nearest, 1e-6 * camera.target_depth) : camera.target_depth);
@@ -57,13 +57,13 @@ LevelMap ZonesOf(const Index3& size) {
 // Calls function(width of the pixels that show its nearest point) for each zone of `map`, over `grid`; 0: it is not in the picture.
 template <class Function>
 void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetup& setup, Function&& function) {
-  const GridMap to_camera = MapBetween(grid, setup.description.geometry);
+  const GridMap to_camera = MapBetween(grid, WorldGeometryOf(setup));
   map.ForEachZone([&](const Index3& zone) {
     const Box box = map.BoxOf(zone, grid.size);
     const Camera::ImageExtent extent = ExtentOf(box, to_camera, setup.camera);
     const bool shown =
         InPicture(extent, setup.camera) && setup.clip.MayKeep(CoveringVoxels(box, to_camera, setup.description.geometry.size));
-    function(shown ? WidthAt(extent, setup.camera) : 0);
+    function(shown ? setup.unit * WidthAt(extent, setup.camera) : 0);
   });
 }
 
@@ -199,7 +199,8 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   const Camera& camera = setup->camera;
   const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
-    return LevelMap{.levels = {CoarsestFor(detail * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera), levels, count)}};
+    const double width = setup->unit * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera);
+    return LevelMap{.levels = {CoarsestFor(detail * width, levels, count)}};
   };
   const bool mixes =
       camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();

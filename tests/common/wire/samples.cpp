@@ -66,6 +66,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   message.display = kMax32;
   FrameSetup& setup = message.setup;
   setup.dataset = kMax64;
+  setup.unit = 0x1p-40;
   setup.description = Description();
   setup.range = {-1, 1e30F};
   SetRenderer(*renderer, setup);
