@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/view/supersampled_voxel.h"
+
 namespace slabstream {
 namespace {
 
@@ -95,6 +97,21 @@ Axis NearestAxis(const Vec3& direction) {
   return nearest;
 }
 
+// The axis nearest in physical space. If voxels are so long along it that the central ray passes more than kMostShear others from slice to
+// slice, it is the axis nearest in data space, whose slices the ray meets most often. Usual scans keep the nearest one.
+Axis TraversalAxisOf(const Look& look, const VolumeGeometry& geometry, bool perspective) {
+  const Vec3& forward = look.frame.forward;
+  const Axis nearest = NearestAxis(forward);
+  const Vec3 voxels = Absolute(forward / geometry.spacing);  // passed a unit
+  const Axis most = *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return voxels[axis]; });
+  constexpr double kMostShear = 8;
+  if (voxels[most] <= kMostShear * voxels[nearest]) return nearest;
+  // Slices next to the eye would be magnified too much.
+  constexpr double kFar = 2;
+  const double before = look.distance * std::abs(forward[most]) - std::copysign(look.target[most], look.target[most] * forward[most]);
+  return perspective && before < kFar * 0.5 * ExtentOf(geometry)[most] ? nearest : most;
+}
+
 // Row of a data-space form: data point p -> scale * Dot(direction, spacing * (p - centre)) + offset.
 std::array<double, 4> Row(const Vec3& direction, double scale, double offset, const Vec3& spacing, const Vec3& centre) {
   const Vec3 row = scale * (direction * spacing);
@@ -123,6 +140,11 @@ ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometr
   }
   fitted.zoom = std::min(fitted.zoom, kMaxZoom);
   return fitted;
+}
+
+double SupersampledVoxel(const VolumeGeometry& geometry) {
+  const double mean = BoundingRadius(geometry) / (0.5 * Length(ToVec3(geometry.size)));
+  return std::max(Least(geometry.spacing), std::min(mean / kMaxStretch, 0.5 * Least(ExtentOf(geometry)) / kMaxVoxelsPerPixel));
 }
 
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
@@ -156,7 +178,8 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const double radius = BoundingRadius(geometry);
-  const auto& [frame, target, distance] = LookOf(view, geometry);
+  const Look look = LookOf(view, geometry);
+  const auto& [frame, target, distance] = look;
   const Vec3 centre = geometry.centre() + target / spacing;  // data space, of the picture
 
   // Pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
@@ -195,7 +218,7 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
     camera.x_row = Row(frame.right, scale, middle_x, spacing, centre);
     camera.y_row = Row(frame.up, -scale, middle_y, spacing, centre);
   }
-  camera.traversal_axis = NearestAxis(frame.forward);
+  camera.traversal_axis = TraversalAxisOf(look, geometry, perspective);
   camera.ascending = frame.forward[camera.traversal_axis] > 0;
   return camera;
 }

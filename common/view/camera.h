@@ -14,9 +14,9 @@
 // (column + 0.5, row + 0.5). Depth: distance from the eye plane along the view direction in physical units; for an orthographic camera the
 // eye plane is 2 R before the centre. Depth is positive for everything in the volume.
 //
-// Supersampling (Z-buffer): where more than kMaxVoxelsPerPixel voxels would fall on one pixel's width, everything is rendered on a grid
-// `supersample` (a power of two) times finer in x and y, and box-filtered at the end, so that minified pictures do not alias. Camera and
-// all pixel bounds are then in that finer grid. Splatting has a grid of its own: sheet_grid.h.
+// Supersampling (Z-buffer, rays): where more than kMaxVoxelsPerPixel voxels (SupersampledVoxel) would fall on one pixel's width, all is
+// rendered on a grid `supersample` (a power of two) times finer in x and y, and box-filtered at the end, so that minified pictures do not
+// alias. Camera and all pixel bounds are then in that finer grid. Splatting has a grid of its own: sheet_grid.h.
 #pragma once
 
 #include <array>
@@ -77,8 +77,8 @@ struct Camera {
   int width = 0, height = 0;  // pixels of the (supersampled) grid
   int supersample = 1;        // power of two
   double target_depth = 1;    // depth of the target, which the picture's centre shows; perspective: its distance from the eye, > 0
-  // The traversal: slices perpendicular to `traversal_axis` (the data axis nearest to the view direction in physical space; ties go to the
-  // higher axis), from index 0 up if `ascending`, else from the last one down: nearest slice first.
+  // The traversal: slices perpendicular to `traversal_axis`, from index 0 up if `ascending`, else from the last one down: nearest slice
+  // first. It is the data axis nearest to the view direction in physical space (ties go to the higher axis), if slices lie close enough.
   Axis traversal_axis = Axis::kY;
   bool ascending = true;
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "common/view/supersampled_voxel.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/common/view/view_limits.h"
@@ -199,6 +200,34 @@ TEST(Camera, SupersamplingOnlyDividesPixels) {
     EXPECT_NEAR(in_fine.y, in_wide.y * fine.supersample, 1e-9 * fine.width);
     EXPECT_EQ(in_fine.depth, in_wide.depth);
   }
+}
+
+// Not by the shortest side of very flat voxels, which would take as many pixels as if there were cubes of that side.
+TEST(Camera, SupersamplesFlatVoxelsLikeCubes) {
+  EXPECT_EQ(SupersampledVoxel({{30, 40, 50}, {0.5, 0.5, 0.5}}), 0.5);
+  EXPECT_EQ(SupersampledVoxel({{512, 512, 60}, {0.5, 0.5, 5}}), 0.5) << "a usual scan";
+  const VolumeGeometry flat = {{24, 24, 24}, {300, 300, 1}};
+  EXPECT_EQ(SupersampledVoxel(flat), 6) << "a quarter of the thinnest side";
+  EXPECT_LE(MakeCamera({}, {256, 256}, flat, SupersampledVoxel(flat)).supersample, 4);
+}
+
+// Slices along the nearest axis lie too far apart for their voxels.
+TEST(Camera, TraversesCloseSlices) {
+  const VolumeGeometry flat = {{24, 24, 24}, {300, 300, 1}};
+  const auto axis = [&](double elevation, Projection projection = Projection::kOrthographic) {
+    return MakeCamera({.projection = projection, .azimuth_degrees = 20, .elevation_degrees = elevation}, {64, 64}, flat).traversal_axis;
+  };
+  EXPECT_EQ(axis(0), Axis::kY);
+  EXPECT_EQ(axis(20), Axis::kZ);
+  EXPECT_EQ(axis(-20), Axis::kZ);
+  EXPECT_EQ(axis(90), Axis::kZ);
+  EXPECT_EQ(axis(20, Projection::kPerspective), Axis::kZ);
+  // Not slices that the eye is next to.
+  const VolumeGeometry high = {{24, 24, 2400}, {300, 300, 1}};
+  ViewParameters view = {.azimuth_degrees = 20, .elevation_degrees = 1};
+  EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kZ);
+  view.projection = Projection::kPerspective;
+  EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kY);
 }
 
 TEST(Camera, SupersamplingIsBounded) {
