@@ -25,6 +25,7 @@
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/read_progress.h"
+#include "data/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
@@ -90,7 +91,8 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!IsHidden(path) && LooksLikeAnyVolume(path.string())) files.push_back(path);
+    if (IsHidden(path) || IsPicture(path.string())) continue;  // pictures lie about for other reasons
+    if (LooksLikeAnyVolume(path.string())) files.push_back(path);
   }
   if (error) {
     const bool missing = error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;

@@ -18,8 +18,9 @@ namespace slabstream {
 
 Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options, double channels) {
   while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
+  if (sizes.size() == 2) sizes.push_back(1);
   if (sizes.size() != 3 && sizes.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3, or 4 with time", path, sizes.size()));
+    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 2 or 3, or 4 with time", path, sizes.size()));
   }
   for (const Axis axis : kAxes) {
     const double side = sizes[std::size_t(Number(axis))];

@@ -134,6 +134,8 @@ def _from_nibabel(image: Any) -> Volume:
     array = numpy.asanyarray(image.dataobj)
     while array.ndim > 3 and array.shape[-1] == 1:
         array = array[..., 0]
+    if array.ndim == 2:
+        array = array[..., numpy.newaxis]
     if array.ndim != 3:
         raise InvalidArgument(f"the image has the shape {image.shape}, must have 3 axes: choose one of its volumes")
     affine = numpy.asarray(image.affine, numpy.float64)
@@ -201,8 +203,11 @@ def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: A
     if any(value is not None for value in (spacing, origin, direction, world)):
         found = dataclasses.replace(found, grid=grid_of(spacing, origin, direction, world))
     shape = tuple(found.samples.shape)
+    if len(shape) == 2:  # a slice
+        found = dataclasses.replace(found, samples=numpy.asanyarray(found.samples)[numpy.newaxis])
+        shape = (1, *shape)
     if len(shape) != 3:
-        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x")
+        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x, or 2 of a slice: y, x")
     if not all(1 <= side <= _MOST_SIDE for side in shape):
         raise InvalidArgument(f"the array has the shape {shape}, each side must be in [1, {_MOST_SIDE}]")
     file_type_of(found.samples.dtype)

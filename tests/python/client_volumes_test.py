@@ -72,7 +72,7 @@ class Files(InAFolder):
             (np.full((2, 2, 2), 2**60 + 1), "the array has samples of type int64, and 1152921504606846977 is no float32"),
             (np.zeros((2, 2, 2), complex), "the array has samples of type complex128"),
             (np.zeros((2, 2, 2), "M8[s]"), "the array has samples of type datetime64"),
-            (np.zeros((2, 2)), "the array has the shape (2, 2), must have 3 axes: z, y, x"),
+            (np.zeros(2), "the array has the shape (2,), must have 3 axes: z, y, x, or 2 of a slice: y, x"),
             (np.zeros((2, 0, 2)), "the array has the shape (2, 0, 2), each side must be in [1, 65535]"),
             ([1, 2, 3], "a list is no volume"),
             (3, "a int is no volume"),

@@ -289,7 +289,7 @@ TEST_F(Hdf5LayoutsTest, SeveralVolumesAreListed) {
   EXPECT_THAT(many.message(), HasSubstr("more"));
   EXPECT_LT(many.message().size(), 2000U);
   Hdf5Writer(path).Write("/line", {.size = {60}}, samples.data());
-  ExpectRefused(path, {}, "several.h5: has no dataset of three axes or more");
+  ExpectRefused(path, {}, "several.h5: has no dataset of two axes or more");
 }
 
 TEST_F(Hdf5LayoutsTest, AnAxisBeforeTheLastThreeIsTime) {
