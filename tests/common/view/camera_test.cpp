@@ -224,7 +224,7 @@ TEST(Camera, TraversesCloseSlices) {
   EXPECT_EQ(axis(20, Projection::kPerspective), Axis::kZ);
   // Not slices that the eye is next to.
   const VolumeGeometry high = {{24, 24, 2400}, {300, 300, 1}};
-  ViewParameters view = {.azimuth_degrees = 20, .elevation_degrees = 1};
+  ViewParameters view = {.azimuth_degrees = 20, .elevation_degrees = 3};
   EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kZ);
   view.projection = Projection::kPerspective;
   EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kY);
