@@ -79,6 +79,7 @@ struct Client::Impl {
   Impl(Context& client_context, const ServiceAddress& service, Socket service_socket, ClientTiming client_timing)
       : context(client_context),
         endpoint(service.endpoint),
+        has_keys(service.keys.has_value()),
         takes_pictures(service.keys.has_value() && service.direct_pictures),
         socket(std::move(service_socket)),
         timing(client_timing) {}
@@ -92,6 +93,9 @@ struct Client::Impl {
   bool Pump(Time limit);
 
   Status NoAnswer(Duration timeout) const {
+    if (socket.refused() && !has_keys) {
+      return Status::InvalidArgument("the service at " + endpoint + " has keys: name its service file, client.json (--service)");
+    }
     if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
     return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
   }
@@ -125,11 +129,13 @@ struct Client::Impl {
 
   Context& context;
   std::string endpoint;
+  const bool has_keys;
   const bool takes_pictures;  // straight from workers, if they reach this host
   Socket socket;
   ClientTiming timing;
   const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
-  bool unreachable = false;  // the last ping could not be queued
+  bool unreachable = false;              // the last ping could not be queued
+  std::optional<Status> wrong_endpoint;  // clients are not heard there
   Wakeup wakeup;
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
@@ -226,7 +232,10 @@ void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
                  [&](FrameReply& reply) { Handle(reply, payload); },
                  [&](const FrameFailed& failed) { End(failed.request, failed.status); },
                  [&](const ClientPong& pong) { Handle(pong); },
-                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+                 [&](const OrderRefused& refused) {
+                   if (refused.nonce == 0) wrong_endpoint = refused.status;
+                   End(refused.nonce, refused.status);
+                 },
                  [&](Answer auto& reply) { End(reply.nonce, std::move(reply)); },
                  [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
@@ -357,11 +366,13 @@ Result<Client> Client::Connect(Context& context, const ServiceAddress& service, 
   if (Status connected = socket->Connect(service.endpoint); !connected.ok()) return connected;
   Client client(std::make_unique<Impl>(context, service, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
-  constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up
+  constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up, and whether the service admits it
   for (const Time end = MonotonicNow() + timeout; !client.impl_->pinged.empty();) {
     const Time now = MonotonicNow();
     if (now >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
-    client.impl_->Pump(give_up ? std::min(end, now + kEachLook) : end);
+    client.impl_->Pump(std::min(end, now + kEachLook));
+    if (const auto& wrong = client.impl_->wrong_endpoint) return Status(wrong->code(), service.endpoint + ": " + wrong->message());
+    if (client.impl_->socket.refused()) return client.impl_->NoAnswer(timeout);
   }
   return client;
 }

@@ -234,6 +234,10 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
         Guarded("decoding", [&] { return Decode<WorkerToCoordinator>(incoming->header(), payload.size()); });
     if (!message.ok()) {
       complaints.Warning("control plane: dropped a message: " + message.status().message());
+      if (Decode<ClientToCoordinator>(incoming->header()).ok()) {
+        const Status why = Status::InvalidArgument("this is the endpoint for workers; clients connect to " + client_endpoint);
+        (void)control.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
+      }
       continue;
     }
     HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});
@@ -250,6 +254,11 @@ void CoordinatorService::Impl::ReceiveFromClients() {
         Guarded("decoding", [&] { return Decode<ClientToCoordinator>(incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
       complaints.Warning("client plane: refused a message: " + message.status().message());
+      if (Decode<WorkerToCoordinator>(incoming->header()).ok()) {  // it would wait for ever
+        const Status why = Status::InvalidArgument("this is the endpoint for clients; workers connect to " + worker_endpoint);
+        (void)clients.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
+        continue;
+      }
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
       if (std::optional<CoordinatorToClient> refusal = RefusalOf(incoming->header(), message.status())) {
         HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});

@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <optional>
+#include <span>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -49,6 +50,13 @@ WorkerId SenderOf(const MessageToWorker& message) {
   if (const auto* refused = std::get_if<ImageRefused>(&message)) return refused->from_worker;
   const auto* received = std::get_if<ImageReceived>(&message);
   return received == nullptr ? 0 : received->from_worker;
+}
+
+// What a coordinator says to a worker that has come to the endpoint for clients.
+std::optional<Status> RefusalIn(std::span<const std::byte> header) {
+  const Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(header);
+  const auto* const refused = message.ok() ? std::get_if<OrderRefused>(&*message) : nullptr;
+  return refused == nullptr ? std::nullopt : std::optional(refused->status);
 }
 
 std::string HostName() {
@@ -122,9 +130,10 @@ struct WorkerService::Impl {
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
-  Status ended;           // set before `stopped`
-  bool stop_now = false;  // set by the machine
-  LimitedLog complaints;  // about messages
+  Status ended;                          // set before `stopped`
+  bool stop_now = false;                 // set by the machine
+  std::optional<Status> wrong_endpoint;  // nobody registers workers there
+  LimitedLog complaints;                 // about messages
   WorkerMetrics metrics{options.machine.memory_bytes};
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
@@ -180,6 +189,13 @@ Status WorkerService::Impl::Loop() {
     peers.CloseIdle(now);
     pictures.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
+    if (wrong_endpoint) {
+      return Status(wrong_endpoint->code(), "--coordinator " + options.coordinator_endpoint + ": " + wrong_endpoint->message());
+    }
+    if (control.refused() && !options.keys) {
+      return Status::InvalidArgument("the coordinator at " + options.coordinator_endpoint +
+                                     " has keys: name its service file, worker.json (--service)");
+    }
     if (control.refused()) {
       return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
     }
@@ -201,6 +217,7 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
     Bytes payload = incoming->payload();
     Result<Messages> decoded = Guarded("decoding", [&] { return Decode<Messages>(incoming->header(), payload.size()); });
     if (!decoded.ok()) {
+      if (plane == Plane::kControl) wrong_endpoint = RefusalIn(incoming->header());
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + decoded.status().message());
       continue;
     }
