@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/source_name.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
@@ -35,13 +37,6 @@ namespace fs = std::filesystem;
 std::string Shown(const std::string& argument) {
   constexpr std::size_t kMost = 512;
   return argument.size() <= kMost ? argument : argument.substr(0, kMost) + "...";
-}
-
-// The file name without its ending; ".nii.gz" is one ending.
-std::string Stem(const fs::path& path) {
-  fs::path name = path.filename();
-  if (name.extension() == ".gz") name = name.stem();
-  return name.stem().string();
 }
 
 bool IsFolder(const fs::path& path) {
@@ -70,17 +65,37 @@ bool IsOneVolume(const std::string& folder, const std::vector<fs::path>& volumes
 
 Status Repeated(const std::string& name) { return Status::InvalidArgument("there is already a dataset named \"" + name + "\""); }
 
-// Adds what is in the folder; what cannot be added is left out.
+// Whether the file can only be read with options: samples without a header.
+bool NeedsOptions(const std::string& path) {
+  const VolumeFormat* const format = FindFormat(path, {});
+  return format != nullptr && !format->required.empty();
+}
+
+// Without samples that belong to the header beside them, as ball.raw does to ball.mhd.
+std::vector<std::string> WithoutSamplesOfHeaders(const std::vector<fs::path>& files) {
+  std::set<fs::path> headers;
+  std::vector<std::string> volumes;
+  for (const fs::path& file : files) {
+    if (!NeedsOptions(file.string())) headers.insert(file.stem());
+  }
+  for (const fs::path& file : files) {
+    if (!headers.contains(file.stem()) || !NeedsOptions(file.string())) volumes.push_back(file.string());
+  }
+  return volumes;
+}
+
+// Adds what is in the folder, by its names (NamesOfSources). What is named already has precedence.
 void AddContents(FoundData& found, const std::string& folder, const std::vector<fs::path>& files) {
-  const auto add = [&](const std::string& name, const std::string& path) {
-    Status added = CheckDatasetName(name);
-    if (added.ok() && !found.datasets.emplace(name, DataSource(path, folder)).second) added = Repeated(name);
-    if (!added.ok()) found.complaints.push_back(path + ": left out: " + added.message());
-  };
-  if (IsOneVolume(folder, files)) {
-    add(fs::path(folder).filename().string(), folder);
-  } else {
-    for (const fs::path& file : files) add(IsFolder(file) ? file.filename().string() : Stem(file), file.string());
+  const std::vector<std::string> volumes = IsOneVolume(folder, files) ? std::vector{folder} : WithoutSamplesOfHeaders(files);
+  const std::vector<std::string> names = NamesOfSources(volumes);
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const std::string usual = NameOfSource(volumes[i]);
+    if (!found.datasets.emplace(names[i], DataSource(volumes[i], folder)).second) {
+      found.complaints.push_back(volumes[i] + ": left out: " + Repeated(names[i]).message());
+    } else if (names[i] != usual) {
+      found.complaints.push_back(
+          fmt::format("{}: its dataset is named \"{}\", since \"{}\" is that of another file", volumes[i], names[i], usual));
+    }
   }
 }
 
@@ -122,10 +137,20 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
   return Status::Ok();
 }
 
+// Whether a path without a name is a folder to watch. A store of objects such as an OME-Zarr is one volume. A folder of slices is watched:
+// it is one volume as long as nothing else lies in it.
+bool IsWatched(const std::string& path) {
+  if (!IsFolder(path)) return false;
+  return FindFormat(path, {}) != nullptr || !LooksLikeAnyVolume(path);
+}
+
+// As the name of a dataset, or of several times.
+bool HasName(const FoundData& found, const std::string& name) {
+  const auto next = found.datasets.lower_bound(name + "@");
+  return found.datasets.contains(name) || (next != found.datasets.end() && NameWithoutTime(next->first) == name);
+}
+
 Status AddFolder(FoundData& found, const std::string& path) {
-  std::error_code error;
-  if (!fs::exists(path, error)) return Status::NotFound("does not exist");
-  if (!fs::is_directory(path, error)) return Status::InvalidArgument("is a file; give it a name as in NAME=" + path);
   const std::string folder = WatchedFolder(path);
   if (std::ranges::find(found.folders, folder) != found.folders.end()) return Status::InvalidArgument("the folder is given before it");
   const Result<std::vector<fs::path>> files = VolumeFilesIn(folder);
@@ -322,7 +347,9 @@ const std::string* DataArgument::RelativePath() const {
 }
 
 Result<DataArgument> ParseDataArgument(const std::string& argument) {
-  const std::size_t equals = argument.find('=');
+  // What stands before an '=' is no name if it is an address, or ends in an option or a layer.
+  const std::size_t first = argument.find('='),
+                    equals = argument.find_first_of("?,") < first || argument.find("://") < first ? std::string::npos : first;
   DataArgument parsed;
   if (equals != std::string::npos) parsed.name = argument.substr(0, equals);
   parsed.path = equals == std::string::npos ? argument : argument.substr(equals + 1);
@@ -334,7 +361,6 @@ Result<DataArgument> ParseDataArgument(const std::string& argument) {
     return wrong(fmt::format("a path of {} bytes, must have 1 to {}", parsed.path.size(), kMaxPathBytes));
   }
   if (parsed.path.find('\0') != std::string::npos) return wrong("a path with a zero byte");
-  if (parsed.name.empty()) return parsed;
   if (Status layers = TakeLayers(parsed.path, parsed.layers); !layers.ok()) return wrong(layers.message());
   if (parsed.path.empty()) return wrong("layers without a volume");
   return parsed;
@@ -348,7 +374,7 @@ std::string WatchedFolder(const std::string& path) {
 
 FoundData FindData(const std::vector<std::string>& arguments, const std::string& prefix) {
   FoundData found;
-  std::vector<std::pair<std::string, DataArgument>> folders;
+  std::vector<std::pair<std::string, DataArgument>> folders, unnamed;
   const auto note = [&](const std::string& argument, const Status& status) {
     if (!status.ok()) found.errors.emplace_back(status.code(), prefix + Shown(argument) + ": " + status.message());
   };
@@ -358,9 +384,20 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
     if (!parsed.ok()) {
       found.errors.emplace_back(parsed.status().code(), prefix + parsed.status().message());
     } else if (parsed->name.empty()) {
-      folders.emplace_back(argument, *parsed);
+      (IsWatched(parsed->path) ? folders : unnamed).emplace_back(argument, *parsed);
     } else {
       note(argument, AddNamed(found, *parsed));
+    }
+  }
+  for (auto& [argument, volume] : unnamed) {
+    const std::string usual = NameOfSource(volume.path);
+    volume.name = usual;
+    for (int number = 2; HasName(found, volume.name); ++number) volume.name = fmt::format("{}-{}", usual, number);
+    const Status added = AddNamed(found, volume);
+    note(argument, added);
+    if (added.ok() && volume.name != usual) {
+      found.complaints.push_back(
+          fmt::format("{}: its dataset is named \"{}\", since \"{}\" is that of another file", volume.path, volume.name, usual));
     }
   }
   if (found.datasets.size() > kMaxListed) {
@@ -368,7 +405,10 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
         fmt::format("{}{} volumes are named, the catalogue has at most {}", prefix, found.datasets.size(), kMaxListed)));
     return found;
   }
-  for (const auto& [argument, folder] : folders) note(argument, AddFolder(found, folder.path));
+  for (const auto& [argument, folder] : folders) {
+    note(argument, folder.layers.any() ? Status::InvalidArgument("layers belong to one volume, and this is a folder to watch")
+                                       : AddFolder(found, folder.path));
+  }
   LeaveOutMost(found);
   return found;
 }
