@@ -177,8 +177,9 @@ void LeaveOutMost(FoundData& found) {
 
 // The files of a source, by its headers.
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
-  const Result<SourceText> source = ParseSourceText(data.path);
+  Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
+  source->options.describe = true;
   Result<std::vector<std::string>> files = CheckAnyVolumeHeaders(source->path, source->options);
   if (!files.ok() || !data.layers.any()) return files;
   const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
@@ -282,7 +283,7 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   WayToRead way{source->info().files, {}};
   if (in_parts) {
     way.read = [source, source_text = data.path, place = PlaceOf(data, text), text, progress] {
-      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
+      WarnOfPart(text.path, text.options, FileInfoOf(source->info()));
       return Surveyed(source, place, FindIndex(source_text, source->info()), *progress);
     };
   } else if (IsReadWhole(text.path, text.options)) {
@@ -310,7 +311,7 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   Result<SourceText> text = ParseSourceText(data.path);
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
-  text->options.describe = data.describe && !IsReadWhole(text->path, text->options);
+  text->options.describe = true;
   if (!data.layers.any()) {
     const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
     const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };

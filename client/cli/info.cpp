@@ -105,9 +105,7 @@ nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
 Result<VolumeFacts> FactsOf(const std::string& source) {
   ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
   const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
-  DataSource data(source, "");
-  data.describe = true;
-  Result<ReadableSource> read = ReadSource(data, std::uint64_t(kExactBytes), tell);
+  Result<ReadableSource> read = ReadSource(DataSource(source, ""), std::uint64_t(kExactBytes), tell);
   if (!read.ok()) return AsInput(read.status());
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};

@@ -170,6 +170,7 @@ Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& st
   Result<SourceText> text = ParseSourceText(source);
   if (!text.ok()) return text.status();
   text->options.progress = progress;
+  text->options.describe = true;
   const Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(text->path, text->options, context);
   if (!stream.ok()) return stream.status();
   const SourceInfo& info = (*stream)->info();

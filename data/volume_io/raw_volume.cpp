@@ -69,6 +69,7 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
 Status CheckChannel(const std::string& path, const RawHeader& header, const ReadOptions& options) {
   const int components = header.components;
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
+  if (!options.channel && options.describe) return Status::Ok();
   const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
   if (components == 1 && (options.channel.value_or(0) == 0 || !header.channels.empty())) return Status::Ok();
   if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");
