@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "client/request/named_colors.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/cli/parse.h"
 
@@ -31,7 +32,12 @@ std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
 
 Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text) {
   const std::vector<std::string_view> sides = Split(text, 'x');
-  if (sides.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  const auto no_digits = [](std::string_view side) {
+    return side.empty() || side.find_first_not_of("+-0123456789") != std::string_view::npos;
+  };
+  if (sides.size() > 2 || std::ranges::any_of(sides, no_digits)) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  }
   const Result<int> width = ParseInteger(option, sides.front(), 1, kMaxImageSide);
   if (!width.ok()) return width.status();
   const Result<int> height = ParseInteger(option, sides.back(), 1, kMaxImageSide);
@@ -133,7 +139,8 @@ Result<StraightColor> ParseColor(std::string_view option, std::string_view text)
   }
   const std::vector<std::string_view> parts = Split(text, ',');
   if (parts.size() != 3 && parts.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour", option, text));
+    return Status::InvalidArgument(
+        fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour{}", option, text, DidYouMean(text, kNamedColors)));
   }
   float channels[4] = {0, 0, 0, 1};
   for (std::size_t i = 0; i < parts.size(); ++i) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/classification/color_maps.h"
 #include "common/classification/histogram_analysis.h"
@@ -305,7 +306,8 @@ ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary)
 
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary) {
   if (const TransferPreset* preset = FindNamed(TransferPresets(), name)) return preset->make(summary);
-  return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}", name, NamesOf(TransferPresets())));
+  return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}{}", name, NamesOf(TransferPresets()),
+                                      DidYouMean(name, TransferPresets())));
 }
 
 }  // namespace slabstream

@@ -10,6 +10,7 @@
 
 #include "client/cli/interrupt.h"
 #include "commit.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/files.h"
 #include "common/base/find_named.h"
 #include "common/base/version.h"
@@ -110,7 +111,10 @@ void Find(const Experiment& experiment, ExperimentContext& context, const Machin
 
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
-  if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
+  if (experiment == nullptr) {
+    throw Failure(Status::NotFound(
+        fmt::format("NAME '{}' is no experiment (--list names them){}", options.name, DidYouMean(options.name, Experiments()))));
+  }
   if (experiment->takes_file && options.sweep_file.empty())
     throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' needs a FILE", options.name)));
   if (options.folder.empty()) throw Failure(Status::InvalidArgument("-o (--output) is missing: the folder for the results"));

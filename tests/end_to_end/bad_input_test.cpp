@@ -16,8 +16,15 @@ TEST_F(BadInputTest, CommandLines) {
   many[0] = "data";
   many[1] = "remove";
   const std::vector<Refusal> cases = {
-      {{}, "render, turntable"},
-      {{"rendr"}, "rendr"},
+      {{"rendr"}, "slabstream: there is no command 'rendr'"},
+      {{"rendr", "v"}, "; did you mean 'render'?"},
+      {{"keys", "lst"}, "slabstream keys: there is no command 'lst', but list, rotate, revoke"},
+      {{"help", "turntabel"}, "did you mean 'turntable'?"},
+      {{"render", "v", "--ouput", "x.png"}, "`slabstream render` has no option '--ouput'; did you mean '--output'?"},
+      {{"render", "v", "-o", "x.png", "-size", "5"}, "did you mean '--size'?"},
+      {{"render", "v", "--isovalue=", "-o", "x.png"}, "--isovalue has no value behind its '='"},
+      {{"up", "--thread=2"}, "did you mean '--threads'?"},
+      {{"experiment", "papr"}, "did you mean 'paper'?"},
       {{"render"}, "required"},
       {{"render", "v", "w", "-o", "x.png"}, "w"},
       {{"render", "v"}, "--output"},
@@ -46,7 +53,7 @@ TEST_F(BadInputTest, CommandLines) {
       {{"up", "--link", "bus:-1,5"}, "a latency in [0, 1000000] microseconds"},
       {{"status", "--endpoint", "tcp://0.0.0.0:1"}, "--endpoint"},
       {{"down", "--endpoint", "tcp://127.0.0.1:*"}, "--endpoint"},
-      {{"data"}, "required"},
+      {{"data"}, "slabstream data: a command is needed: list, add, remove, reload"},
       {{"data", "add"}, "DATA"},
       {{"data", "add", "a=x.nrrd"},
        "a=x.nrrd: the path must be absolute, since it is a path on the coordinator's host; on this host it would be /"},
