@@ -8,8 +8,10 @@
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -19,6 +21,7 @@
 #include "common/base/log.h"
 #include "common/base/open_files.h"
 #include "common/base/printable.h"
+#include "common/base/process_limits.h"
 #include "common/base/url.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
@@ -98,6 +101,12 @@ int RunMain(const std::string& name, const std::function<int()>& program) {
   int exit_status = 1;
   try {
     exit_status = program();
+  } catch (const std::bad_alloc&) {
+    std::cerr << name << ": there is no memory for this" << LimitsOf(Scarce::kMemory) << std::endl;
+  } catch (const std::system_error& error) {
+    const bool no_thread = error.code() == std::errc::resource_unavailable_try_again;
+    std::cerr << name << ": " << (no_thread ? "no further thread can be started" + LimitsOf(Scarce::kThreads) : Redacted(error.what()))
+              << std::endl;
   } catch (const std::exception& error) {
     std::cerr << name << ": " << Redacted(error.what()) << std::endl;
   }
