@@ -7,12 +7,14 @@
 #include <cctype>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/completion.h"
+#include "client/cli/help_pages.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"
 #include "common/base/log.h"
@@ -92,6 +94,7 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
 int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
   SetUp(app, fmt::format("slabstream {}", Version()));
+  app.set_help_all_flag("--help-all", "Print all options");
   app.require_subcommand(0, 1);  // so that words after a command are never taken for another command
   std::function<Status()> run;
   const std::string typed = fmt::format("{}", fmt::join(argv, argv + argc, " "));
@@ -107,6 +110,7 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
     sub->group(sub == options || sub == man || sub->get_name() == kAnnotateCommand ? kHidden : "Commands");
     AllowLogLevel(*sub, log_level);
   }
+  AddHelpPages(app);
   if (argc > 1 && argv[1] == kCompleteCommand) {  // before the parse: the words need not be complete
     return Finish("slabstream", RunComplete(app, std::vector<std::string>(argv + 2, argv + argc)));
   }

@@ -105,7 +105,8 @@ Json Describe(CLI::Option& option) {
 Json DescribeOptions(CLI::App& command) {
   Json options = Json::array();
   for (CLI::Option* option : command.get_options()) {
-    if (!option->get_group().empty() && option != command.get_help_ptr()) options.push_back(Describe(*option));
+    const bool help = option == command.get_help_ptr() || option == command.get_help_all_ptr();
+    if (!option->get_group().empty() && !help) options.push_back(Describe(*option));
   }
   return options;
 }

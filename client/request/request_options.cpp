@@ -84,7 +84,8 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
   if (!about.list().empty()) {
     Choices choices = ChoicesOf(about.list());
     option.choices = std::move(choices.names);
-    option.help += choices.explained;
+    const bool told_elsewhere = path == "overlay.preset";  // as --transfer
+    if (!told_elsewhere) option.help += choices.explained;
   }
   if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
   const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };

@@ -1,4 +1,6 @@
 // Bad input of every kind: exit status 2, one line on stderr that names what is wrong, nothing on stdout, no picture.
+#include <gmock/gmock.h>
+
 #include <fstream>
 
 #include "tests/end_to_end/program.h"
@@ -89,6 +91,17 @@ TEST_F(BadInputTest, CommandLines) {
       {{"turntable", "v", "--frames", "2", "--in-flight", "0", "-o", "%d.png"}, "--in-flight 0"},
   };
   ExpectEachRefused({}, cases);
+}
+
+TEST_F(BadInputTest, WhoTypesNoCommandSeesExamples) {
+  const std::string help = MustRun({}).out;
+  EXPECT_THAT(help, testing::HasSubstr("Examples:\n  slabstream view head.nii.gz"));
+  EXPECT_THAT(help, testing::HasSubstr("turntable"));
+  const std::string render = MustRun({"render", "--help"}).out, all = MustRun({"render", "--help-all"}).out;
+  EXPECT_THAT(render, testing::HasSubstr("options: slabstream render --help-all\n"));
+  EXPECT_THAT(render, testing::Not(testing::HasSubstr("--pixel-error")));
+  EXPECT_THAT(all, testing::HasSubstr("--pixel-error"));
+  EXPECT_EQ(render, MustRun({"help", "render"}).out);
 }
 
 TEST_F(BadInputTest, OptionsOfSlice) {
