@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
-#include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -65,28 +64,10 @@ bool IsOneVolume(const std::string& folder, const std::vector<fs::path>& volumes
 
 Status Repeated(const std::string& name) { return Status::InvalidArgument("there is already a dataset named \"" + name + "\""); }
 
-// Whether the file can only be read with options: samples without a header.
-bool NeedsOptions(const std::string& path) {
-  const VolumeFormat* const format = FindFormat(path, {});
-  return format != nullptr && !format->required.empty();
-}
-
-// Without samples that belong to the header beside them, as ball.raw does to ball.mhd.
-std::vector<std::string> WithoutSamplesOfHeaders(const std::vector<fs::path>& files) {
-  std::set<fs::path> headers;
-  std::vector<std::string> volumes;
-  for (const fs::path& file : files) {
-    if (!NeedsOptions(file.string())) headers.insert(file.stem());
-  }
-  for (const fs::path& file : files) {
-    if (!headers.contains(file.stem()) || !NeedsOptions(file.string())) volumes.push_back(file.string());
-  }
-  return volumes;
-}
-
 // Adds what is in the folder, by its names (NamesOfSources). What is named already has precedence.
 void AddContents(FoundData& found, const std::string& folder, const std::vector<fs::path>& files) {
-  const std::vector<std::string> volumes = IsOneVolume(folder, files) ? std::vector{folder} : WithoutSamplesOfHeaders(files);
+  std::vector<std::string> volumes = {folder};
+  if (!IsOneVolume(folder, files)) volumes.assign(files.begin(), files.end());
   const std::vector<std::string> names = NamesOfSources(volumes);
   for (std::size_t i = 0; i < volumes.size(); ++i) {
     const std::string usual = NameOfSource(volumes[i]);

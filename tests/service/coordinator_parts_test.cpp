@@ -435,13 +435,6 @@ TEST_F(CatalogueTest, EveryFileOfAFolderIsServed) {
   EXPECT_THAT(empty.complaints, testing::ElementsAre(HasSubstr("no volume file in this folder yet")));
 }
 
-TEST_F(CatalogueTest, SamplesOfAHeaderAreNoVolumeOfTheirOwn) {
-  Touch("ball.mhd");
-  Touch("ball.raw");
-  Touch("lone.raw");
-  EXPECT_THAT(NamesOf(ListFolder(directory_.string()).value()), testing::ElementsAre("ball", "lone"));
-}
-
 TEST_F(CatalogueTest, WhatHasNoNameIsNamedAfterItsFile) {
   const std::string head = Write("head.nrrd", 8), layer = Write("layer.nrrd", 5);
   std::filesystem::create_directories(directory_ / "brain.ome.zarr");
