@@ -16,6 +16,7 @@
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
+#include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/tuning/service_machine.h"
@@ -261,11 +262,11 @@ void DeclareClusters(const CommandLine& line) {
 void DeclareUp(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
   auto options = std::make_shared<UpOptions>();
-  options->listen = "tcp://127.0.0.1:7420";
+  options->listen = fmt::format("tcp://{}:7420", OwnHost());
   AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")
       ->default_str("one a core, but no more than one for each GiB of --memory");
   AddThreads(*sub, options->threads, "Render threads of each worker");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("[NAME=]FILE|FOLDER");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
             "Address of this machine for clients; port * takes any free port. An address that is not loopback gets keys")
       ->type_name("ENDPOINT")
@@ -295,6 +296,7 @@ void DeclareUp(const CommandLine& line) {
              "Serve metrics for Prometheus on loopback: the coordinator at this port, each worker at one of the next")
       ->type_name("PORT")
       ->default_str("no metrics");
+  sub->add_flag("--unlisted", options->unlisted)->group(kHidden);
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   AddLogLevel(*sub, line.log_level)->default_str("info for the processes that it starts, warning for itself");
   sub->callback([&run = line.run, options, &log_level = line.log_level] {
@@ -317,6 +319,7 @@ void DeclareView(const CommandLine& line) {
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
   AddService(*sub, options->service);
   AddCacheOption(*sub, options->cache);
+  options->listen = OwnHost() + ":0";
   sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
       ->type_name("HOST:PORT")
       ->default_str(options->listen);
@@ -380,7 +383,7 @@ void DeclareData(const CommandLine& line) {
   declare("list", "Print each dataset: state, size, samples and last error", DataAction::kList);
   const auto [add, add_options] =
       declare("add", "Add volumes, or folders to watch, until the coordinator ends; paths are on the coordinator's host", DataAction::kAdd);
-  add->add_option("DATA", add_options->order.items, "NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
+  add->add_option("DATA", add_options->order.items, "FILE, NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
       ->required();
   const auto [remove, remove_options] =
       declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files are not deleted, and running frames finish",
@@ -419,7 +422,7 @@ void DeclareSlurm(const CommandLine& line) {
       ->type_name("TIME")
       ->default_str("the partition's");
   AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("[NAME=]FILE|FOLDER");
   sub->add_option("--folder", options->folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
       ->type_name("FOLDER")
       ->default_str("the folder from which the job is submitted");

@@ -39,14 +39,15 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   AddService(app, connection.service);
 }
 
-// Whether this process renders SOURCE: --local says so, or the user names no service, none runs here, and SOURCE is a file. Then the number
-// of workers is known, too.
+// Whether this process renders SOURCE: --local says so, or the user names no service, and SOURCE is a file's path or, where none runs, a
+// file's name. Then the number of workers is known, too.
 bool RendersHere(const std::string& source, ConnectionOptions& connection) {
   const int suitable = WorkersWithin(connection.local_memory, std::min(WorkersForOneUser(), kMaxLocalWorkers));
   if (connection.local_workers == ConnectionOptions::kSuitableWorkers) connection.local_workers = suitable;
   if (connection.local_workers > 0) return true;
   const Result<ServiceChoice> named = NamedService(connection.service);
-  if (!named.ok() || !named->text().empty() || !NamesVolumeFile(source) || FindState("")) return false;
+  if (!named.ok() || !named->text().empty() || !NamesVolumeFile(source)) return false;
+  if (source.find('/') == std::string::npos && FindState("")) return false;  // a dataset may have this name
   connection.local_workers = suitable;
   connection.unasked = true;
   return true;

@@ -135,16 +135,17 @@ struct UpOptions {
   std::uint64_t cache = 0;        // bytes on disk, as slabstream-worker takes it; 0: none
   int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none
   bool detach = false;
+  bool unlisted = false;  // ServiceState::unlisted
   std::string log_level;  // of the processes that it starts; empty: info
 };
 
 struct ViewOptions {
   ServiceChoice service;
-  std::string source;                  // a volume file, or a dataset's name at the service
-  LayerFiles layers;                   // of a file
-  std::uint64_t cache = 0;             // of the service that it starts, as UpOptions::cache
-  std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
-  bool browser = true;                 // open it, if there is a display
+  std::string source;       // a volume file, or a dataset's name at the service
+  LayerFiles layers;        // of a file
+  std::uint64_t cache = 0;  // of the service that it starts, as UpOptions::cache
+  std::string listen;       // as slabstream-gateway takes it
+  bool browser = true;      // open it, if there is a display
 };
 
 struct DownOptions {

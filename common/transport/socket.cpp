@@ -69,7 +69,11 @@ constexpr std::int64_t kHandshakeBytes = 512;  // more than any part of a PLAIN 
 constexpr int kSealedBatch = 256;              // frames opened in one call: 64 MiB
 
 Status Failed(const std::string& endpoint, const zmq::error_t& error) {
-  if (error.num() == EADDRNOTAVAIL) return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address");
+  if (error.num() == EADDRNOTAVAIL) {
+    const bool loopback = endpoint.starts_with("tcp://127.");
+    return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address" +
+                                   (loopback ? "; one with IPv6 alone has [::1], as in tcp://[::1]:7420" : ""));
+  }
   return Status::Unavailable("endpoint \"" + endpoint + "\": " + (error.num() == EADDRINUSE ? "already in use" : error.what()));
 }
 

@@ -26,6 +26,8 @@ TEST_F(BadInputTest, CommandLines) {
       {{"render", "v", "-o", "x.png", "-size", "5"}, "did you mean '--size'?"},
       {{"render", "v", "--isovalue=", "-o", "x.png"}, "--isovalue has no value behind its '='"},
       {{"up", "--thread=2"}, "did you mean '--threads'?"},
+      {{"render", "no/v", "--endpoint", "ipc:///nobody", "-o", "x.png"}, "SOURCE no/v: no such file"},
+      {{"view", "no/v.nrrd"}, "SOURCE no/v.nrrd: no such file"},
       {{"experiment", "papr"}, "did you mean 'paper'?"},
       {{"render"}, "required"},
       {{"render", "v", "w", "-o", "x.png"}, "w"},
