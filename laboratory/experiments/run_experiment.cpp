@@ -141,7 +141,7 @@ ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, st
 int Scaled(const ExperimentOptions& options, int side) { return std::max(kLeastScaledSide, int(std::lround(side * options.scale))); }
 
 void ExperimentContext::Run(std::vector<Trial> trials) {
-  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? 1 : kRankingRepeats;
+  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? kQuickRepeats : kRankingRepeats;
   trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
   // Before and after: a machine that became slower shows.
