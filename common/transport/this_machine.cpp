@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -27,9 +28,11 @@ bool NobodyListens(const Endpoint& endpoint) {
     four.sin_port = htons(static_cast<std::uint16_t>(endpoint.port));
     bytes = sizeof(four);
   }
-  const int descriptor = ::socket(address.ss_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int descriptor = ::socket(address.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (descriptor < 0) return false;
-  // On the loopback the answer comes at once.
+  // On the loopback the answer comes at once, unless a full queue or a firewall swallows the question.
+  const timeval patience{1, 0};
+  (void)::setsockopt(descriptor, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
   const bool refused = ::connect(descriptor, reinterpret_cast<const sockaddr*>(&address), bytes) != 0 && errno == ECONNREFUSED;
   ::close(descriptor);
   return refused;
