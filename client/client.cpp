@@ -96,6 +96,11 @@ struct Client::Impl {
     if (socket.refused() && !has_keys) {
       return Status::InvalidArgument("the service at " + endpoint + " has keys: name its service file, client.json (--service)");
     }
+    // Whoever listens with keys may end the connection before its greeting, which says so, has come.
+    if (!has_keys && !socket.connected() && !socket.local_host().empty()) {
+      return Status::Unavailable("no service answers at " + endpoint + ", but somebody listens there; a service with keys needs its " +
+                                 "service file, client.json (--service)");
+    }
     if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
     return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
   }
