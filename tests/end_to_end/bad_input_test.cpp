@@ -96,7 +96,7 @@ TEST_F(BadInputTest, CommandLines) {
 }
 
 TEST_F(BadInputTest, WhoTypesNoCommandSeesExamples) {
-  const std::string help = MustRun({}).out;
+  const std::string help = Slabstream({}).out;
   EXPECT_THAT(help, testing::HasSubstr("Examples:\n  slabstream view head.nii.gz"));
   EXPECT_THAT(help, testing::HasSubstr("turntable"));
   const std::string render = MustRun({"render", "--help"}).out, all = MustRun({"render", "--help-all"}).out;
