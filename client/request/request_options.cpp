@@ -84,7 +84,7 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
   if (!about.list().empty()) {
     Choices choices = ChoicesOf(about.list());
     option.choices = std::move(choices.names);
-    const bool told_elsewhere = path == "overlay.preset";  // as --transfer
+    const bool told_elsewhere = option.path == "overlay.preset";  // as --transfer
     if (!told_elsewhere) option.help += choices.explained;
   }
   if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
