@@ -221,15 +221,18 @@ class Gateway::Impl : public HttpApplication {
         std::invoke(method, *requests, *std::move(fields), std::move(reply), request.gone);
       };
     };
-    const auto picture = [this](auto method) {
-      return [this, method](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
+    const auto picture = [this](auto method, PictureFileType type) {
+      return [this, method, type](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
         Result<PictureFields> fields = FieldsOf(target, request);
         if (!fields.ok()) return reply(Failure(fields.status()));
-        std::invoke(method, *pictures_, *std::move(fields), std::move(reply), request.gone, std::move(trace));
+        std::invoke(method, *pictures_, type, *std::move(fields), std::move(reply), request.gone, std::move(trace));
       };
     };
-    routes["/api/v1/render.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render)};
-    routes["/api/v1/slice.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice)};
+    for (const PictureFileTypeNames& names : PictureFileTypes()) {
+      const auto route = [&](const char* kind) -> Route& { return routes[fmt::format("/api/v1/{}{}", kind, names.ending)]; };
+      route("render") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render, names.type)};
+      route("slice") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice, names.type)};
+    }
     routes["/api/v1/command"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Command)};
     routes["/api/v1/turntable.mp4"] = {.takes_post = true, .handle = bind(movies_, &MovieRequests::Turntable)};
     routes["/api/v1/histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Histogram)};

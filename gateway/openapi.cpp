@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "client/image_io/picture_file_type.h"
 #include "client/movie/turntable.h"
 #include "client/request/picture_fields.h"
 #include "common/base/version.h"
@@ -81,7 +82,9 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
 }
 
 struct Operation {
-  const char *path, *summary, *type;
+  const char* path;
+  std::string summary;
+  const char* type;
   bool open = false;
   Json fields = Json::array();
   bool takes_post = false;
@@ -136,8 +139,11 @@ Json OpenApi() {
        true},
       {"/api/v1/status", "The service: workers, frames, memory", "application/json"},
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
-      {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, render, true},
-      {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
+      {"/api/v1/render.png", "A picture, as `slabstream render` makes it; other endings make other files: " + PictureEndings(), "image/png",
+       false, render, true},
+      {"/api/v1/slice.png",
+       "Planes through a volume, as `slabstream slice` makes them; other endings make other files: " + PictureEndings(), "image/png", false,
+       SliceFields(), true},
       {"/api/v1/turntable.mp4", "A movie, as `slabstream turntable` makes it, sent while it is made", "video/mp4", false,
        With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("{}", kMovieFrames)), field("turns", kTurnsHelp, "NUMBER", "1"),
                      field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second))}),

@@ -61,7 +61,8 @@ Status TurntableMovie::RenderAndEncode() {
     if (i == 0) key = rendered->key;
     const Picture& picture = rendered->pictures.front();
     metrics_.CountFrame(picture.statistics, picture.latency);
-    const auto composed = ComposedPicture::Make(picture.image, picture.size, request_.render.format, picture.geometry, key);
+    const auto composed =
+        ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(request_.render.format), picture.geometry, key);
     if (!composed.ok()) return composed.status();
     const std::vector<std::byte> frame = MovieFrame(*composed);
     // Not before there is a frame: so an error of the service comes before the first byte.

@@ -11,6 +11,7 @@
 #include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/value.h"
+#include "client/image_io/picture_file_type.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
 #include "client/request/layer_options.h"
@@ -35,7 +36,7 @@ void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Option
 void DeclareRender(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("render", "Render one picture of a volume");
   auto options = std::make_shared<RenderOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
+  sub->add_option("-o,--output", options->output, "The picture: " + PictureEndings())->required()->type_name("FILE")->group(kOutputGroup);
   AddFrameOptions(*sub, options->frame);
   AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
   RunWith(*sub, line.run, options, RunRender);
@@ -77,7 +78,7 @@ void DeclareTurntable(const CommandLine& line) {
 void DeclareSlice(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("slice", "Render planes or thick slabs of a volume");
   auto options = std::make_shared<SliceOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
+  sub->add_option("-o,--output", options->output, "The picture: " + PictureEndings())->required()->type_name("FILE")->group(kOutputGroup);
   AddSliceOptions(*sub, *options);
   RunWith(*sub, line.run, options, RunSlice);
 }
@@ -143,7 +144,7 @@ void DeclareTransfer(const CommandLine& line) {
   sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values");
   CLI::Option* const list =
       sub->add_flag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");
-  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture, .png or .exr")
+  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture: " + PictureEndings())
       ->type_name("FILE")
       ->needs(list);
   AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);

@@ -120,8 +120,10 @@ void Send(const FrameOptions& options, const std::string& command, Time begin, c
   if (!status.ok()) PrintWarning("--otlp: " + status.message());
 }
 
-std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options, const PictureKey& key) {
-  return std::make_unique<PictureFiles>(options.format, key, options.record, options.layers);
+// `output`: one of the files.
+Result<std::unique_ptr<PictureSink>> FilesOf(const FrameOptions& options, const PictureKey& key, const std::string& output) {
+  if (Status status = CheckCanWritePicture(output); !status.ok()) return status;
+  return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.format, key, options.record, options.layers));
 }
 
 MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}) {
@@ -131,9 +133,14 @@ MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}
   return movie;
 }
 
+// Where frame `index` goes.
+std::string FileOf(const TurntableOptions& options, int index) {
+  return options.output.movie.empty() ? options.output.pictures.Name(index) : options.output.movie;
+}
+
 // Where the frames of a turntable go.
 Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const PictureKey& key) {
-  if (options.output.movie.empty()) return FilesOf(options.frame, key);
+  if (options.output.movie.empty()) return FilesOf(options.frame, key, FileOf(options, 0));
   Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options, key));
   if (!movie.ok()) return movie.status();
   return std::unique_ptr<PictureSink>(*std::move(movie));
@@ -157,11 +164,6 @@ Result<TurntableOptions> WithTimesOfSource(TurntableOptions options) {
   return options;
 }
 
-// Where frame `index` goes.
-std::string FileOf(const TurntableOptions& options, int index) {
-  return options.output.movie.empty() ? options.output.pictures.Name(index) : options.output.movie;
-}
-
 // What is wrong with the options as a whole, before work begins.
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
@@ -175,7 +177,7 @@ Status CheckTurntable(const TurntableOptions& options) {
   } else if (options.frames_per_second) {
     return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
                                                *options.frames_per_second, MovieEndings(), first_output));
-  } else if (Status status = CheckCanWritePicture(first_output); !status.ok()) {
+  } else if (Status status = CheckPictureFile(first_output, options.frame.request.size); !status.ok()) {
     return status;
   }
   return CheckPaths(options.frame, first_output);
@@ -206,9 +208,9 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
 
 Status RunRender(const RenderOptions& options) {
   const Time start = MonotonicNow();
-  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
+  if (Status status = CheckPictureFile(options.output, options.frame.request.size); !status.ok()) return status;
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key); };
+  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key, options.output); };
   const auto frames =
       RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();

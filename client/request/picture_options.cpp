@@ -78,7 +78,17 @@ void AddPictureFormat(CLI::App& app, PictureFormat& format) {
       "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, which "
       "is black in a movie)")
       ->type_name("COLOUR");
-  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
+  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG or TIFF: 8 or 16")
+      ->default_str("8");
+  AddInteger(app, "--quality", format.quality, 1, 100, "Quality of a JPEG or WebP");
+  const auto dots = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxDotsPerInch); };
+  CLI::Option* const dpi =
+      AddParsed(app, "--dpi", format.dots_per_inch, dots,
+                "Pixels an inch, as the file states them: the size of a figure in print, and of the page of a PDF or SVG")
+          ->type_name("N")
+          ->default_str(
+              fmt::format("{} for pages and --font-size; other files of patients state the size of pixels there", kUsualDotsPerInch));
+  NoteRange(dpi, {1, kMaxDotsPerInch});
 }
 
 void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
@@ -101,6 +111,13 @@ void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
       "The colours of the transfer function with their data values; CAPTION stands above them, such as a unit")
       ->type_name("[=CAPTION]");
   app.add_flag("--legend", annotations.legend, "Names and colours of the labels that are shown, and of isosurfaces");
+  const NumberRange sizes{kMinFontSize, kMaxFontSize};
+  const auto points = [sizes](const std::string& option, const std::string& text) { return ParseNumber(option, text, sizes); };
+  CLI::Option* const font =
+      AddParsed(app, "--font-size", annotations.font_size, points, "Size of the letters in points, of which 72 make an inch")
+          ->type_name("NUMBER")
+          ->default_str("1/31 of the picture's shorter side, at least 11 pixels");
+  NoteRange(font, sizes);
 }
 
 }  // namespace

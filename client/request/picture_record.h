@@ -3,7 +3,8 @@
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
 //    "layers": {"labels", "overlay"},                                     likewise, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
-//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend"},
+//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend", "font_size",
+//                "quality", "dpi"},
 //    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"},
 //    "levels": [2]}                                                       that the picture was drawn from, if not from level 0 alone
 //

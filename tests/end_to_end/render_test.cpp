@@ -232,20 +232,27 @@ TEST_F(RenderTest, AFontBesideTheProgramComesFirst) {
   EXPECT_EQ(result.err, "slabstream annotate: the font '" + Path("DejaVuSans-Bold.ttf") + "' cannot be read\n");
 }
 
-// Copied without libslabstream-pictures.so, the program says so before it looks for the service.
+// Copied without libslabstream-pictures.so, the program writes what it encodes itself. Of other files it says so before it makes a picture,
+// but after it has looked at its arguments and files.
 TEST_F(RenderTest, AnEncoderThatIsNotThereIsToldBeforeTheWorkBegins) {
   std::filesystem::copy_file(Command({}).front(), Path("slabstream"));
-  const std::string endpoint = "ipc://" + Path("none");
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"render", "-o", "a.png"}, {"turntable", "--frames", "2", "-o", "a%d.png"}, {"slice", "-o", "a.png"}}) {
-    std::vector<std::string> command = {Path("slabstream")};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    command.insert(command.end(), {"ball", "--endpoint", endpoint});
-    const ProgramResult result = RunningProgram(command, directory_).Wait();
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), Path("slabstream"));
+    arguments.insert(arguments.end(), {"--local=1", "--size", "16"});
+    return RunningProgram(arguments, directory_).Wait();
+  };
+  for (const std::string name : {"a.png", "a.jpg", "a.webp"}) EXPECT_EQ(run({"render", ball_, "-o", name}).exit_status, 0) << name;
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"render", ball_, "-o", "a.exr"},
+                                                    {"turntable", ball_, "--frames", "2", "-o", "a%d.tif"},
+                                                    {"slice", ball_, "-o", "a.pdf"}}) {
+    const ProgramResult result = run(arguments);
     EXPECT_EQ(result.exit_status, 1) << arguments[0];
     ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
-    EXPECT_THAT(result.err, HasSubstr("pictures cannot be written: libslabstream-pictures.so: ")) << arguments[0];
+    EXPECT_THAT(result.err, HasSubstr("only .png, .jpg and .webp can be written: libslabstream-pictures.so: ")) << arguments[0];
   }
+  const ProgramResult missing = run({"render", "missing.nrrd", "-o", "a.exr"});
+  EXPECT_EQ(missing.exit_status, 2);
+  EXPECT_THAT(missing.err, HasSubstr("missing.nrrd"));
 }
 
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {

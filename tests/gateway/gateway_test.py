@@ -151,6 +151,22 @@ class HttpTest(WithService):
                 posted = self.gateway.request(f"/api/v1/{kind}.png", method="POST", body=json.dumps(options))
                 self.assertEqual(posted[2], file)
 
+    def test_other_endings_make_other_files(self):
+        options = {"dataset": "a", "size": 60, "dpi": 200, "font-size": 9.5, "title": "A", "quality": 70, "background": "white"}
+        arguments = [f"--{name}={value}" for name, value in options.items() if name != "dataset"]
+        for ending, media in (("jpg", "image/jpeg"), ("webp", "image/webp"), ("tif", "image/tiff"), ("exr", "image/x-exr"),
+                              ("pdf", "application/pdf"), ("svg", "image/svg+xml")):
+            with self.subTest(ending=ending):
+                self.programs.run("render", "a", "--endpoint", self.endpoint, "-o", f"file.{ending}", *arguments)
+                status, headers, body = self.get(f"/api/v1/render.{ending}", **options)
+                self.assertEqual((status, headers["Content-Type"]), (200, media))
+                if ending != "svg":  # cairo counts the parts of its pictures in a process, and names them by their numbers
+                    self.assertEqual(body, (self.programs.folder / f"file.{ending}").read_bytes())
+        self.assertTrue(self.get("/api/v1/slice.pdf", dataset="a", size=40, plane="zyx")[2].startswith(b"%PDF"))
+        self.assertEqual(self.get("/api/v1/render.gif", dataset="a")[0], 404)
+        status, body = self.gateway.json("/api/v1/slice.webp?dataset=a&size=8000x10&plane=zyx")
+        self.assertEqual((status, body["error"]), (400, "--size 24000x10 is too large for .webp, which has at most 16383 pixels a side"))
+
     def test_a_colour_bar_has_a_caption_or_none(self):
         options = {"dataset": "a", "size": 200}
         plain, bare, named = (self.get("/api/v1/render.png", **options, **bar)[2] for bar in ({}, {"color-bar": ""}, {"color-bar": "K"}))
