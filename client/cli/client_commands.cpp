@@ -10,6 +10,7 @@
 #include "client/cli/cores.h"
 #include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
+#include "client/cli/picture_orders.h"
 #include "client/cli/value.h"
 #include "client/image_io/picture_file_type.h"
 #include "client/movie/movie_format.h"
@@ -34,10 +35,14 @@ void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Option
 }
 
 void DeclareRender(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("render", "Render one picture of a volume");
+  CLI::App* sub = line.app.add_subcommand("render", "Render a picture of a volume, or of each of several");
   auto options = std::make_shared<RenderOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: " + PictureEndings())->required()->type_name("FILE")->group(kOutputGroup);
-  AddFrameOptions(*sub, options->frame);
+  sub->add_option("-o,--output", options->output,
+                  fmt::format("The picture: {}; of several SOURCEs, with {} in the place of their names", PictureEndings(), kNamePlace))
+      ->required()
+      ->type_name("FILE")
+      ->group(kOutputGroup);
+  AddFrameOptions(*sub, options->frame, {}, &options->sources);
   AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
   RunWith(*sub, line.run, options, RunRender);
 }

@@ -51,9 +51,16 @@ struct FrameOptions {
   bool progress = false;
 };
 
+// A volume, and the transfer function that it is shown with.
+struct SourceChoice {
+  std::string source;
+  TransferChoice transfer;
+};
+
 struct RenderOptions {
-  FrameOptions frame;
-  std::string output;
+  FrameOptions frame;                 // of each picture; its source and transfer function are those of `sources`
+  std::vector<SourceChoice> sources;  // at least one
+  std::string output;                 // with several sources: PictureOrders
 };
 
 inline constexpr int kMaxInFlight = 64;

@@ -15,6 +15,7 @@
 #include "client/cli/movie.h"
 #include "client/cli/picture_files.h"
 #include "client/cli/picture_keys.h"
+#include "client/cli/picture_orders.h"
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
@@ -75,10 +76,10 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
 }
 
 // The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
+// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`, `label`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
 Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight, std::vector<Status>* failures) {
+                                                int in_flight, std::vector<Status>* failures, const std::string& label = "") {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
@@ -94,6 +95,7 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty() || options.collector;
   loop.failures = failures;
   loop.progress = options.progress;
+  loop.label = label;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
   WarnOf(connection->client(), jobs.front().request, frames->front().empty);
@@ -204,21 +206,40 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   return jobs;
 }
 
+// `label` begins each line of progress.
+Status RenderOne(const PictureOrder& order, const std::string& label) {
+  const Time start = MonotonicNow();
+  const FrameOptions& frame = order.frame;
+  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(frame, key, order.output); };
+  const auto frames = RenderPictures(frame, {{frame.request, order.output, frame.source}}, open_pictures, 1, nullptr, label);
+  if (!frames.ok()) return frames.status();
+  const ImageSize size = frame.request.size;
+  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", order.output, size.width, size.height,
+                           Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
+  Send(frame, "render", start, *frames, {});
+  return Status::Ok();
+}
+
 }  // namespace
 
 Status RunRender(const RenderOptions& options) {
-  const Time start = MonotonicNow();
-  if (Status status = CheckPictureFile(options.output, options.frame.request.size); !status.ok()) return status;
-  if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key, options.output); };
-  const auto frames =
-      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
-  if (!frames.ok()) return frames.status();
-  const ImageSize size = options.frame.request.size;
-  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
-                           Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
-  Send(options.frame, "render", start, *frames, {});
-  return Status::Ok();
+  const Result<std::vector<PictureOrder>> orders = PictureOrders(options);
+  if (!orders.ok()) return orders.status();
+  for (const PictureOrder& order : *orders) {
+    if (Status status = CheckPictureFile(order.output, order.frame.request.size); !status.ok()) return status;
+    if (Status status = CheckPaths(order.frame, order.output); !status.ok()) return status;
+  }
+  if (orders->size() == 1) return RenderOne(orders->front(), "");
+  std::vector<Status> failures;
+  for (const PictureOrder& order : *orders) {
+    const std::string& source = order.frame.source;
+    const Status status = RenderOne(order, source);
+    if (status.code() == StatusCode::kCancelled) return status;
+    if (status.ok()) continue;
+    const bool named = status.message().find(source) != std::string::npos;
+    failures.push_back(named ? status : Status(status.code(), fmt::format("SOURCE {}: {}", source, status.message())));
+  }
+  return ReportAll("slabstream render", failures);
 }
 
 Status RunTurntable(const TurntableOptions& given) {

@@ -255,6 +255,51 @@ TEST_F(RenderTest, AnEncoderThatIsNotThereIsToldBeforeTheWorkBegins) {
   EXPECT_THAT(missing.err, HasSubstr("missing.nrrd"));
 }
 
+TEST_F(RenderTest, SeveralSourcesMakeAPictureEach) {
+  std::filesystem::copy_file(ball_, Path("other.nrrd"));
+  std::filesystem::copy_file(ball_, Path("ball two.nrrd"));
+  MustRun({"render", ball_, "other.nrrd:opaque", "ball two.nrrd", "--local=1", "--size", "20", "-o", "{name}.png", "--stats", "{name}.json",
+           "--no-record"});
+  for (const std::string name : {"ball", "other", "ball_two"}) {
+    EXPECT_THAT(Files(), Contains(name + ".png"));
+    EXPECT_THAT(Files(), Contains(name + ".json"));
+  }
+  EXPECT_EQ(ReadFile("ball.png"), ReadFile("ball_two.png"));
+  EXPECT_NE(ReadFile("ball.png"), ReadFile("other.png")) << "another transfer function";
+
+  // One that fails does not stop the others, and is named.
+  std::filesystem::remove(Path("other.png"));
+  std::ofstream(Path("broken.nrrd")) << "NRRD0004\nno header\n";
+  const ProgramResult some =
+      Slabstream({"render", "missing.nrrd", "broken.nrrd", "other.nrrd", "--local=1", "--size", "20", "-o", "{name}.png", "--progress"});
+  EXPECT_EQ(some.exit_status, 2);
+  EXPECT_THAT(some.out, HasSubstr("rendered other.png"));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("slabstream render: SOURCE missing.nrrd: no such file")));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("broken.nrrd")));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("other.nrrd: frame 1 of 1: done")));
+}
+
+TEST_F(RenderTest, FilesOfSeveralSourcesNeedDifferentNames) {
+  std::filesystem::create_directory(Path("more"));
+  std::filesystem::copy_file(ball_, Path("more/ball.nrrd"));
+  std::filesystem::copy_file(ball_, Path("other.nrrd"));
+  const auto expect = [&](std::vector<std::string> arguments, const std::string& complaint) {
+    arguments.insert(arguments.begin(), "render");
+    arguments.insert(arguments.end(), {"--local=1", "--size", "20"});
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2);
+    EXPECT_THAT(result.err, HasSubstr(complaint));
+    EXPECT_EQ(result.err_lines().size(), 1U);
+  };
+  const std::vector<std::string> before = Files();
+  expect({ball_, "other.nrrd", "-o", "a.png"}, "--output 'a.png' has no place for {name}, which 2 SOURCEs need");
+  expect({ball_, "other.nrrd", "-o", "{name}.png", "--trace", "t.json"}, "--trace 't.json' has no place for {name}");
+  expect({ball_, "more/ball.nrrd", "-o", "{name}.png"}, "have the same name, ball, so their pictures would be one file");
+  EXPECT_EQ(Files(), before) << "nothing was done";
+  MustRun({"render", ball_, "--local=1", "--size", "20", "-o", "one-{name}.png"});
+  EXPECT_THAT(Files(), Contains("one-ball.png"));
+}
+
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
   const PictureFile picture = Render("ball.png", {"--zoom", "0.001"});
   EXPECT_EQ(picture.width, kPixels);
