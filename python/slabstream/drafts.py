@@ -223,6 +223,16 @@ def _depth(draft: Draft, option: Option, value: Any) -> None:
     draft.format = dataclasses.replace(draft.format, png_bits=(8, 16)[values.choice(option.name, value, option.choices)])
 
 
+def _format(field: str) -> Put:
+    """A whole number of PictureFormat."""
+
+    def put(draft: Draft, option: Option, value: Any) -> None:
+        number = values.integer(option.name, value, int(option.least), int(option.most))
+        draft.format = dataclasses.replace(draft.format, **{field: number})
+
+    return put
+
+
 def _annotation(parse: Callable[[Option, Any], Any]) -> Put:
     def put(draft: Draft, option: Option, value: Any) -> None:
         annotations = dataclasses.replace(draft.format.annotations, **{option.name: parse(option, value)})
@@ -261,6 +271,9 @@ _PUT: dict[str, Put] = {
     "camera": _camera,
     "background": _background,
     "depth": _depth,
+    "quality": _format("quality"),
+    "dpi": _format("dots_per_inch"),
+    "font_size": _annotation(lambda option, value: values.number(option.name, value, option.least, option.most)),
     "title": _annotation(_line),
     "scale_bar": _annotation(lambda option, value: values.flag(option.name, value)),
     "orientation_marker": _annotation(lambda option, value: values.flag(option.name, value)),

@@ -8,6 +8,7 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -106,10 +107,25 @@ class AtAService(WithAService):
         image = self.service.render("head", size=20)
         image.save(self.folder / "a.PNG")
         self.assertEqual((self.folder / "a.PNG").read_bytes(), image.png())
-        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png or .exr"):
+        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png, .*, .pdf or .svg"):
             image.save("a.gif")
         with self.assertRaisesRegex(ss.Unavailable, "cannot write '.*none/a.png': No such file"):
             image.save(self.folder / "none" / "a.png")
+
+    def test_other_types_are_those_of_the_command_line(self) -> None:
+        options = dict(size=(60, 50), dpi=200, font_size=9, title="A head", scale_bar=True, quality=60, background="white", azimuth=30)
+        image = self.service.render("head", **options)
+        arguments = ["--size=60x50", "--dpi=200", "--font-size=9", "--title=A head", "--scale-bar", "--quality=60", "--background=white", "--azimuth=30"]
+        image.save(self.folder / "a.svg")
+        self.assertIn(b"<image", (self.folder / "a.svg").read_bytes())
+        for ending in ("jpg", "webp", "tif", "pdf"):
+            image.save(self.folder / f"a.{ending}")
+            self.running.run("render", "head", "-o", f"b.{ending}", "--no-record", "--endpoint", self.running.endpoint, *arguments)
+            self.assertEqual((self.folder / f"a.{ending}").read_bytes(), (self.folder / f"b.{ending}").read_bytes(), ending)
+        self.assertIn(struct.pack(">II", round(200 / 0.0254), round(200 / 0.0254)), image.png())
+        image.save(self.folder / "a.tif", bits=16)
+        with self.assertRaisesRegex(ss.InvalidArgument, "bits is 16, but samples of .jpg have 8"):
+            image.save("a.jpg", bits=16)
 
     def test_openexr_has_the_samples_of_the_command_line(self) -> None:
         for renderer, size in (("zbuffer", (37, 21)), ("raycast", (50, 33))):
