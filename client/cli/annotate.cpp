@@ -121,7 +121,7 @@ Result<Order> ParseOrder(const std::string& text) {
     if (opaque) order.format.background = {float(channels[0]), float(channels[1]), float(channels[2]), 1};
   };
   const auto file = [&](const JsonValue& v) {
-    order.file = PictureFileTypeOf("." + v.Text());
+    order.file = PictureFileTypeOf("picture." + v.Text());
     if (!order.file) v.Complain("is no ending of pictures");
   };
   JsonValue(*json, "", mistake)
