@@ -43,6 +43,7 @@ const std::vector<PictureFields> kFields = {
     {{"background", "#102030"}, {"depth", "16"}, {"title", "A & B = \"C\" --size=1"}, {"scale-bar", ""}},
     {{"color-bar", "K"}, {"legend", "true"}, {"orientation-marker", ""}},
     {{"color-bar", ""}, {"legend", ""}},
+    {{"dpi", "300"}, {"font-size", "9.5"}, {"quality", "40"}, {"title", "x"}},
     {{"renderer", "raycast"}, {"label-mode", "surface"}, {"labels-shown", "1,5-9"}, {"overlay-transfer", "gray-ramp"}},
     {{"decomposition", "kd-tree"}, {"groups", "auto"}, {"combine", "radix-k:2x2"}, {"pixel-error", "1e-4"}},
 };
@@ -55,6 +56,8 @@ TEST(PictureFieldsTest, AskForWhatTheCommandLineAsksFor) {
     EXPECT_EQ(render->frame, typed.request);
     EXPECT_EQ(render->format.background, typed.format.background);
     EXPECT_EQ(render->format.png_bits, typed.format.png_bits);
+    EXPECT_EQ(render->format.quality, typed.format.quality);
+    EXPECT_EQ(render->format.dots_per_inch, typed.format.dots_per_inch);
     EXPECT_EQ(render->format.annotations, typed.format.annotations);
   }
 }

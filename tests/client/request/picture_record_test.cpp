@@ -97,6 +97,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--title=-x"},
     {"--color-bar", "--legend"},
     {"--color-bar=velocity (m/s)"},
+    {"--title", "x", "--font-size", "9.5", "--dpi", "300", "--quality", "75"},
     {"--previews"},
 };
 
@@ -114,6 +115,8 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       ExpectSame(record.request, typed.request);
       EXPECT_EQ(record.format.background, typed.format.background);
       EXPECT_EQ(record.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(record.format.quality, typed.format.quality);
+      EXPECT_EQ(record.format.dots_per_inch, typed.format.dots_per_inch);
       EXPECT_EQ(record.format.annotations, typed.format.annotations);
 
       std::vector<std::string> again = RenderArguments(record, "b.png");
@@ -127,6 +130,8 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       ExpectSame(parsed.request, typed.request);
       EXPECT_EQ(parsed.format.background, typed.format.background);
       EXPECT_EQ(parsed.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(parsed.format.quality, typed.format.quality);
+      EXPECT_EQ(parsed.format.dots_per_inch, typed.format.dots_per_inch);
       EXPECT_EQ(parsed.format.annotations, typed.format.annotations);
     }
   }
