@@ -12,11 +12,11 @@
 namespace slabstream {
 namespace {
 
-HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
+HttpReply PngReply(const Result<std::vector<std::byte>>& png, const std::string& renderer) {
   if (!png.ok()) return Failure(png.status());
   return {.type = "image/png",
           .body = std::string(reinterpret_cast<const char*>(png->data()), png->size()),
-          .headers = {{"Cache-Control", "no-store"}}};
+          .headers = {{"Cache-Control", "no-store"}, {"Slabstream-Renderer", renderer}}};
 }
 
 }  // namespace
@@ -40,10 +40,11 @@ void PictureRequests::MakePng(std::vector<FrameRequest> frames, const PictureFor
       auto held = std::make_shared<ServiceLink::Rendered>(*std::move(rendered));
       boost::asio::post(encoders_, [this, encode, finish, held, trace] {
         const Time begin = MonotonicNow();
+        const std::string renderer = held->pictures.front().statistics.renderer;
         auto png = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
         if (png->ok()) metrics_.CountPicture("file", (*png)->size(), MonotonicNow() - begin);
         if (trace != nullptr) trace->AddEncoding(begin);
-        finish([png] { return PngReply(*png); });
+        finish([png, renderer] { return PngReply(*png, renderer); });
       });
     };
     return link_.Render(std::move(frames), annotations, kAnswerDeadline, {.progress = {}, .done = done});

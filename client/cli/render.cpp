@@ -213,8 +213,9 @@ Status RunRender(const RenderOptions& options) {
       RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
-  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
-                           Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
+  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms ({}, frame {:.0f} ms)\n", options.output, size.width, size.height,
+                           Milliseconds(MonotonicNow() - start), frames->front().statistics.renderer,
+                           Milliseconds(frames->front().latency));
   Send(options.frame, "render", start, *frames, {});
   return Status::Ok();
 }

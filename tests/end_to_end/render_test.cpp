@@ -257,6 +257,7 @@ TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
 TEST_F(RenderTest, SaysWhatItDidAndHowFarItIs) {
   const ProgramResult result = MustRun({"render", ball_, "--local=2", "--groups", "2", "-o", "ball.png", "--size", "40x30", "--progress"});
   EXPECT_THAT(result.out, HasSubstr("rendered ball.png 40x30 in "));
+  EXPECT_THAT(result.out, HasSubstr(" ms (splat, frame ")) << "which renderer was chosen";
   EXPECT_THAT(result.err_lines(), Contains(HasSubstr("frame 1 of 1: done")));
   EXPECT_EQ(result.err.find('\r'), std::string::npos);  // no terminal, no bar
 }
