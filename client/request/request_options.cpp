@@ -54,8 +54,8 @@ Choices ChoicesOf(const std::string& list) {
   if (list == "balances") add_all(Balances());
   if (list == "presets") add_all(TransferPresets());
   if (list == "renderers") {
-    choices.Add(kAutomatic,
-                fmt::format("{} for volumes, {} for unstructured grids", DefaultRenderer(false).name(), DefaultRenderer(true).name()));
+    choices.Add(kAutomatic, fmt::format("{} for volumes, {} for unstructured grids, or the first of these that can do what is asked",
+                                        DefaultRenderer(false).name(), DefaultRenderer(true).name()));
     for (const RendererKind* kind : Renderers()) choices.Add(kind->name(), kind->purpose());
   }
   if (list == "combining schemes") {

@@ -190,10 +190,9 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
   const VolumeGeometry& overview = levels.overview->description.geometry;
-  FrameRequest seen = AtLevel(request, finest, overview);
-  seen.shading = {};  // light changes no level, and here there is no level to make a light volume from
-  const Result<ResolvedRequest> resolved = ResolveRequest(std::move(seen), 1, levels.overview);
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview);
   if (!resolved.ok()) return resolved.status();
+  resolved->frame.shading = {};  // light changes no level, and here there is no level to make a light volume from
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   const Camera& camera = setup->camera;

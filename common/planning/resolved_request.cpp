@@ -8,6 +8,7 @@
 
 #include "common/base/find_named.h"
 #include "common/renderers/registry.h"
+#include "common/renderers/renderer_choice.h"
 
 namespace slabstream {
 namespace {
@@ -104,26 +105,18 @@ void Brighten(double factor, TransferFunction& transfer) {
   for (TransferRegion& region : transfer.regions) region.color = Brightened(region.color, factor);
 }
 
-// `asked`: the renderer's name in the request.
-Status CheckShowsRegions(const RendererKind& renderer, std::string_view asked, const TransferFunction& transfer) {
-  if (transfer.regions.empty() || renderer.Can(Ability::kRegions)) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("renderer is '{}', but a two-dimensional transfer function needs one of: {}", asked,
-                                             NamesOfAble(NameOf(Ability::kRegions))));
-}
-
 }  // namespace
 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
   const VolumeGeometry& geometry = summary->description.geometry;
-  const RendererKind* const renderer =
-      request.renderer == kAutomatic ? &DefaultRenderer(!summary->cells.empty()) : FindRenderer(request.renderer);
-  const std::string asked = std::exchange(request.renderer, std::string(renderer->name()));
+  const Result<std::vector<const RendererKind*>> able = RenderersFor(request);
+  if (!able.ok()) return able.status();
+  const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
+  request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
-  if (const auto parameters = ParseParameters(*renderer, request.parameters); !parameters.ok()) return parameters.status();
-  if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
+  if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
-  if (Status status = CheckShowsRegions(*renderer, asked, *transfer); !status.ok()) return status;
   const auto* const name = std::get_if<std::string>(&request.transfer.choice);
   if (request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
     transfer->opacities = {{double(summary->range.min), 1}};
@@ -137,7 +130,7 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   std::optional<ResolvedPolicy> policy;
   if (!LeavesChoice(request.policy)) policy = ResolvePolicy(request.policy, geometry);
   return ResolvedRequest{.frame = std::move(request),
-                         .volume = {dataset, *std::move(transfer), renderer, *std::move(clip), *std::move(layers)},
+                         .volume = {dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers)},
                          .summary = std::move(summary),
                          .policy = std::move(policy)};
 }

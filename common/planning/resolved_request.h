@@ -35,9 +35,9 @@ struct ResolvedRequest {
   std::optional<CoarserVolume> light = {};
 };
 
-// Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the
-// renderer that kAutomatic means has no such parameter; the volume has no slice with the slab's index, or no such layer, or there is no
-// such label; NotFound: no such preset.
+// Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as RenderersFor and
+// CheckHasWhatIsDrawn; the volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such
+// preset.
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.

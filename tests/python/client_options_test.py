@@ -347,7 +347,7 @@ class Requests(unittest.TestCase):
             ({"size": 0}, "size 0 is out of range [1, 16384]"),
             ({"size": (1, 2, 3)}, "size (1, 2, 3) is neither WIDTHxHEIGHT nor one number"),
             ({"shading": "toon"}, "shading 'toon' is not one of phong, none, depth-gradient"),
-            ({"renderer": "crayon"}, "renderer 'crayon' is not one of auto, splat, zbuffer, raycast, shear, mip, slice"),
+            ({"renderer": "crayon"}, "renderer 'crayon' is not one of auto, splat, raycast, zbuffer, shear, mip, slice"),
             ({"fit": "yes"}, "fit 'yes' is neither True nor False"),
             ({"look_at": (1, 2)}, "look_at (1, 2) is not X,Y,Z"),
             ({"light": (0, 0, 0)}, "light [0, 0, 0] has no direction"),

@@ -197,8 +197,8 @@ class AtAService(WithAService):
     def test_the_services_sentence_is_the_exceptions(self) -> None:
         for options, kind, sentence in (
             ({"dataset": "foot"}, ss.NotFound, "foot"),
-            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'auto', but shading 'depth-gradient' needs one of: zbuffer"),
-            ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'auto', but isovalue needs one of: zbuffer, raycast"),
+            ({"dataset": "head", "renderer": "splat", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"),
+            ({"dataset": "head", "isovalue": 4, "energy": 60}, ss.InvalidArgument, "isovalue needs one of: raycast, zbuffer; energy needs one of: xray"),
             ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
         ):
             with self.subTest(options=options), self.assertRaises(kind) as caught:

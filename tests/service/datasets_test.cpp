@@ -149,7 +149,7 @@ TEST_F(DatasetsTest, LayersOfADatasetAreThoseOfTheirFiles) {
   }
   request.renderer = "splat";
   request.labels->shown.clear();
-  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: zbuffer, raycast"));
+  EXPECT_THAT(client_->Render(request).status().message(), testing::HasSubstr("labels needs one of: raycast, zbuffer"));
   EXPECT_FALSE(Order(DataAction::kAdd, {"wrong=" + file_.string() + ",labels=" + (directory_ / "none.nrrd").string()}).ok());
 }
 

@@ -20,7 +20,7 @@ import { measureSection } from "./measure_section";
 import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { automaticRenderer, can, loadOffers, noteKind } from "./offers";
+import { automaticRenderer, can, loadOffers } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
@@ -119,7 +119,6 @@ class Page {
 
   private forgetVolume(): void {
     this.volume = null;
-    noteKind(0);
     for (const listener of this.volumeListeners) listener(null);
   }
 
@@ -133,7 +132,6 @@ class Page {
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
       if (!this.volume) return;
-      noteKind(this.volume.cells);
       if (this.starts) this.store.update(startOf(world));
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();

@@ -2,7 +2,6 @@
 
 export interface Offer {
   name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; region_presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
-  automatic?: { volumes: string; grids: string }; // renderers
 }
 export interface NamedWindow { name: string; width: number; level: number }
 export interface Renderer { name: string; title: string; abilities: string[]; parameters: Record<string, string> } // parameters with their standard values
@@ -48,24 +47,15 @@ export const namedWindows = (): readonly NamedWindow[] => offers.get("window")?.
 
 const has = (what: string, { abilities, parameters }: Renderer): boolean => abilities.includes(what) || what in parameters;
 
-// The renderer unless the user chooses one: the service takes that of volumes or that of unstructured grids.
+// The renderer unless the user chooses one: the service takes one that can do what is asked, and says which.
 export const automaticRenderer = (): string => offers.get("renderer")?.default ?? "";
-let ofGrids = false;
-export const noteKind = (cells: number): void => { ofGrids = cells > 0; }; // of the dataset that is shown
-export function settled(renderer: string): string {
-  const automatic = offers.get("renderer")?.automatic;
-  return renderer !== automaticRenderer() || !automatic ? renderer : ofGrids ? automatic.grids : automatic.volumes;
-}
 
 // An ability ("isosurfaces") or a parameter ("sampling-rate") of a renderer; the service refuses the rest.
-export function can(what: string, renderer: string): boolean {
-  const name = settled(renderer);
-  return renderers().some(each => each.name === name && has(what, each));
-}
+export const can = (what: string, renderer: string): boolean => renderers().some(each => (each.name === renderer || renderer === automaticRenderer()) && has(what, each));
 
-// What a renderer has that others do not.
+// What a renderer has that others do not; nothing, if the service chooses it.
 export function parametersOf(renderer: string): readonly Offer[] {
-  const name = settled(renderer), own = renderers().find(each => each.name === name)?.parameters ?? {};
+  const own = renderers().find(each => each.name === renderer)?.parameters ?? {};
   return Object.entries(own).flatMap(([parameter, standard]) => { const offer = offers.get(parameter); return offer ? [{ ...offer, default: standard }] : []; });
 }
 const allParameters = (): ReadonlySet<string> => new Set(renderers().flatMap(each => Object.keys(each.parameters)));

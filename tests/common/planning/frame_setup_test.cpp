@@ -28,13 +28,11 @@ TEST(ResolveRequest, TheAutomaticRendererDrawsTheCellsOfGridsAndTheVoxelsOfVolum
   }
 }
 
-TEST(ResolveRequest, ParametersMustBeThoseOfTheRendererThatTheDatasetGets) {
+TEST(ResolveRequest, TheAutomaticRendererHasTheParametersThatAreGiven) {
   FrameRequest request = SomeRequest();
   request.parameters = {{"sampling-rate", "2.5"}};
-  ASSERT_TRUE(Validate(request).ok()) << "grids have it";
   EXPECT_EQ(SetupOf(request, FullGridSummary({20, 20, 20})).parameters, std::vector{2.5});
-  const auto of_volume = ResolveRequest(request, 1, std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20})));
-  EXPECT_EQ(of_volume.status(), Status::InvalidArgument("sampling-rate is '2.5', but the renderer 'splat' has no such parameter"));
+  EXPECT_EQ(SetupOf(request, FullSummary({20, 20, 20})).parameters.front(), 2.5);
 }
 
 TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
