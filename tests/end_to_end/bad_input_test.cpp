@@ -30,7 +30,7 @@ TEST_F(BadInputTest, CommandLines) {
       {{"bench", "--frames", "0"}, "--frames 0 is out of range [1, 100000]"},
       {{"bench", "--turns", "1001"}, "--turns 1001 is out of range [1, 1000]"},
       {{"bench", "--workers", "0"}, "--workers 0 is out of range [1, 256]"},
-      {{"bench", "--renderer", "ray"}, "--renderer 'ray' is not one of splat, zbuffer"},
+      {{"bench", "--renderer", "ray"}, "--renderer 'ray' is not one of splat, raycast"},
       {{"bench", "--json", "no/r.json"}, "--json 'no/r.json'"},
       {{"bench", "--pictures", "/proc/no"}, "--pictures '/proc/no'"},
       {{"bench", "--export", "/proc/no"}, "--export '/proc/no'"},

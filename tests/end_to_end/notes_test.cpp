@@ -93,6 +93,13 @@ TEST_F(NotesTest, WhoDidNotChooseAChannelIsToldWhichOneIsShown) {
   EXPECT_THAT(MustRun({"convert", "em", "em.ome.zarr"}).err_lines(), ElementsAre(HasSubstr(note)));
 }
 
+TEST_F(NotesTest, AVolumeOfOneValueHasNothingToShow) {
+  std::ofstream(Path("empty.nrrd")) << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\nencoding: raw\n\n" << std::string(729, '\3');
+  const ProgramResult result = MustRun({"render", "empty.nrrd", "--local=1", "--size", "32", "-o", "x.png"});
+  EXPECT_THAT(result.err_lines(), ElementsAre("slabstream: warning: the picture is empty: all values of the volume are 3"));
+  EXPECT_EQ(ReadPicture(Path("x.png")).At(16, 16, 3), 0);
+}
+
 TEST_F(NotesTest, PresetsAreListed) {
   const std::string list = MustRun({"transfer", "--list", "--preview", "maps.png"}).out;
   for (const char* name : {"auto  ", "ct-bone  ", "viridis  ", "magma  ", "cividis  ", "turbo  ", "coolwarm  ", "grey  "}) {
