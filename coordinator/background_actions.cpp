@@ -19,6 +19,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/answer_question.h"
+#include "coordinator/client_file.h"
 #include "coordinator/dataset_id.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
@@ -224,7 +225,10 @@ BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   return Post(
       loads_, barrier.c_str(),
       [action, inbox = inbox_] {
-        return Load(action, [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); });
+        const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
+        Result<News> news = Load(action, tell);
+        if (news.ok() || action.source.sent == nullptr) return news;
+        return Result<News>(action.source.sent->ForClient(news.status()));
       },
       EndOf<DatasetFailed>(action.name, action.load));
 }

@@ -18,6 +18,7 @@
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
+#include "coordinator/client_file.h"
 #include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
@@ -418,6 +419,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     ReadProgress progress(tell);
     const Result<WayToRead> way = FindWay(source, most_bytes, progress);
     if (!way.ok()) return way.status();
+    if (const Status alone = source.sent ? source.sent->CheckAlone(way->files) : Status::Ok(); !alone.ok()) return alone;
     const Result<FileStamp> before = StampFiles(way->files);
     if (!before.ok()) return before.status();
     AwaitRest(*before);

@@ -40,6 +40,7 @@ void DatasetMachine::State::On(const ForgetClient& event) {
   if (const Upload upload = UploadOf(event.client); upload != uploads.end()) {
     EndUpload(upload, Status::Unavailable("its client has gone"));
   }
+  RemoveFilesOf(event.client);
   std::erase_if(questions, [&](const auto& open) { return open.second.client == event.client; });
 }
 

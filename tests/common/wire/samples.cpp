@@ -579,7 +579,8 @@ std::vector<AddVolume> SamplesOf() {
            kLongName,
            Description(),
            {ScalarType::kUint16, ScalarType::kFloat32},
-           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}}};
+           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}},
+          {.name = "a", .description = {}, .layers = {}, .labels = {}, .file = SentFile{"a.nii.gz", kMaxSentFileBytes}}};
 }
 
 template <>
