@@ -83,12 +83,12 @@ class Gateway::Impl : public HttpApplication {
 
   std::uint16_t port() const { return port_; }
 
-  std::string url() const {
+  std::string url(bool with_token) const {
     const bool v6 = options_.listen.host.find(':') != std::string::npos;
     const std::string host = v6 ? "[" + options_.listen.host + "]" : options_.listen.host;
     const std::string origin =
         !options_.proxy_origin.empty() ? options_.proxy_origin : fmt::format("{}://{}:{}", options_.tls ? "https" : "http", host, port_);
-    return fmt::format("{}/#token={}", origin, options_.token);
+    return origin + (with_token ? "/#token=" + options_.token : "/");
   }
 
   void RequestStop() {
@@ -276,7 +276,8 @@ class Gateway::Impl : public HttpApplication {
 
   HttpReply NoToken() {
     CountRefusal("token");
-    HttpReply answer = Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed");
+    HttpReply answer =
+        Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed, or in its --token-file");
     answer.headers.emplace_back("WWW-Authenticate", "Bearer");
     return answer;
   }
@@ -340,7 +341,7 @@ Result<std::unique_ptr<Gateway>> Gateway::Start(Context& context, ServiceAddress
 }
 
 std::uint16_t Gateway::port() const { return impl_->port(); }
-std::string Gateway::url() const { return impl_->url(); }
+std::string Gateway::url(bool with_token) const { return impl_->url(with_token); }
 void Gateway::RequestStop() { impl_->RequestStop(); }
 void Gateway::WaitUntilStopped() { impl_->WaitUntilStopped(); }
 

@@ -46,7 +46,7 @@ class Gateway {
   ~Gateway();
 
   std::uint16_t port() const;
-  std::string url() const;  // with the token
+  std::string url(bool with_token) const;
 
   void RequestStop();  // any thread, signal handlers too
   void WaitUntilStopped();

@@ -41,8 +41,8 @@ Status Serve(Options options) {
   Context context;
   const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
   if (!gateway.ok()) return gateway.status();
-  // Whoever started this process reads the address from this line.
-  (void)std::printf("ready %s\n", (*gateway)->url().c_str());
+  // Whoever started this process reads the address from this line. A token that lasts is not in it: logs would keep it.
+  (void)std::printf("ready %s\n", (*gateway)->url(options.token_file.empty()).c_str());
   if (Status told = FlushOutput(); !told.ok()) return told;
   NotifyReady();
   const sigset_t signals = StopSignals();

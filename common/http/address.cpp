@@ -165,7 +165,7 @@ Status CheckToken(std::string_view token) {
 
 Result<std::string> ReadToken(std::string_view option, const std::string& path) {
   constexpr std::size_t kMostBytes = 256;
-  Result<std::string> token = ReadTextFile(path, kMostBytes);
+  Result<std::string> token = ReadPrivateTextFile(path, kMostBytes);
   if (!token.ok()) return Status(token.status().code(), fmt::format("{} {}", option, token.status().message()));
   while (token->ends_with('\n')) token->pop_back();
   if (const Status checked = CheckToken(*token); !checked.ok()) {

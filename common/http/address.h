@@ -57,7 +57,7 @@ class OriginRules {
 Result<std::string> MakeToken();
 // What may stand in --token-file: 16 to 128 letters, digits, - and _. InvalidArgument.
 Status CheckToken(std::string_view token);
-// The token in a file, without the end of its line. InvalidArgument and the errors of ReadTextFile, which name the option.
+// The token in a file, without the end of its line. InvalidArgument and the errors of ReadPrivateTextFile, which name the option.
 Result<std::string> ReadToken(std::string_view option, const std::string& path);
 // In time that does not depend on where they differ.
 bool SameToken(std::string_view a, std::string_view b);

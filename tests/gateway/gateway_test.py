@@ -857,9 +857,22 @@ class StartTest(unittest.TestCase):
             self.assertEqual(self.refused(*arguments)[0], 2, arguments)
 
     def test_behind_a_proxy(self):
-        (self.programs.folder / "token").write_text("0123456789abcdef\n")
-        _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--token-file", "token", "--listen", "127.0.0.1")
-        self.assertEqual((gateway.authority, gateway.token), ("viewer.example.org:8443", "0123456789abcdef"))
+        _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--listen", "127.0.0.1")
+        self.assertEqual(gateway.authority, "viewer.example.org:8443")
+
+    def test_a_token_of_a_file(self):
+        file = self.programs.folder / "token"
+        file.write_text("0123456789abcdef\n")
+        file.chmod(0o644)
+        code, why = self.refused("--token-file", "token")
+        self.assertEqual(code, 2)
+        self.assertIn("others can use 'token', which holds a secret", why)
+        file.chmod(0o600)
+        child = self.programs.start("slabstream-gateway", "--token-file", "token", "--listen", "127.0.0.1")
+        word, address = child.stdout.readline().split()
+        self.assertEqual(word, "ready")
+        self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
+        self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/api/v1/status")[0], 200)
 
     @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
     def test_tls(self):
