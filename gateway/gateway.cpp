@@ -160,6 +160,7 @@ class Gateway::Impl : public HttpApplication {
 
   std::vector<std::pair<std::string, std::string>> CommonHeaders() const override {
     std::string frames = "'self' http://localhost:* http://127.0.0.1:*";  // notebooks
+    for (const std::string& source : options_.frame_sources) frames += " " + source;
     if (!options_.proxy_origin.empty()) frames += " " + options_.proxy_origin;
     return {
         {"Content-Security-Policy",

@@ -19,6 +19,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/client.h"
 #include "common/base/status.h"
@@ -30,12 +31,14 @@ namespace slabstream {
 struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
-  std::string proxy_origin;          // of --behind-proxy, as ParseOrigin gives it; empty: none
-  std::string token;                 // CheckToken
-  std::optional<HttpUrl> collector;  // of OpenTelemetry, which gets traces of requests; none: there are no traces
+  std::string proxy_origin;                // of --behind-proxy, as ParseOrigin gives it; empty: none
+  std::vector<std::string> frame_sources;  // whose pages may show the viewer in a frame, as ParseFrameSource gives them
+  std::string token;                       // CheckToken
+  std::optional<HttpUrl> collector;        // of OpenTelemetry, which gets traces of requests; none: there are no traces
   HttpLimits limits;
   int max_sessions = 64;
-  int max_renders = 16;  // pictures over HTTP under way
+  int max_renders = 16;                           // pictures over HTTP under way
+  std::uint64_t max_upload_bytes = kUploadBytes;  // of a file that a page sends; 0: none are taken
 };
 
 class Gateway {

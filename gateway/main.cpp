@@ -68,6 +68,11 @@ int Run(int argc, char** argv) {
   AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
             "Public address of a proxy that ends TLS, such as https://viewer.example.org")
       ->type_name("ORIGIN");
+  AddParsedList(
+      app, "--frame-in", options.gateway.frame_sources, ParseFrameSource,
+      "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
+      "vscode-webview: for notebooks of VS Code")
+      ->type_name("ORIGIN");
   app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
       ->type_name("FILE")
       ->default_str("a new random one at each start");

@@ -24,6 +24,10 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
 // "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
 Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
 
+// Whose pages may show this server's in a frame: an origin, as ParseOrigin takes it, or a scheme, "vscode-webview:". The text in lower
+// case, as the header Content-Security-Policy has it. InvalidArgument.
+Result<std::string> ParseFrameSource(std::string_view option, std::string_view text);
+
 // What a client asks, without TLS.
 struct HttpUrl {
   std::string host;  // a name or a numeric address; IPv6 without brackets

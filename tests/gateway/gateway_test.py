@@ -874,6 +874,13 @@ class StartTest(unittest.TestCase):
         self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
         self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/api/v1/status")[0], 200)
 
+    def test_frames_of_other_pages(self):
+        _, gateway = self.programs.gateway("--frame-in", "vscode-webview:", "--frame-in", "https://Hub.example.org")
+        policy = gateway.request("/")[1]["Content-Security-Policy"]
+        self.assertTrue(policy.endswith("frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview: https://hub.example.org"), policy)
+        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'"):
+            self.assertEqual(self.refused("--frame-in", wrong)[0], 2, wrong)
+
     @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
     def test_tls(self):
         subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", "key.pem", "-out", "cert.pem", "-days", "2", "-subj",
