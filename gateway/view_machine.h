@@ -103,7 +103,8 @@ class ViewMachine {
   bool sent_final_ = false;
   std::uint64_t frames_ = 0;
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
-  bool small_ = false;                     // pictures while moving have half the size
+  bool small_ = false;                     // pictures while moving have half the size, for the connection's sake
+  double scale_ = 1;                       // likewise, for the service's sake
   double coarseness_ = kFirstCoarseness;   // of pictures while moving
   bool plain_ = false;                     // pictures while moving have no shadows
   double still_coarseness_ = 1;            // of the next picture of a view that stands still

@@ -145,6 +145,29 @@ TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
                                                       ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
 }
 
+TEST(ViewMachineTest, SlowPicturesWithoutCoarserLevelsBecomeSmallWhileTheViewMoves) {
+  ViewMachine machine;
+  std::uint64_t frames = 0;
+  const auto scale = [&](int begin, int ms, bool finest = true) {  // of the next view's picture, which takes so long
+    const auto actions = machine.OnView(std::uint64_t(begin), At(begin));
+    const ViewAction render = actions.back();
+    EXPECT_EQ(render.kind, Kind::kRender);
+    machine.OnRendered(finest, false, At(begin + ms));
+    machine.OnEncoded(At(begin + ms + 1));
+    machine.OnAck(++frames, At(begin + ms + 2));
+    return render.scale;
+  };
+  EXPECT_EQ(scale(1000, 130, false), 1);
+  EXPECT_EQ(scale(2000, 130), 1) << "a coarser level helped";
+  EXPECT_EQ(scale(3000, 130), 0.5);
+  EXPECT_EQ(scale(4000, 130), 0.25);
+  EXPECT_EQ(scale(5000, 60), 0.25) << "but no smaller";
+  EXPECT_EQ(scale(6000, 20), 0.25);
+  EXPECT_EQ(scale(7000, 60), 0.5) << "larger ones may take four times as long";
+  // The view stands still: the whole picture, however long it takes.
+  EXPECT_THAT(machine.OnTime(At(7150)), ElementsAre(ViewAction{.kind = Kind::kRender, .seq = 7000}));
+}
+
 TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
   ViewMachine machine;
   std::uint64_t frames = 0;
