@@ -29,6 +29,7 @@
 #include "gateway/service_link.h"
 #include "gateway/service_monitor.h"
 #include "gateway/target.h"
+#include "gateway/uploads.h"
 #include "gateway/view_session.h"
 
 namespace slabstream {
@@ -51,6 +52,7 @@ class Gateway::Impl : public HttpApplication {
         traces_(options_.collector ? std::make_shared<TraceSender>(*options_.collector, ThisProcess("slabstream-gateway")) : nullptr),
         encoders_(std::max(2U, std::thread::hardware_concurrency())),
         movies_(std::make_unique<MovieRequests>(io_, context_, service_, metrics_)),
+        uploads_(std::make_unique<Uploads>(io_, context_, service_, metrics_, options_.max_upload_bytes)),
         routes_(Routes()) {}
 
   ~Impl() override {
@@ -77,6 +79,7 @@ class Gateway::Impl : public HttpApplication {
     monitor_ = std::make_unique<ServiceMonitor>(context_, service_, [this](std::shared_ptr<const ServiceNews> news) {
       asio::post(io_, [this, news = std::move(news)]() mutable { OnNews(std::move(news)); });
     });
+    asio::post(io_, [this] { Beat(); });
     thread_ = std::thread([this] { io_.run(); });
     return Status::Ok();
   }
@@ -122,6 +125,9 @@ class Gateway::Impl : public HttpApplication {
       return counted(Failure(404, fmt::format("there is nothing at '{}'", Shown(target->path))));
     }
     if (!route->second.open && !MayAsk(request, *target)) return counted(NoToken());
+    for (const PictureField& field : target->fields) {
+      if (field.name == "dataset") uploads_->Touch(field.text, MonotonicNow());
+    }
     const bool get = request.method == "GET" || request.method == "HEAD";
     if (!get && !(request.method == "POST" && route->second.takes_post)) {
       HttpReply answer = Failure(405, fmt::format("{} is not a method of {}", Shown(request.method), target->path));
@@ -241,6 +247,16 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/statistics"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.takes_post = true, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
+    routes["/api/v1/upload"] = {
+        .takes_post = true,
+        .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
+          if (request.method != "POST") return reply(Failure(405, "files are sent by POST"));
+          PictureFields fields = target.fields;
+          std::erase_if(fields, [](const PictureField& field) { return field.name == "token"; });
+          std::vector<std::string> taken;
+          for (const DatasetStatus& dataset : news_->status.datasets) taken.push_back(dataset.name);
+          uploads_->Handle(std::move(fields), request.body, taken, std::move(reply), request.gone);
+        }};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};
     return routes;
   }
@@ -292,10 +308,26 @@ class Gateway::Impl : public HttpApplication {
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->OnNews(news_);
   }
 
+  // Once a second, even while the service does not answer: so pages notice when their connection has died without a word.
+  void Beat() {
+    const Time now = MonotonicNow();
+    for (ViewSession* session : std::set<ViewSession*>(sessions_)) {
+      session->SendStatus();
+      uploads_->Touch(session->dataset(), now);
+    }
+    uploads_->RemoveUnseen(now);
+    beat_.expires_after(std::chrono::seconds(1));
+    beat_.async_wait([this](boost::system::error_code error) {
+      if (!error) Beat();
+    });
+  }
+
   void Stop() {
+    beat_.cancel();
     monitor_->RequestStop();
     link_->RequestStop();
     movies_->Stop();
+    uploads_->Stop();
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End();
     // Farewells get a moment to leave.
     auto timer = std::make_shared<asio::steady_timer>(io_, std::chrono::milliseconds(200));
@@ -312,6 +344,7 @@ class Gateway::Impl : public HttpApplication {
   Metrics metrics_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_;
+  asio::steady_timer beat_{io_};
   const std::shared_ptr<TraceSender> traces_;  // null: nobody wants any
   asio::thread_pool encoders_;
   std::unique_ptr<HttpServer> server_;
@@ -321,6 +354,7 @@ class Gateway::Impl : public HttpApplication {
   std::optional<PictureRequests> pictures_;
   std::optional<QuestionRequests> questions_;
   const std::unique_ptr<MovieRequests> movies_;
+  const std::unique_ptr<Uploads> uploads_;
   const std::map<std::string, Route, std::less<>> routes_;
   std::atomic<bool> stopping_ = false;
   // Of the io thread.

@@ -25,6 +25,7 @@
 #include "common/base/status.h"
 #include "common/http/address.h"
 #include "common/http/http.h"
+#include "gateway/uploads.h"
 
 namespace slabstream {
 

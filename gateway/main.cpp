@@ -13,6 +13,7 @@
 #include "common/http/address.h"
 #include "common/otlp/trace_sender.h"
 #include "common/transport/context.h"
+#include "common/volume/memory_budget.h"
 #include "gateway/gateway.h"
 
 namespace slabstream {
@@ -24,6 +25,10 @@ struct Options {
   TlsFiles tls;
   std::string token_file;
 };
+
+Result<std::uint64_t> ParseUploadLimit(const std::string& option, const std::string& text) {
+  return text == "0" ? Result<std::uint64_t>(0) : ParseMemoryLimit(option, text);
+}
 
 Status Serve(Options options) {
   BlockStopSignals();
@@ -73,6 +78,10 @@ int Run(int argc, char** argv) {
       "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
       "vscode-webview: for notebooks of VS Code")
       ->type_name("ORIGIN");
+  AddParsed(app, "--max-upload", options.gateway.max_upload_bytes, ParseUploadLimit,
+            "Largest file that a page may send to the service as a dataset; 0: none may")
+      ->type_name("SIZE")
+      ->default_str(MemoryText(kUploadBytes));
   app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
       ->type_name("FILE")
       ->default_str("a new random one at each start");

@@ -85,6 +85,7 @@ struct Operation {
   bool open = false;
   Json fields = Json::array();
   bool takes_post = false;
+  bool takes_bytes = false;  // by POST alone
 };
 
 // Those of `fields` with these names.
@@ -110,6 +111,12 @@ Json Describe(const Operation& operation) {
   if (operation.open) get["security"] = Json::array();
   if (!options) return {{"get", std::move(get)}};
   Json post = get;
+  if (operation.takes_bytes) {
+    post["parameters"] = Parameters(operation.fields);
+    post["requestBody"] = {{"required", false},
+                           {"content", {{"application/octet-stream", {{"schema", {{"type", "string"}, {"format", "binary"}}}}}}}};
+    return {{"post", std::move(post)}};
+  }
   get["parameters"] = Parameters(operation.fields);
   if (!operation.takes_post) return {{"get", std::move(get)}};
   post["requestBody"] = Body(operation.fields);
@@ -126,6 +133,9 @@ Json OpenApi() {
     Json json = {{"name", name}, {"group", "Options"}, {"type", type}, {"help", help}};
     json[standard.empty() ? "required" : "default"] = standard.empty() ? Json(true) : Json(standard);
     return json;
+  };
+  const auto optional = [](const char* name, const char* help, const char* type) {
+    return Json{{"name", name}, {"group", "Options"}, {"type", type}, {"help", help}};
   };
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
@@ -158,6 +168,11 @@ Json OpenApi() {
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
        Named(render, {"dataset", "transfer", "scalar-range"})},
+      {"/api/v1/upload", "Sends a file that becomes a dataset, in parts (docs/http.md)", "application/json", false,
+       Json::array({optional("file", "To begin: the name of the file, whose ending says its format", "NAME"),
+                    optional("bytes", "To begin: the size of the file", "N"), optional("upload", "Then: what the first answer says", "ID"),
+                    optional("begin", "Then: where in the file the body begins", "N"), optional("drop", "Remove the dataset", "true")}),
+       false, true},
   };
   Json paths = Json::object();
   for (const Operation& operation : operations) paths[operation.path] = Describe(operation);

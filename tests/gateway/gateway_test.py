@@ -120,6 +120,97 @@ class WithService(unittest.TestCase):
         return self.gateway.request(path + "?" + urllib.parse.urlencode(fields, doseq=True))
 
 
+class UploadTest(WithService):
+    """Files that pages send."""
+
+    def post(self, body=b"", **fields):
+        status, _, answer = self.gateway.request("/api/v1/upload?" + urllib.parse.urlencode(fields), method="POST", body=body)
+        return status, json.loads(answer)
+
+    def send(self, name, data, part=1 << 20):
+        status, begun = self.post(file=name, bytes=len(data))
+        self.assertEqual(status, 200, begun)
+        for begin in range(0, len(data), part):
+            status, answer = self.post(data[begin:begin + part], upload=begun["upload"], begin=begin)
+            if status != 200:
+                return status, answer
+            self.assertEqual(answer["received"], min(begin + part, len(data)))
+        self.assertEqual(answer["dataset"], begun["dataset"])
+        return begun["upload"], begun["dataset"]
+
+    def read(self, name):
+        return (self.programs.folder / name).read_bytes()
+
+    def names(self):
+        return {dataset["name"] for dataset in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
+
+    def test_a_file_is_a_dataset_until_it_is_dropped(self):
+        noise = random.Random(3).randbytes(128 ** 3)  # more than what may be under way at a time
+        (self.programs.folder / "noise.nrrd").write_bytes(b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n" + noise)
+        upload, name = self.send("my noise (1).nrrd", self.read("noise.nrrd"), 300_000)
+        self.assertEqual(name, "my_noise_1_")
+        self.assertEqual(self.gateway.json(f"/api/v1/value?dataset={name}&at=3,4,5")[1]["value"], noise[3 + 128 * (4 + 128 * 5)])
+        second, other = self.send("../../my noise (1).nrrd", self.read("a.nrrd"))
+        self.assertEqual(other, "_")
+        again, third = self.send("a.nrrd", self.read("a.nrrd"))
+        self.assertEqual(third, "a-2")
+        one, same = (png_pixels(self.get("/api/v1/render.png", dataset=each, size=32)[2]) for each in ("a", third))
+        self.assertEqual(one, same)
+        for each in (upload, second, again):
+            self.assertEqual(self.post(upload=each, drop="true"), (200, {}))
+        wait_until(lambda: self.names() <= {"a", "b", "c", "levels"}, "they are gone")
+        self.assertEqual(self.get("/api/v1/render.png", dataset=name, size=16)[0], 404)
+        status, answer = self.post(b"x", upload=upload, begin=0)
+        self.assertEqual((status, "no such upload" in answer["error"]), (404, True))
+
+    def test_what_is_no_volume_is_refused_without_paths(self):
+        upload, name = self.send("notes.nrrd", b"NRRD0004\nnonsense\n")
+        status, body = self.gateway.json(f"/api/v1/histogram?dataset={name}")
+        self.assertNotEqual(status, 200)
+        self.assertIn("notes.nrrd", body["error"])
+        self.assertNotIn("/tmp", body["error"])
+        self.post(upload=upload, drop="true")
+
+    def test_a_header_cannot_name_other_files(self):
+        secret = self.programs.folder / "secret"
+        secret.write_bytes(bytes(range(64)))
+        for named in (str(secret), "../" + self.programs.folder.name + "/secret"):
+            header = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\ndata file: {named}\n".encode()
+            upload, name = self.send("header.nhdr", header)
+            status, body = self.gateway.json(f"/api/v1/histogram?dataset={name}")
+            self.assertNotEqual(status, 200)
+            self.assertRegex(body["error"], "another file, 'secret'")
+            self.post(upload=upload, drop="true")
+
+    def test_limits(self):
+        self.assertEqual(self.post(file="a.nii", bytes=0)[0], 400)
+        self.assertEqual(self.post(file="a.nii", bytes="x")[0], 400)
+        status, answer = self.post(file="a.nii", bytes=(1 << 30) + 1)
+        self.assertEqual((status, "--max-upload" in answer["error"]), (413, True))
+        self.assertEqual(self.gateway.request("/api/v1/upload?file=a&bytes=1", method="POST", body=b"", token=False)[0], 401)
+        self.assertEqual(self.gateway.request("/api/v1/upload?file=a&bytes=1")[0], 405)
+        _, begun = self.post(file="a.nii", bytes=10)
+        for begin, body in ((1, b"a"), (0, b"a" * 11), (11, b"")):
+            self.assertEqual(self.post(body, upload=begun["upload"], begin=begin)[0], 400, begin)
+        self.assertEqual(self.post(b"abc", upload=begun["upload"], begin=0), (200, {"received": 3}))
+        self.assertEqual(self.post(b"abc", upload=begun["upload"], begin=0), (200, {"received": 3}), "its answer was lost")
+        self.post(upload=begun["upload"], drop="true")
+        _, none = self.programs.gateway("--endpoint", self.endpoint, "--max-upload", "0")
+        self.assertEqual(none.request("/api/v1/upload?file=a&bytes=1", method="POST", body=b"")[0], 403)
+
+    def test_files_go_with_their_gateway(self):
+        child, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        data = self.read("a.nrrd")
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        begun = gateway.json(f"/api/v1/upload?file=gone.nrrd&bytes={len(data)}", method="POST", body=b"")[1]
+        self.assertEqual(gateway.json(f"/api/v1/upload?upload={begun['upload']}&begin=0", method="POST", body=data)[1]["dataset"], "gone")
+        wait_until(lambda: "gone" in self.names(), "it is there")
+        child.kill()
+        child.wait()
+        self.programs.end(child)
+        wait_until(lambda: "gone" not in self.names(), "it is gone")
+
+
 class HttpTest(WithService):
     def test_pictures_are_the_files_of_the_command_line(self):
         cases = [
