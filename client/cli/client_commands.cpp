@@ -306,6 +306,12 @@ void DeclareUp(const CommandLine& line) {
   });
 }
 
+Result<std::string> ParseLoopbackPort(std::string_view option, std::string_view text) {
+  const Result<int> port = ParseInteger(option, text, 0, 65535);
+  if (!port.ok()) return port.status();
+  return fmt::format("127.0.0.1:{}", *port);
+}
+
 void DeclareView(const CommandLine& line) {
   CLI::App* sub =
       line.app.add_subcommand("view", "Show a volume in the browser; starts a service and a gateway if needed, and ends them at Ctrl-C");
@@ -317,9 +323,15 @@ void DeclareView(const CommandLine& line) {
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
   AddService(*sub, options->service);
   AddCacheOption(*sub, options->cache);
-  sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
-      ->type_name("HOST:PORT")
-      ->default_str(options->listen);
+  CLI::Option* const listen = sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
+                                  ->type_name("HOST:PORT")
+                                  ->default_str(options->listen);
+  AddParsed(*sub, "--port", options->listen, ParseLoopbackPort,
+            "Port of the gateway on this machine: with --token-file, an address that stays")
+      ->type_name("PORT")
+      ->excludes(listen);
+  sub->add_option("--token-file", options->token_file, "Use the token in this file; make the file, with a new token, if it does not exist")
+      ->type_name("FILE");
   sub->add_flag("!--no-browser", options->browser, "Only print the address");
   RunWith(*sub, line.run, options, RunView);
 }

@@ -144,6 +144,7 @@ struct ViewOptions {
   LayerFiles layers;                   // of a file
   std::uint64_t cache = 0;             // of the service that it starts, as UpOptions::cache
   std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
+  std::string token_file;              // likewise; empty: a new token. A file that does not exist is made
   bool browser = true;                 // open it, if there is a display
 };
 

@@ -15,11 +15,13 @@
 #include "client/cli/service_connection.h"
 #include "client/service/process.h"
 #include "client/service/service_state.h"
+#include "common/base/files.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "common/base/url.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
+#include "common/http/address.h"
 #include "data/layers/layer_reader.h"
 #include "data/open/cache_option.h"
 #include "data/volume_io/read_options.h"
@@ -139,6 +141,17 @@ Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
   }
 }
 
+// The token in the file, which is made if it does not exist.
+Result<std::string> KeptToken(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    const Result<std::string> token = MakeToken();
+    if (!token.ok()) return token;
+    if (Status written = WritePrivateTextFile(path, *token + "\n"); !written.ok()) return written;
+  }
+  return ReadToken("--token-file", path);
+}
+
 // The dataset that the service has for the file. With keys it takes an admin's.
 Status AddToService(const ServiceChoice& choice, const std::string& entry) {
   Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
@@ -170,6 +183,8 @@ Status RunView(const ViewOptions& options) {
   const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
   if (!self.ok()) return self.status();
   if (!program.ok()) return program.status();
+  const Result<std::string> token = options.token_file.empty() ? Result<std::string>("") : KeptToken(options.token_file);
+  if (!token.ok()) return token.status();
   BlockStopSignals();
   std::optional<Helper> service;
   ServiceChoice choice = *named;
@@ -194,14 +209,15 @@ Status RunView(const ViewOptions& options) {
   std::vector<std::string> command = {*program, "--listen", options.listen};
   if (!choice.endpoint.empty()) command.insert(command.end(), {"--endpoint", choice.endpoint});
   if (!choice.file.empty()) command.insert(command.end(), {"--service", choice.file});
+  if (!options.token_file.empty()) command.insert(command.end(), {"--token-file", options.token_file});
   Result<Helper> gateway = Helper::Start(std::move(command));
   if (!gateway.ok()) return gateway.status();
   const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
   if (!line.ok()) return Status(line.status().code(), "the gateway did not start; see its error above");
   const std::string dataset = file ? ShownDataset(options.source) : options.source;
-  const std::string url =
-      fmt::format("{}&dataset={}{}{}", line->substr(line->find(' ') + 1), dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
-                  options.layers.overlay.empty() ? "" : "&overlay=1");
+  const std::string address = line->substr(line->find(' ') + 1), with_token = token->empty() ? address : address + "#token=" + *token;
+  const std::string url = fmt::format("{}&dataset={}{}{}", with_token, dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
+                                      options.layers.overlay.empty() ? "" : "&overlay=1");
   std::cout << fmt::format("{} is at {}\n", dataset, url);
   if (options.browser) {
     const Status opened = OpenBrowser(url);

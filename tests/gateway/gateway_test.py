@@ -972,6 +972,19 @@ class StartTest(unittest.TestCase):
         for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'"):
             self.assertEqual(self.refused("--frame-in", wrong)[0], 2, wrong)
 
+    def test_view_with_a_port_and_a_token_that_stay(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        addresses = []
+        for _ in range(2):
+            child = self.programs.start("slabstream", "view", "a.nrrd", "--no-browser", "--port", "0", "--token-file", "kept")
+            addresses.append(child.stdout.readline().split()[-1])
+            self.assertEqual(Gateway(addresses[-1]).request("/api/v1/render.png?dataset=a&size=16")[0], 200)
+            self.assertEqual(self.programs.end(child), 0)
+        tokens = [Gateway(address).token for address in addresses]
+        self.assertEqual(tokens, 2 * [(self.programs.folder / "kept").read_text().strip()])
+        self.assertEqual((self.programs.folder / "kept").stat().st_mode & 0o777, 0o600)
+        self.programs.run("view", "a.nrrd", "--port", "70000", expect=2)
+
     @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
     def test_tls(self):
         subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", "key.pem", "-out", "cert.pem", "-days", "2", "-subj",
