@@ -278,6 +278,7 @@ applyTheme();
 const token = takeToken();
 const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
 if (token) {
+  showAlone("Connecting…");
   loadOffers().then(() => {
     INITIAL.renderer = automaticRenderer();
     new Page(token);
