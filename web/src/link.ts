@@ -129,7 +129,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: opacities,
   overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
-  measures, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
+  measures, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), colorBar: flag("color-bar"), machine: flag("machine"),
 };
 
 // Spaces and most marks are legible as they are in a fragment.

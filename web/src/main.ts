@@ -4,7 +4,7 @@ import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./
 import { wholeBox } from "./clip_handles";
 import { clipSection } from "./clip_section";
 import type { Context } from "./context";
-import { openSection, section } from "./controls";
+import { openSection, section, toggle } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
@@ -57,7 +57,7 @@ class Page {
     this.api = new Api(token);
     const { store, notices, api } = this;
     const context: Context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
-    const source: FunctionSource = new FunctionSource(context, () => editor.refresh());
+    const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
     const labels = new Labels(context), layers = layersSection(context, labels);
     this.measuring = new Measuring(context);
     this.measures = measureSection(context, this.measuring);
@@ -65,7 +65,10 @@ class Page {
     this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
     const editor = new TransferEditor(context, source);
     this.clipping = clipSection(context);
-    const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element);
+    const bar = toggle("Colour bar", on => store.update({ colorBar: on }));
+    store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
+    bar.set(store.state.colorBar);
+    const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
     this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, layers, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },

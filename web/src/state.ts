@@ -58,6 +58,7 @@ export interface State {
   legend: boolean; // of labels
   marker: boolean;
   scaleBar: boolean;
+  colorBar: boolean;
   machine: boolean;
 }
 
@@ -71,7 +72,7 @@ export const INITIAL: State = {
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
   overlay: false, overlayPreset: "auto", overlayColor: "#ff4fd8", overlayRange: null, overlayWeight: 1,
   layout: "single", crosshair: null, window: null, level: null, measures: [], legend: true,
-  marker: true, scaleBar: true, machine: false,
+  marker: true, scaleBar: true, colorBar: false, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.
