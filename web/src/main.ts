@@ -1,6 +1,7 @@
 // The page: makes the parts and connects them.
 import { Api, type Dataset } from "./api";
 import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
+import { carried } from "./carry";
 import { wholeBox } from "./clip_handles";
 import { clipSection } from "./clip_section";
 import type { Context } from "./context";
@@ -20,7 +21,7 @@ import { measureSection } from "./measure_section";
 import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { automaticRenderer, can, loadOffers, noteKind } from "./offers";
+import { automaticRenderer, can, loadOffers, noteDataset } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
 import { Slices } from "./slices";
@@ -48,8 +49,10 @@ class Page {
   private readonly measuring: Measuring;
   private readonly measures: HTMLDetailsElement;
   private volume: Volume | null = null;
+  private left: Volume | null = null; // the one before, whose view the other dataset takes over
   private starts = !/(^|&)(azimuth|elevation)=/.test(location.hash.slice(1)); // the view has not been chosen yet
   private asking = ""; // the dataset that is being asked about
+  private listed: readonly Dataset[] = []; // as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
 
@@ -90,6 +93,7 @@ class Page {
     });
     addEventListener("hashchange", () => {
       if (location.hash.includes("token=")) return location.reload(); // a link of another start of the gateway, perhaps
+      this.left = null;
       store.update(stateOf(location.hash.slice(1)));
     });
     document.addEventListener("pointerdown", () => store.press(), true);
@@ -116,28 +120,40 @@ class Page {
     this.machine.onStatus(status);
     const { dataset } = this.store.state, first = status.datasets[0];
     if (!dataset && first) this.store.update({ dataset: first.name });
+    this.listed = status.datasets;
     this.shell.showDatasets(status.datasets, this.store.state.dataset);
     this.know();
   }
 
+  // The view, the look and what undo knows stay. What of it does not apply shows once the dataset is known.
+  private showDataset(name: string): void {
+    this.left = this.volume ?? this.left;
+    this.starts = !this.left;
+    noteDataset(this.listed.find(each => each.name === name), true);
+    this.store.update({ dataset: name });
+  }
+
   private forgetVolume(): void {
     this.volume = null;
-    noteKind(0);
+    noteDataset(this.listed.find(each => each.name === this.store.state.dataset), this.left !== null);
     for (const listener of this.volumeListeners) listener(null);
   }
 
-  // Once a picture of the dataset is there, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
+  // Once the dataset is loaded, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
   private know(): void {
-    const { dataset } = this.store.state;
-    if (this.volume?.name === dataset || this.asking === dataset || this.viewer.pane.shown?.frame.view.options["dataset"] !== dataset) return;
+    const { dataset } = this.store.state, drawn = this.viewer.pane.shown?.frame.view.options["dataset"] === dataset;
+    const loaded = drawn || this.listed.some(each => each.name === dataset && each.state === "ready");
+    if (this.volume?.name === dataset || this.asking === dataset || !loaded) return;
     this.asking = dataset;
     Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
       const entry = list.find((each: Dataset) => each.name === dataset);
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
       if (!this.volume) return;
-      noteKind(this.volume.cells);
+      noteDataset(entry, false);
       if (this.starts) this.store.update(startOf(world));
+      if (this.left) this.store.update(carried(this.store.state, this.left, this.volume));
+      this.left = null;
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();
     }).catch((error: unknown) => this.notices.say(error instanceof Error ? error.message : String(error), "error")).finally(() => { this.asking = ""; });
@@ -209,7 +225,7 @@ class Page {
   private actions(): ConstructorParameters<typeof Shell>[0] {
     const { store } = this;
     return {
-      dataset: name => { this.starts = true; store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }); },
+      dataset: name => this.showDataset(name),
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
       panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),

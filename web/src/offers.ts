@@ -1,4 +1,5 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
+import type { Dataset } from "./api";
 
 export interface Offer {
   name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; region_presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
@@ -50,11 +51,24 @@ const has = (what: string, { abilities, parameters }: Renderer): boolean => abil
 
 // The renderer unless the user chooses one: the service takes that of volumes or that of unstructured grids.
 export const automaticRenderer = (): string => offers.get("renderer")?.default ?? "";
-let ofGrids = false;
-export const noteKind = (cells: number): void => { ofGrids = cells > 0; }; // of the dataset that is shown
+// The dataset that is shown: whether it is a grid, and which layers it has. `cautious`: what is not known yet counts as missing.
+let ofGrids: boolean | null = null; // null: not known
+let layers = { labels: true, overlay: true };
+export function noteDataset(dataset: Dataset | undefined, cautious: boolean): void {
+  const known = dataset?.state === "ready";
+  ofGrids = known ? (dataset.cells ?? 0) > 0 : cautious ? false : null;
+  layers = known ? { labels: (dataset.layers?.labels ?? 0) > 0, overlay: dataset.layers?.overlay ?? false } : { labels: !cautious, overlay: !cautious };
+}
+export const hasLayer = (name: "labels" | "overlay"): boolean => layers[name];
 export function settled(renderer: string): string {
   const automatic = offers.get("renderer")?.automatic;
   return renderer !== automaticRenderer() || !automatic ? renderer : ofGrids ? automatic.grids : automatic.volumes;
+}
+
+// The renderer, or the automatic one if it draws cells and the dataset has none.
+export function fitting(renderer: string): string {
+  const chosen = renderers().find(({ name }) => name === renderer);
+  return ofGrids === false && chosen?.abilities.includes("cells") ? automaticRenderer() : renderer;
 }
 
 // An ability ("isosurfaces") or a parameter ("sampling-rate") of a renderer; the service refuses the rest.

@@ -34,7 +34,7 @@ export class Viewer {
     context.onVolume(volume => {
       if (this.pane.shown) this.resolveFit(this.pane.shown);
       this.annotate();
-      if (volume && Object.keys(context.store.state.parameters).length > 0) this.later(); // by now it is known which of them apply
+      if (volume) this.later(); // by now it is known which of its options apply
     });
     measuring.onChange(() => this.annotate());
     labels.onChange(() => this.annotate());
