@@ -26,11 +26,16 @@ export class Api {
   // Whether the gateway has said that it has no such address.
   lacks(path: string): boolean { return this.missing.has(path); }
 
-  async ask(path: string, fields: Record<string, string> = {}, body?: Options, signal?: AbortSignal): Promise<Response> {
+  ask = (path: string, fields: Record<string, string> = {}, body?: Options, signal?: AbortSignal): Promise<Response> =>
+    this.request(path, fields, body ? { method: "POST", body: JSON.stringify(body) } : {}, signal);
+
+  // Bytes, as they are.
+  send = (path: string, fields: Record<string, string>, body: ArrayBuffer | null, signal?: AbortSignal): Promise<Response> =>
+    this.request(path, fields, { method: "POST", body }, signal);
+
+  private async request(path: string, fields: Record<string, string>, what: RequestInit, signal?: AbortSignal): Promise<Response> {
     const query = new URLSearchParams(fields).toString();
-    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, {
-      method: body ? "POST" : "GET", headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(body ? { body: JSON.stringify(body) } : {}), ...(signal ? { signal } : {}),
-    });
+    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, { ...what, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(signal ? { signal } : {}) });
     if (response.ok) return response;
     const answer = (await response.json().catch(() => null)) as { error?: string } | null;
     throw new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);

@@ -24,6 +24,7 @@ import { Notices } from "./notices";
 import { automaticRenderer, can, loadOffers, noteDataset } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
+import { Sending } from "./sending";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
 import { INITIAL, type State, Store } from "./state";
@@ -41,6 +42,7 @@ class Page {
   private readonly api: Api;
   private readonly notices = new Notices();
   private readonly shell: Shell;
+  private readonly sending: Sending;
   private readonly machine = new Machine(() => this.store.update({ machine: false }));
   private readonly pointed: Pointed;
   private readonly viewer: Viewer;
@@ -55,6 +57,7 @@ class Page {
   private listed: readonly Dataset[] = []; // as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
+  private readonly file = h("input", { type: "file" });
 
   constructor(token: string) {
     this.api = new Api(token);
@@ -65,7 +68,8 @@ class Page {
     this.measuring = new Measuring(context);
     this.measures = measureSection(context, this.measuring);
     this.pointed = new Pointed(context, label => labels.note(label));
-    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
+    this.sending = new Sending(api, context.say, name => this.showDataset(name));
+    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element, this.sending.element);
     const editor = new TransferEditor(context, source);
     this.clipping = clipSection(context);
     const bar = toggle("Colour bar", on => store.update({ colorBar: on }));
@@ -98,7 +102,7 @@ class Page {
     });
     document.addEventListener("pointerdown", () => store.press(), true);
     for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => store.letGo(), true);
-    this.dropsFiles(editor);
+    this.takesFiles(editor);
     this.shell.setPanel(innerWidth > NARROW_PIXELS);
     this.show();
     showInAddress(store.state, token);
@@ -225,7 +229,7 @@ class Page {
   private actions(): ConstructorParameters<typeof Shell>[0] {
     const { store } = this;
     return {
-      dataset: name => this.showDataset(name),
+      dataset: name => this.showDataset(name), open: () => this.file.click(),
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
       panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
@@ -266,20 +270,22 @@ class Page {
         { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => this.toggleBox() },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
         { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command", run: actions.command },
-        { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        { keys: ["f"], label: "F", does: "Open a file", run: actions.open }, { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
         { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
       ] },
     ];
   }
 
-  private dropsFiles(editor: TransferEditor): void {
+  // A file that is dropped or chosen: a colour map, or else a volume.
+  private takesFiles(editor: TransferEditor): void {
+    const take = (file: File | undefined): void => { if (file) void (file.name.toLowerCase().endsWith(".json") ? editor.open(file) : this.sending.send(file)); };
+    this.file.addEventListener("change", () => { take(this.file.files?.[0]); this.file.value = ""; });
     document.addEventListener("dragover", event => { event.preventDefault(); document.body.dataset["drop"] = "over"; });
     document.addEventListener("dragleave", event => { if (!event.relatedTarget) delete document.body.dataset["drop"]; });
     document.addEventListener("drop", event => {
       event.preventDefault();
       delete document.body.dataset["drop"];
-      const file = event.dataTransfer?.files[0];
-      if (file) void editor.open(file);
+      take(event.dataTransfer?.files[0]);
     });
   }
 }
