@@ -15,6 +15,10 @@ export interface Dataset {
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
+export interface LabelStatistics {
+  unit: string; // of volumes
+  labels: { value: number; name: string; volume: number; mean: number | null; deviation: number | null; least: number | null; largest: number | null }[];
+}
 export interface LabelName { value: number; name: string; color?: string }
 export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null }
 
@@ -60,6 +64,7 @@ export class Api {
   value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);
   profile = (dataset: string, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { dataset, from: from.join(","), to: to.join(",") });
   statistics = (dataset: string, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { dataset, box });
+  labelStatistics = (dataset: string): Promise<LabelStatistics | null> => this.maybe("statistics", { dataset, labels: "true" });
   pick = (options: Options, x: number, y: number, signal?: AbortSignal): Promise<Value | null> => this.maybe("pick", {}, { ...options, x, y }, signal);
 
   private async maybe<T>(path: string, fields: Record<string, string>, body?: Options, signal?: AbortSignal): Promise<T | null> {

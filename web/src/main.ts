@@ -10,6 +10,7 @@ import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dial
 import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
 import { GradientEditor } from "./gradient_editor";
+import { keepView, keyFramesSection } from "./key_frames";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
 import { Labels } from "./labels";
@@ -40,6 +41,7 @@ const TURN = { near: 5, far: 45 }, MOVE_PIXELS = { near: 20, far: 100 }, ZOOM_ST
 class Page {
   private readonly store = new Store(stateOf(location.hash.slice(1)));
   private readonly api: Api;
+  private readonly context: Context;
   private readonly notices = new Notices();
   private readonly shell: Shell;
   private readonly sending: Sending;
@@ -62,7 +64,7 @@ class Page {
   constructor(token: string) {
     this.api = new Api(token);
     const { store, notices, api } = this;
-    const context: Context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
+    const context: Context = this.context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
     const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
     const labels = new Labels(context), layers = layersSection(context, labels);
     this.measuring = new Measuring(context);
@@ -76,7 +78,7 @@ class Page {
     store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
     bar.set(store.state.colorBar);
     const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
-    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, layers, lightSection(context), this.facts());
+    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
       status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
@@ -270,7 +272,7 @@ class Page {
         { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => this.toggleBox() },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
         { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command", run: actions.command },
-        { keys: ["f"], label: "F", does: "Open a file", run: actions.open }, { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        { keys: ["f"], label: "F", does: "Open a file", run: actions.open }, { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["n"], label: "N", does: "Add a key frame", run: () => keepView(this.context) }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
         { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
       ] },
     ];
