@@ -76,7 +76,7 @@ class PageTest(unittest.TestCase):
         (cls.programs.folder / "big.nrrd").write_bytes(big + gzip.compress(bytes(1 << 20), 1) * BIG_MEGABYTES)
         cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "v.nrrd")
         cls.programs.run("convert", "v.nrrd", "v.ome.zarr")
-        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd")
+        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -976,7 +976,7 @@ class PageTest(unittest.TestCase):
         wait_until(lambda: all(each["name"] != "large" for each in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "it is dropped")
 
     def test_no_curve_is_made_up_while_a_dataset_is_read(self):
-        viewer = self.viewer(dataset="big")
+        viewer = self.viewer(dataset="later")
         viewer.until("document.querySelector('.plot .curve') !== null && document.querySelector('.progress-text').textContent.startsWith('Reading')")
         self.assertEqual(viewer.js("[document.querySelector('.plot .curve').getAttribute('d') || '', document.querySelectorAll('.plot .point').length]"), ["", 0])
         viewer.settled()
