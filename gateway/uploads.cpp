@@ -68,7 +68,9 @@ void Uploads::Handle(PictureFields fields, std::string body, const std::vector<s
   }
   upload->second.used = MonotonicNow();
   if (std::ranges::find(fields, "drop", &PictureField::name) != fields.end()) {
+    const ReplyFunction waiting = std::move(upload->second.waiting);
     uploads_.erase(upload);
+    if (waiting) waiting(Failure(404, "the upload was dropped"));
     return reply(JsonReply(Json::object()));
   }
   if (upload->second.failure) {
@@ -133,10 +135,13 @@ void Uploads::Continue(Place upload, std::uint64_t begin, std::string body, Repl
     const auto owner = std::make_shared<const std::string>(std::move(body));
     to.sender->Add(Bytes(owner, std::as_bytes(std::span(*owner))));
   }
+  // The connection of a part that comes again may have died without a word.
+  if (to.waiting) std::exchange(to.waiting, nullptr)(Failure(400, "the part has come again"));
   to.waiting = std::move(reply);
-  *gone = [this, alive = std::weak_ptr<bool>(alive_), id = upload->first] {
+  *gone = [this, alive = std::weak_ptr<bool>(alive_), id = upload->first, number = ++to.requests] {
     if (alive.lock() == nullptr) return;
-    if (const Place left = uploads_.find(id); left != uploads_.end()) left->second.waiting = nullptr;
+    const Place left = uploads_.find(id);
+    if (left != uploads_.end() && left->second.requests == number) left->second.waiting = nullptr;
   };
   AnswerIfDone(to);
 }
@@ -182,7 +187,10 @@ void Uploads::Touch(std::string_view dataset, Time now) {
 }
 
 void Uploads::RemoveUnseen(Time now) {
-  std::erase_if(uploads_, [now](const auto& each) { return now - each.second.used > kUnseen; });
+  std::erase_if(uploads_, [now](const auto& each) {
+    const Upload& upload = each.second;
+    return !upload.waiting && now - upload.used > (upload.there ? kUnseen : kStalled);
+  });
 }
 
 }  // namespace slabstream

@@ -4,7 +4,8 @@
 //   POST upload?upload=ID&begin=B + body   the next bytes: {"received": N}, once the service takes them; with the last ones, once the
 //                                          dataset is there
 //   POST upload?upload=ID&drop=true        removes it
-// A dataset of a file goes when the gateway ends, or when nobody has looked at it for kUnseen.
+// A dataset of a file goes when the gateway ends, or when nobody has looked at it for kUnseen. A file of which no part comes for kStalled
+// is given up.
 #pragma once
 
 #include <boost/asio/io_context.hpp>
@@ -27,6 +28,7 @@ namespace slabstream {
 
 inline constexpr std::size_t kMaxUploadsKept = 16;
 inline constexpr Duration kUnseen = std::chrono::minutes(10);
+inline constexpr Duration kStalled = std::chrono::minutes(1);          // between the parts of a file: the service takes few files at a time
 inline constexpr std::uint64_t kUploadBytes = std::uint64_t{1} << 30;  // of a file, unless the gateway is told another limit
 
 // The name of a file that a browser tells, as the service takes it: with the file's ending.
@@ -52,6 +54,7 @@ class Uploads {
     bool there = false;                               // the dataset
     std::optional<Status> failure;                    // nobody has been told yet
     ReplyFunction waiting;                            // for the end of the last part; empty: nobody waits
+    std::uint64_t requests = 0;                       // with parts
     Time used;
     std::unique_ptr<FileUpload> sender;
   };

@@ -963,7 +963,7 @@ class StartTest(unittest.TestCase):
         word, address = child.stdout.readline().split()
         self.assertEqual(word, "ready")
         self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
-        self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/api/v1/status")[0], 200)
+        self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/metrics")[0], 200)
 
     def test_frames_of_other_pages(self):
         _, gateway = self.programs.gateway("--frame-in", "vscode-webview:", "--frame-in", "https://Hub.example.org")
