@@ -56,6 +56,7 @@ class Page {
   private left: Volume | null = null; // the one before, whose view the other dataset takes over
   private starts = !/(^|&)(azimuth|elevation)=/.test(location.hash.slice(1)); // the view has not been chosen yet
   private asking = ""; // the dataset that is being asked about
+  private refused = false; // a view of the dataset
   private listed: readonly Dataset[] = []; // as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
@@ -81,7 +82,7 @@ class Page {
     this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
-      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
+      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; notices.onError(message); },
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
@@ -141,14 +142,16 @@ class Page {
 
   private forgetVolume(): void {
     this.volume = null;
+    this.refused = false;
     noteDataset(this.listed.find(each => each.name === this.store.state.dataset), this.left !== null);
     for (const listener of this.volumeListeners) listener(null);
   }
 
-  // Once the dataset is loaded, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
+  // Once a picture of the dataset is there, or none can be made of it as it was asked for although it is loaded, the gateway can tell of it;
+  // what it tells may be a second old, so it is asked again then.
   private know(): void {
     const { dataset } = this.store.state, drawn = this.viewer.pane.shown?.frame.view.options["dataset"] === dataset;
-    const loaded = drawn || this.listed.some(each => each.name === dataset && each.state === "ready");
+    const loaded = drawn || (this.refused && this.listed.some(each => each.name === dataset && each.state === "ready"));
     if (this.volume?.name === dataset || this.asking === dataset || !loaded) return;
     this.asking = dataset;
     Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
