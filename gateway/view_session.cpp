@@ -217,6 +217,7 @@ void ViewSession::PrefetchAhead(const std::vector<FrameRequest>& frames) {
 
 void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress) {
   if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
+  if (progress.phase == FramePhase::kLoading) machine_.OnLoading(MonotonicNow());
   peer_->SendText(TextOf({{"type", "progress"},
                           {"seq", rendering_->view.seq},
                           {"phase", NameOf(progress.phase)},
