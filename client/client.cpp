@@ -464,6 +464,10 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
   return std::move(reply->samples);
 }
 
+Result<ViewReply> Client::ChooseView(ViewQuery query, Duration deadline) {
+  return impl_->Await<ViewReply>(impl_->Ask(std::move(query), deadline));
+}
+
 Result<BoxStatistics> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline) {
   Result<StatisticsReply> reply = impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box}, deadline));
   if (!reply.ok()) return reply.status();

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/levels.h"
 #include "common/planning/shown_zones.h"
 #include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
@@ -80,6 +81,17 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
     reply.depth = picked->depth;
   }
   return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& finest,
+                                 const std::shared_ptr<const VolumeSummary>& overview) {
+  const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed);
+  if (!chosen.ok()) return chosen.status();
+  if (Status status = CheckView(chosen->view, finest); !status.ok()) return status;
+  return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
+}
+Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
+  return AnswerView(query, dataset.summary->description.geometry, dataset.summary);
 }
 
 Result<QuestionReply> Answer(const PrefetchQuery& query, const Dataset&) { return QuestionReply(PrefetchReply{.nonce = query.nonce}); }
@@ -174,6 +186,10 @@ Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion
   return AnswerSummary(query, *asked.summary);
 }
 
+Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
+  return AnswerView(query, asked.summary->description.geometry, asked.summary);
+}
+
 Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& asked, Prefetcher& prefetcher) {
   PrefetchReply reply{.nonce = query.nonce, .fetches = asked.summary->stored && Prefetcher::Fetches(*asked.summary->stored)};
   if (!reply.fetches) return QuestionReply(reply);
@@ -188,6 +204,9 @@ Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& as
 }  // namespace
 
 Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher) {
+  if (asked.levels != nullptr) {
+    return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary);
+  }
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {

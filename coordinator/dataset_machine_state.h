@@ -44,6 +44,7 @@ struct DatasetMachine::State {
     };
     std::vector<Entry> entries;
     std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
+    std::optional<ViewParameters> view = {};   // likewise (DatasetReady::view)
     bool has_light = false;                    // likewise: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
@@ -124,6 +125,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const ViewQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PrefetchQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);

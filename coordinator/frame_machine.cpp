@@ -149,7 +149,9 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
                   .share_pixels = in_shares ? config.share_pixels : 0,
                   .limits = WorkerLimits()};
   if (const OpenRequest::HasDataset& dataset = *request.dataset(); dataset.levels != nullptr) {
-    ask.frame = std::make_shared<const FrameRequest>(request.submit.frame);
+    FrameRequest frame = request.submit.frame;
+    frame.view = dataset.view;
+    ask.frame = std::make_shared<const FrameRequest>(std::move(frame));
     ask.levels = dataset.levels;
     ask.level = dataset.drawn.front();
   }

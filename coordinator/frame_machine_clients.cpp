@@ -66,7 +66,8 @@ void FrameMachine::State::On(const DatasetNews& event) {
 
 // Errors as of ResolveRequest.
 Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
-  const FrameRequest& asked = request.submit.frame;
+  FrameRequest asked = request.submit.frame;
+  if (ready.view) asked.view = *ready.view;
   if (ready.levels == nullptr && LevelNumber(asked.level).value_or(0) > 0) {
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has level 0 alone", asked.level, asked.dataset));
   }
@@ -81,10 +82,12 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   const bool counted = !resolved->summary->stored && resolved->map == nullptr;
   request.uses_occupancy = NeedsOccupancy(asked.policy) && counted;
   request.needs_occupancy = request.uses_occupancy && !LeavesChoice(asked.policy);
+  const ViewParameters view = ready.view.value_or(resolved->frame.view);
   request.state = OpenRequest::HasDataset{.resolved = std::make_shared<const ResolvedRequest>(*std::move(resolved)),
                                           .seen = ready.seen,
                                           .levels = ready.levels,
-                                          .drawn = ready.drawn};
+                                          .drawn = ready.drawn,
+                                          .view = view};
   return Status::Ok();
 }
 

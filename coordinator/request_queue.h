@@ -53,6 +53,7 @@ struct OpenRequest {
     bool seen = false;                                // DatasetReady::seen: its frame may begin
     std::shared_ptr<const VolumeLevels> levels;       // DatasetReady::levels and drawn
     std::vector<int> drawn = {0};
+    ViewParameters view = {};  // of the picture, complete, in terms of the finest level (ChooseView)
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
     // The voxels that its frame is drawn from: the volume first.

@@ -26,21 +26,21 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return render.status();
   request.render = *std::move(render);
-  const Result<int> frames = ParseInteger("frames", *frames_text, 1, kMaxMovieFrames);
-  if (!frames.ok()) return Printable(frames.status());
   const Result<int> turns = ParseInteger("turns", *turns_text, 0, kMaxTurns);
   if (!turns.ok()) return Printable(turns.status());
   const Result<double> fps = ParseNumber("fps", *fps_text, {kMinFramesPerSecond, kMaxFramesPerSecond});
   if (!fps.ok()) return Printable(fps.status());
+  const Result<int> frames = ParseInteger("frames", *frames_text, 1, kMaxMovieFrames);
+  if (!frames.ok()) return Printable(frames.status());
   request.frames = *frames;
-  request.turns = *turns;
+  request.move.turns = *turns;
   request.frames_per_second = *fps;
   const auto [width, height] = request.render.frame.size;
   if (std::int64_t{width} * height > kMaxMoviePixels) {
     return Status::InvalidArgument(fmt::format("--size {}x{} has {} pixels, frames of movies at most {}", width, height,
                                                std::int64_t{width} * height, kMaxMoviePixels));
   }
-  if (request.render.frame.view.eye && request.turns > 0) {
+  if (request.render.frame.view.eye && request.move.turns > 0) {
     return Status::InvalidArgument(
         "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; turns=0 fixes the view");
   }

@@ -20,8 +20,9 @@
 #include "client/cli/trace_json.h"
 #include "client/cli/trace_spans.h"
 #include "client/cli/warn_of_picture.h"
+#include "client/movie/camera_moves.h"
 #include "client/movie/turntable.h"
-#include "client/request/request_options.h"
+#include "client/request/camera_file.h"
 #include "common/base/files.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
@@ -74,15 +75,32 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
   return Status::Ok();
 }
 
-// The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
+// The views of the jobs, whose datasets are known.
+Status PlaceCameras(Client& client, const CameraMove& move, std::vector<FrameJob>& jobs) {
+  std::vector<std::string> datasets;
+  for (const FrameJob& job : jobs) {
+    if (datasets.empty() || datasets.back() != job.request.dataset) datasets.push_back(job.request.dataset);  // times rise
+  }
+  const AskView ask = [&client](ViewQuery query) { return client.ChooseView(std::move(query)); };
+  Result<std::vector<ViewParameters>> views = ViewsOfMovie(jobs.front().request, move, int(jobs.size()), datasets, ask);
+  if (!views.ok()) return views.status();
+  for (std::size_t i = 0; i < jobs.size(); ++i) jobs[i].request.view = (*views)[i];
+  return Status::Ok();
+}
+
+// The pictures of `jobs`, and the files beside them (--stats, --trace, --save-camera). `move`: of a sequence; null: the views are those of
+// the jobs. `open_pictures` is called just before the first frame: until then Ctrl-C ends the process at once, so there must be nothing to
+// clean up. `failures`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
-Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight, std::vector<Status>* failures) {
+Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const CameraMove* move,
+                                                const OpenSink& open_pictures, int in_flight, std::vector<Status>* failures) {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
   if (Status status = SettleTransfer(connection->client(), jobs); !status.ok()) return status;
+  if (move != nullptr) {
+    if (Status status = PlaceCameras(connection->client(), *move, jobs); !status.ok()) return status;
+  }
   const Result<PictureKey> key = KeyFor(connection->client(), options.format.annotations, jobs.front().request);
   if (!key.ok()) return key.status();
   const Result<std::unique_ptr<PictureSink>> pictures = open_pictures(*key);
@@ -98,8 +116,8 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   if (!frames.ok()) return frames;
   WarnOf(connection->client(), jobs.front().request, frames->front().empty);
   if (!options.camera_path.empty()) {
-    const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";
-    if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;
+    const ViewParameters view = frames->front().statistics.view.value_or(jobs.front().request.view);
+    if (Status status = WriteTextFile(options.camera_path, CameraText(view)); !status.ok()) return status;
   }
   if (!options.stats_path.empty()) {
     if (Status status = WriteTextFile(options.stats_path, StatsJson(options, *frames)); !status.ok()) return status;
@@ -181,7 +199,7 @@ Status CheckTurntable(const TurntableOptions& options) {
   return CheckPaths(options.frame, first_output);
 }
 
-// Frame i shows the time and the angle that belong to the i-th part of the whole.
+// Frame i shows the time that belongs to the i-th part of the whole.
 Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   const TimeRange times = options.times.value_or(TimeRange{});
   const int frames = options.frames.value_or(times.count());
@@ -189,15 +207,13 @@ Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
     return Status::InvalidArgument(fmt::format("--time {}:{} has {} times, but at most {} --frames are possible", times.first, times.last,
                                                frames, kMaxTurntableFrames));
   }
-  FrameRequest request = options.frame.request;
   if (times.count() > 1 && options.frame.connection.local_workers > 0) {
     if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
   }
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {
     const int time = times.first + int(std::int64_t{i} * times.count() / frames);
-    FrameJob& job = jobs.emplace_back(FrameJob{request, FileOf(options, i), SourceAt(options, time)});
-    job.request.view.azimuth_degrees = TurntableAzimuth(request.view.azimuth_degrees, options.turns, i, frames);
+    jobs.push_back({options.frame.request, FileOf(options, i), SourceAt(options, time)});
   }
   return jobs;
 }
@@ -210,7 +226,7 @@ Status RunRender(const RenderOptions& options) {
   if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
   const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key); };
   const auto frames =
-      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
+      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, nullptr, open_pictures, 1, nullptr);
   if (!frames.ok()) return frames.status();
   const ImageSize size = options.frame.request.size;
   std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
@@ -229,7 +245,8 @@ Status RunTurntable(const TurntableOptions& given) {
   if (!jobs.ok()) return jobs.status();
   const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
   std::vector<Status> failures;
-  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight, &failures);
+  const CameraMove move{.turns = options.turns};
+  const auto frames = RenderPictures(options.frame, *jobs, &move, open_pictures, options.in_flight, &failures);
   const std::string who = "slabstream turntable";
   if (!frames.ok()) {
     failures.push_back(frames.status());

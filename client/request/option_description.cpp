@@ -89,6 +89,7 @@ Json Describe(CLI::Option& option) {
     if (!field->unit.empty()) json["unit"] = field->unit;
     if (!field->ability.empty()) json["ability"] = field->ability;
     if (field->same_picture) json["same_picture"] = true;
+    if (field->negatable) json["negatable"] = true;
     if (field->path == "renderer") {
       json["renderers"] = DescribeRenderers();
       json["automatic"] = {{"volumes", DefaultRenderer(false).name()}, {"grids", DefaultRenderer(true).name()}};

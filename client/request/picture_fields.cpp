@@ -49,7 +49,12 @@ Status AddArgument(CLI::App& app, const PictureField& field, std::vector<std::st
   const CLI::Option* const option = proper ? app.get_option_no_throw(name) : nullptr;
   if (option == nullptr) return Status::InvalidArgument(fmt::format("there is no option '{}'", Printable(field.name.substr(0, 64))));
   if (MayStandAlone(*option) && (field.text == "true" || field.text == "false" || field.text.empty())) {
-    if (field.text != "false") arguments.push_back(name);
+    const std::string off = "--no-" + field.name;
+    if (field.text != "false") {
+      arguments.push_back(name);
+    } else if (option->check_name(off)) {
+      arguments.push_back(off);
+    }
     return Status::Ok();
   }
   if (IsFlag(*option)) {

@@ -9,14 +9,14 @@
 #include <string_view>
 #include <vector>
 
+#include "client/request/camera_file.h"
 #include "client/request/layer_options.h"
 #include "client/request/value_window.h"
 #include "client/request/values.h"
-#include "common/base/files.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
+#include "common/view/default_view.h"
 #include "common/view/named_view.h"
-#include "common/wire/validate_request.h"
 
 namespace slabstream {
 namespace {
@@ -33,15 +33,6 @@ void AddRequestOptions(CLI::App& app, FrameRequest& request, ColorMaps maps, con
     for (const std::string& other : option.excludes) app.get_option("--" + option.name)->excludes(app.get_option("--" + other));
     for (const std::string& other : option.needs) app.get_option("--" + option.name)->needs(app.get_option("--" + other));
   }
-}
-
-Result<ViewParameters> ParseCameraFile(const std::string& option, const std::string& path) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 16;
-  const Result<std::string> text = ReadTextFile(path, kMostBytes);
-  if (!text.ok()) return Status(text.status().code(), fmt::format("{} {}", option, text.status().message()));
-  Result<ViewParameters> view = ParseCamera(*text);
-  if (!view.ok()) return Status::InvalidArgument(fmt::format("{} {}: {}", option, path, view.status().message()));
-  return view;
 }
 
 // Options that stand for several fields.
@@ -65,10 +56,8 @@ void AddWholeViews(CLI::App& app, ViewParameters& view, bool files) {
   for (const char* option : {"--azimuth", "--elevation", "--of-patient", "--eye"}) named->excludes(app.get_option(option));
   if (!files) return;
   CLI::Option* const camera = AddParsed(app, "--camera", view, ParseCameraFile, "Take the view from a file that --save-camera wrote");
-  camera->type_name("FILE")->excludes(named);
-  for (const RequestOption& option : RequestOptions()) {
-    if (option.path.starts_with("view.")) camera->excludes(app.get_option("--" + option.name));
-  }
+  camera->type_name("FILE");
+  ExcludeViewOptions(app, camera);
 }
 
 void AddPictureFormat(CLI::App& app, PictureFormat& format) {
@@ -112,14 +101,23 @@ CLI::Option* AddRequestOption(CLI::App& app, const RequestOption& option, FrameR
     return true;
   };
   app.option_defaults()->group(option.group);
-  if (option.flag())
+  if (option.flag()) {
+    const std::string names = option.negatable ? fmt::format("{},!--no-{}", name, option.name) : name;
     return app.add_flag_function(
-        name, [set](std::int64_t) { set({"true"}); }, option.help);
+        names, [set](std::int64_t count) { set({count > 0 ? "true" : "false"}); }, option.help);
+  }
   CLI::Option* const added = app.add_option(name, CLI::callback_t(set), option.help)->type_name(option.value)->default_str(option.standard);
   if (option.range) NoteRange(added, *option.range);
   if (!option.choices.empty()) NoteChoices(added, {option.choices.begin(), option.choices.end()});
   if (option.repeatable) added->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   return added;
+}
+
+void ExcludeViewOptions(CLI::App& app, CLI::Option* option) {
+  option->excludes(app.get_option("--view"));
+  for (const RequestOption& field : RequestOptions()) {
+    if (field.path.starts_with("view.")) option->excludes(app.get_option("--" + field.name));
+  }
 }
 
 void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer) {
@@ -128,6 +126,7 @@ void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer) {
 
 void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files) {
   const ColorMaps maps = files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts;
+  request.view = kUnstatedView;
   AddRequestOptions(app, request, maps, [](const RequestOption& option) { return option.name != "dataset" && option.name != "previews"; });
   AddWholeViews(app, request.view, files != nullptr);
   if (files != nullptr) AddLayerFiles(app, *files, &request);
@@ -183,17 +182,6 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
   app.get_option("--size")->group("Plane");
   AddPictureFormat(app, slice.format);
   AddAnnotationOptions(app, slice.format.annotations);
-}
-
-Result<ViewParameters> ParseCamera(const std::string& text) {
-  const Result<Json> json = ParseJson(text);
-  if (!json.ok()) return json.status();
-  FrameRequest request;
-  std::optional<std::string> mistake;
-  JsonValue(*json, "", mistake).Fields(OptionFields(request, {"view."}));
-  if (mistake) return Status::InvalidArgument(*mistake);
-  if (Status status = Validate(request.view); !status.ok()) return status;
-  return request.view;
 }
 
 }  // namespace slabstream

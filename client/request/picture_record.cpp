@@ -89,7 +89,7 @@ void AddRequest(OptionList& out, const FrameRequest& request) {
     }
     for (const std::string& text : texts) {
       if (option.flag()) {
-        out.Add("--" + option.name);
+        out.Add((text == "true" ? "--" : "--no-") + option.name);
       } else {
         out.Add("--" + option.name, text);
       }
@@ -138,6 +138,7 @@ Json GeometryJson(const PictureGeometry& geometry) {
 
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
   if (!statistics.renderer.empty()) request.renderer = statistics.renderer;
+  if (statistics.view) request.view = *statistics.view;
   return request;
 }
 

@@ -36,7 +36,8 @@ struct PictureRecord {
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);
 
-// The request of a picture with the renderer that has made it, so that its record names that one. Of a preview: the request as it is.
+// The request of a picture with the renderer and the view that it was made by, so that its record names these. Of a preview: the request as
+// it is.
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics);
 
 // ASCII, one line.

@@ -6,10 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "common/planning/brick_visibility.h"
 #include "common/planning/frame_occlusion.h"
-#include "common/planning/framing.h"
-#include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
 #include "common/volume/light_volume.h"
@@ -57,14 +54,8 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   setup.transfer = resolved.volume.transfer();
   setup.clip = resolved.volume.clip();
   setup.looks = resolved.volume.looks();
-  ViewParameters view = request.view;
-  if (view.fit) {
-    const BrickVisibility visibility(summary, setup.renderer->DrawnTable(setup.transfer, summary),
-                                     LayerBricks(summary, *setup.renderer, setup.looks));
-    view = FramedView(request, visibility.VisibleBricks(setup.clip), setup.clip, geometry);
-  }
-  if (Status status = CheckView(view, geometry); !status.ok()) return status;
-  if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
+  if (Status status = CheckView(request.view, geometry); !status.ok()) return status;
+  if (Status status = setup.renderer->SetView(request.view, request.size, setup); !status.ok()) return status;
   setup.shading = setup.transfer.material ? OnMaterial(request.shading, *setup.transfer.material) : request.shading;
   setup.transfer.material.reset();  // workers find it in the shading
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);

@@ -14,6 +14,7 @@
 #include "common/planning/picture_extent.h"
 #include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/view/default_view.h"
 #include "common/volume/grid_map.h"
 #include "common/volume/light_volume.h"
 
@@ -210,10 +211,27 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
 }
 
+Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry& finest,
+                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed) {
+  ChosenView chosen = {.view = WithDefaults(request.view, finest.orientation.world), .framed = framed};
+  if (!std::exchange(chosen.view.fit, false).value()) return ChosenView{chosen.view, std::nullopt};
+  if (!framed) {
+    // Coarser levels have other indices.
+    const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
+    if (!clip.ok()) return clip.status();
+    const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview);
+    if (!resolved.ok()) return resolved.status();
+    chosen.framed = resolved->framed;
+  }
+  if (chosen.framed) chosen.view = FitView(chosen.view, finest, *chosen.framed);
+  return chosen;
+}
+
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level) {
   if (finest == level) return request;
   ViewParameters& view = request.view;
-  if (!view.look_at && !view.fit) view.look_at = finest.ToWorld(finest.centre());
+  view = WithDefaults(view, level.orientation.world);
+  if (!view.look_at && !*view.fit) view.look_at = finest.ToWorld(finest.centre());
   if (view.projection == Projection::kPerspective) {
     if (!view.eye && view.distance == 0) {
       view.distance = BoundingRadius(finest) / std::sin(view.fov_degrees * (std::numbers::pi / 360));
@@ -221,7 +239,7 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
   } else {
     const Vec3 centre = level.orientation.FromWorld(level.ToWorld(level.centre()) - finest.orientation.origin) / finest.spacing;
     view.distance = MakeCamera(view, request.size, finest).Project(centre).depth;
-    if (!view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
+    if (!*view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);

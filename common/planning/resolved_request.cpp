@@ -7,7 +7,11 @@
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/planning/brick_visibility.h"
+#include "common/planning/framing.h"
+#include "common/planning/layer_bricks.h"
 #include "common/renderers/registry.h"
+#include "common/view/default_view.h"
 
 namespace slabstream {
 namespace {
@@ -133,13 +137,22 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (!clip.ok()) return clip.status();
   Result<LayerLooks> layers = ResolveLayers(request, *summary);
   if (!layers.ok()) return layers.status();
+  request.view = WithDefaults(request.view, geometry.orientation.world);
+  std::optional<Ball> framed;
+  if (*request.view.fit) {
+    const BrickVisibility visibility(*summary, renderer->DrawnTable(*transfer, *summary), LayerBricks(*summary, *renderer, *layers));
+    framed = FramedBall(request, visibility.VisibleBricks(*clip), *clip, geometry);
+    if (framed) request.view = FitView(request.view, geometry, *framed);
+    request.view.fit = false;
+  }
   request.policy = SettledPolicy(request, geometry);
   std::optional<ResolvedPolicy> policy;
   if (!LeavesChoice(request.policy)) policy = ResolvePolicy(request.policy, geometry);
   return ResolvedRequest{.frame = std::move(request),
                          .volume = {dataset, *std::move(transfer), renderer, *std::move(clip), *std::move(layers)},
                          .summary = std::move(summary),
-                         .policy = std::move(policy)};
+                         .policy = std::move(policy),
+                         .framed = framed};
 }
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {

@@ -79,6 +79,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
   io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
   io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
+  io.Optional("view", m.view, &P::has_view, &P::view, &P::mutable_view);
 }
 
 void Fields(auto& io, Is<PictureGeometry> auto& m) {
@@ -436,6 +437,29 @@ void Fields(auto& io, Is<PickReply> auto& m) {
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Optional("sample", m.sample, &P::has_sample, &P::sample, &P::mutable_sample);
   io.Finite("depth", m.depth, &P::depth, &P::set_depth);
+}
+
+void Fields(auto& io, Is<Ball> auto& m) {
+  using P = v1::Ball;
+  io.Message("centre", m.centre, &P::centre, &P::mutable_centre);
+  io.Finite("radius", m.radius, &P::radius, &P::set_radius);
+  io.Check([&](Checker& check) { check.Positive("radius", m.radius); });
+}
+
+v1::ViewQuery ProtoOf(const ViewQuery&);
+void Fields(auto& io, Is<ViewQuery> auto& m) {
+  using P = v1::ViewQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+  io.Optional("framed", m.framed, &P::has_framed, &P::framed, &P::mutable_framed);
+}
+
+v1::ViewReply ProtoOf(const ViewReply&);
+void Fields(auto& io, Is<ViewReply> auto& m) {
+  using P = v1::ViewReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("view", m.view, &P::view, &P::mutable_view);
+  io.Optional("framed", m.framed, &P::has_framed, &P::framed, &P::mutable_framed);
 }
 
 v1::PrefetchQuery ProtoOf(const PrefetchQuery&);

@@ -143,7 +143,7 @@ Status CheckDirection(const std::string& field, const Vec3& v) {
 }
 
 Status CheckRules(const ViewParameters& view) {
-  if (view.fit && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
+  if (view.fit.value_or(false) && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
   if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll_degrees turns the picture");
   if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
   if (view.distance > 0 && view.projection != Projection::kPerspective) {

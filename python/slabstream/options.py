@@ -33,6 +33,7 @@ class Option:
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
     same_picture: bool      # it never changes the finished picture
+    negatable: bool         # a flag that may be on by itself: False turns it off
     renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
     windows: dict[str, tuple[float, float]]  # of the option window: width and level by name
 
@@ -57,6 +58,7 @@ def _option(entry: dict[str, Any]) -> Option:
         excludes=tuple(map(_keyword, entry.get("excludes", ()))),
         needs=tuple(map(_keyword, entry.get("needs", ()))),
         same_picture=entry.get("same_picture", False),
+        negatable=entry.get("negatable", False),
         renderers=tuple(entry.get("renderers", ())),
         windows={window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
     )
@@ -117,7 +119,8 @@ def takes_options_of(command: str) -> Callable[[Function], Function]:
         own = [p for p in signature.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
         named = {p.name for p in own}
         options = [option for option in COMMANDS[command].values() if option.name not in named]
-        more = [inspect.Parameter(o.name, inspect.Parameter.KEYWORD_ONLY, default=False if o.type is None else o.default) for o in options]
+        off = {o.name for o in options if o.type is None and not o.negatable}
+        more = [inspect.Parameter(o.name, inspect.Parameter.KEYWORD_ONLY, default=False if o.name in off else o.default) for o in options]
         function.__signature__ = signature.replace(parameters=own + more)  # type: ignore[attr-defined]
         about = inspect.cleandoc(function.__doc__ or "")
         function.__doc__ = f"{about}\n\nOptions, as of `slabstream {command}`:\n{_help_of(command, (o.name for o in options))}\n"

@@ -5,7 +5,6 @@ import collections
 import contextlib
 import copy
 import dataclasses
-import math
 import os
 from typing import Any, Callable, Iterator
 
@@ -17,6 +16,7 @@ from .drafts import Draft, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
+from .moves import turned_views
 from .options import takes_options_of
 from .probe import Histogram, JointHistogram, Label, Sample, histogram_of, joint_histogram_of, labels_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
@@ -32,16 +32,13 @@ _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
 
-def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
-    """Frame i is turned by i / frames of all turns, from the azimuth of `draft` on."""
-    start = draft.frame.view.azimuth_degrees
-    for i in range(frames):
-        turned = copy.copy(draft)
-        turned.frame = schema.FrameRequest()
-        turned.frame.CopyFrom(draft.frame)
-        # Back into one turn, so that a start near the limit of angles stays valid.
-        turned.frame.view.azimuth_degrees = math.fmod(start + 360.0 * turns * i / frames, 360.0)
-        yield turned
+def _with_views(draft: Draft, views: Iterator[Any]) -> Iterator[Draft]:
+    for view in views:
+        moved = copy.copy(draft)
+        moved.frame = schema.FrameRequest()
+        moved.frame.CopyFrom(draft.frame)
+        moved.frame.view.CopyFrom(view)
+        yield moved
 
 
 class Service(contextlib.AbstractContextManager["Service"]):
@@ -90,8 +87,13 @@ class Service(contextlib.AbstractContextManager["Service"]):
             raise InvalidArgument(
                 "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
             )
+        views = turned_views(self._whole_view(draft), frames, turns)
         self._add_keys([draft])
-        return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
+        return self._pipelined(_with_views(draft, views), in_flight, deadline)
+
+    def _whole_view(self, draft: Draft) -> Any:
+        """The view of a picture, with what its options leave to the volume."""
+        return self._connection.ask("view_query", schema.ViewQuery(frame=draft.frame), _QUESTION_SECONDS).view
 
     @property
     def address(self) -> Address:

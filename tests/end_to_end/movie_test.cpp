@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -250,7 +251,7 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   const std::string movie = ReadFile("movie.mp4");
   ASSERT_EQ(movie.size(), 3 * kFrameBytes);
   for (int i = 0; i < 3; ++i) {
-    run({"render", series, "--time", std::to_string(i), "--azimuth", std::to_string(120 * i), "-o", "single.png"});
+    run({"render", series, "--time", std::to_string(i), "--azimuth", std::to_string(30 + 120 * i), "-o", "single.png"});
     ExpectFrame(movie, std::size_t(i), ReadPicture(Path("single.png")));
   }
   // It stands still, and five frames show two times.
@@ -273,6 +274,33 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   run({"turntable", series + "?time=1", "--frames", "1", "-o", "q%d.png"});
   run({"turntable", series, "--time", "1", "--frames", "1", "-o", "r%d.png"});
   EXPECT_EQ(ReadFile("q0.png"), ReadFile("r0.png"));
+}
+
+// A cube that grows: no frame cuts it off, and it does not jump.
+TEST_F(MovieTest, FramesFrameWhatShowsInAnyOfThem) {
+  constexpr int kSide = 64;
+  std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 64, 64, 64), }";
+  header.resize(118, ' ');
+  std::ofstream file(Path("growing.npy"), std::ios::binary);
+  file << std::string("\x93NUMPY\x01\0\x76\0", 10) << header;
+  for (const int end : {16, 48}) {
+    for (int i = 0; i < kSide * kSide * kSide; ++i) {
+      file.put(i % kSide < end && i / kSide % kSide < end && i / kSide / kSide < end ? char(200) : '\0');
+    }
+  }
+  file.close();
+  const auto camera = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(),
+                     {"--local=1", "--size", "32", "--renderer", "raycast", "--transfer", "opaque", "--save-camera", "camera.json"});
+    MustRun(arguments);
+    return nlohmann::json::parse(ReadFile("camera.json"));
+  };
+  const auto first = camera({"render", "growing.npy", "--time", "0", "-o", "a.png"});
+  const auto second = camera({"render", "growing.npy", "--time", "1", "-o", "b.png"});
+  const auto both = camera({"turntable", "growing.npy", "--time", "0:1", "--turns", "0", "-o", "t%d.png"});
+  EXPECT_GT(first["zoom"], 2 * second["zoom"].get<double>());
+  EXPECT_EQ(both, second) << "the larger cube holds the smaller one";
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("t1.png")), ReadPicture(Path("b.png"))), 0);
 }
 
 TEST_F(MovieTest, AFrameThatFailsIsToldAndTheOthersAreRendered) {

@@ -35,12 +35,16 @@ class RenderTest : public EndToEndTest {
  protected:
   RenderTest() : ball_(MakeSphere("ball.nrrd", 2, kVoxels)) {}
 
-  // Renders the ball, opaque and unshaded.
+  // Renders the ball, opaque and unshaded. The view is along y unless `more` says something else, and shows the whole volume.
   PictureFile Render(const std::string& output, std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"render",     ball_,    "-o",        output, "--size", std::to_string(kPixels),
                                           "--transfer", "opaque", "--shading", "none"};
     if (std::none_of(more.begin(), more.end(), [](const std::string& s) { return s.rfind("--local", 0) == 0; }))
       more.push_back("--local=2");
+    for (const char* angle : {"--azimuth", "--elevation"}) {
+      if (std::ranges::find(more, angle) == more.end()) arguments.insert(arguments.end(), {angle, "0"});
+    }
+    arguments.emplace_back("--no-fit");
     arguments.insert(arguments.end(), more.begin(), more.end());
     MustRun(arguments);
     return ReadPicture(Path(output));
@@ -262,8 +266,8 @@ TEST_F(RenderTest, SaysWhatItDidAndHowFarItIs) {
 }
 
 TEST_F(RenderTest, TurntableFramesAreTheRendersOfTheirAngles) {
-  MustRun({"turntable", ball_, "--local=2", "-o", "t_%02d.exr", "--frames", "3", "--azimuth", "10", "--size", std::to_string(kPixels),
-           "--transfer", "opaque", "--shading", "none"});
+  MustRun({"turntable", ball_, "--local=2", "-o", "t_%02d.exr", "--frames", "3", "--azimuth", "10", "--elevation", "0", "--no-fit",
+           "--size", std::to_string(kPixels), "--transfer", "opaque", "--shading", "none"});
   const std::vector<std::string> angles = {"10", "130", "250"};
   for (std::size_t i = 0; i < 3; ++i) {
     const PictureFile frame = ReadPicture(Path("t_0" + std::to_string(i) + ".exr"));

@@ -300,7 +300,8 @@ class HttpTest(WithService):
 
     def test_pixels_show_points(self):
         # The ball's surface, seen along +y: from its geometry by hand.
-        options = {"dataset": "b", "renderer": "zbuffer", "size": 100}
+        from_above = {"dataset": "b", "renderer": "zbuffer", "size": 100, "fit": False}
+        options = {**from_above, "azimuth": 0, "elevation": 0}
         hit = self.ask("pick", x=50, y=50, **options)
         self.assertTrue(hit["hit"] and hit["inside"])
         self.assertAlmostEqual(hit["at"][0], 9.5, 6)
@@ -316,7 +317,7 @@ class HttpTest(WithService):
             other = self.ask("pick", x=50, y=50, transfer="opaque", **(options | {"renderer": renderer}))
             self.assertAlmostEqual(other["depth"], hit["depth"], delta=1, msg=renderer)
         # A view from above picks by the same camera as the picture.
-        above = self.ask("pick", x=50, y=50, view="top", **options)
+        above = self.ask("pick", x=50, y=50, view="top", **from_above)
         self.assertAlmostEqual(above["at"][0], 9.5, 6)
         self.assertGreater(above["at"][2], 14)
 

@@ -43,6 +43,13 @@ class AtAService(WithAService):
         self.assertGreater(image.statistics.worker_seconds["splat"], 0)
         self.assertGreaterEqual(image.statistics.latency_seconds, image.statistics.frame_seconds)
 
+    def test_the_view_is_that_of_the_command_line(self) -> None:
+        front = self.service.render("head", size=40)  # of a patient
+        np.testing.assert_allclose(front.geometry.forward, (0, -1, 0), atol=1e-12)
+        np.testing.assert_array_equal(np.asarray(front), np.asarray(self.service.render("head", size=40, azimuth=180, elevation=0, fit=True)))
+        whole = self.service.render("head", size=40, fit=False)
+        self.assertGreater(whole.geometry.pixel_size, front.geometry.pixel_size)
+
     def test_the_zbuffer_has_depths(self) -> None:
         image = self.service.render("head", renderer="zbuffer", size=50)
         seen = image.rgba[..., 3] > 0

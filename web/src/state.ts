@@ -64,7 +64,7 @@ export interface State {
 // `renderer`: the gateway's default.
 export const INITIAL: State = {
   dataset: "",
-  ...PATIENT_START, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
+  ...PATIENT_START, roll: 0, zoom: 1, lookAt: null, projection: "orthographic",
   renderer: "", parameters: {}, shading: "phong", lights: [], shadows: 0, ambientOcclusion: 0, background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",

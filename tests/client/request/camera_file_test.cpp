@@ -1,7 +1,9 @@
-#include "client/request/picture_options.h"
+#include "client/request/camera_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "common/view/default_view.h"
 
 namespace slabstream {
 namespace {
@@ -18,11 +20,11 @@ TEST(CameraFile, IsReadBackAsItWas) {
       {.projection = Projection::kPerspective, .look_at = Vec3{1, 2.25, -3}, .distance = 400},
       {.look_at = Vec3{1e-9, 0, 0}, .eye = Vec3{100, 0, 0}, .up = Vec3{0, 1, 1}},
       {.azimuth_degrees = 180, .fit = true, .of_patient = true},
+      kUnstatedView,
+      {.elevation_degrees = std::nullopt, .fit = std::nullopt},
   };
   for (const ViewParameters& view : views) {
-    FrameRequest request;
-    request.view = view;
-    const Result<ViewParameters> read = ParseCamera(OptionsJson(request, "view.").dump());
+    const Result<ViewParameters> read = ParseCamera(CameraText(view));
     ASSERT_TRUE(read.ok()) << read.status().message();
     EXPECT_EQ(*read, view);
   }

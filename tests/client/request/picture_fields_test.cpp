@@ -35,6 +35,7 @@ const std::vector<PictureFields> kFields = {
     {},
     {{"size", "300x200"}, {"azimuth", "-30.1"}, {"elevation", "20"}, {"zoom", "1e-3"}},
     {{"view", "anterior"}, {"fit", ""}},
+    {{"azimuth", "0"}, {"no-fit", ""}},
     {{"eye", "-1,2,3"}, {"up", "0,1,0"}, {"projection", "perspective"}},
     {{"renderer", "raycast"}, {"isovalue", "300:red:0.5,10"}, {"gradient-opacity", "0:0,5:1"}},
     {{"renderer", "raycast"}, {"isovalue", "300"}, {"transfer", "auto"}, {"sampling-rate", "2"}},
@@ -126,7 +127,7 @@ TEST(PictureFieldsTest, JsonHasNumbersBooleansAndLists) {
   ASSERT_TRUE(render.ok()) << render.status().message();
   EXPECT_EQ(render->frame.view.azimuth_degrees, 30);
   EXPECT_EQ(render->frame.view.zoom, 0.1);
-  EXPECT_TRUE(render->frame.view.fit);
+  EXPECT_EQ(render->frame.view.fit, true);
   EXPECT_FALSE(render->format.annotations.scale_bar);
   EXPECT_EQ(render->frame.shading.lights.size(), 2U);
   for (const char* wrong : {"3", "[]", R"({"zoom": [[1]]})", R"({"light": [null]})"})
@@ -142,6 +143,15 @@ TEST(PictureFieldsTest, SlicesHaveAFrameForEachPlane) {
   ASSERT_EQ(frames->size(), 3U);
   for (const FrameRequest& frame : *frames) EXPECT_EQ(frame.dataset, "head");
   EXPECT_FALSE(ParseSliceFields({{"dataset", "head"}, {"plane", "zyx"}, {"index", "3"}}).ok());
+}
+
+TEST(PictureFieldsTest, AFlagThatIsOnByItselfCanBeTurnedOff) {
+  const auto fit = [](const PictureFields& fields) { return ParseRenderFields(WithDataset(fields)).value().frame.view.fit; };
+  EXPECT_EQ(fit({}), std::nullopt) << "the service decides";
+  EXPECT_EQ(fit({{"fit", "true"}}), true);
+  EXPECT_EQ(fit({{"fit", "false"}}), false);
+  EXPECT_EQ(fit({{"no-fit", "true"}}), false);
+  EXPECT_EQ(fit({{"no-fit", "false"}}), std::nullopt);
 }
 
 }  // namespace

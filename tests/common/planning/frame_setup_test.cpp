@@ -6,6 +6,7 @@
 #include "common/combining/travel.h"
 #include "common/renderers/registry.h"
 #include "common/view/clip_corners.h"
+#include "common/view/default_view.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/planning/plan_support.h"
 #include "tests/support/random.h"
@@ -35,6 +36,35 @@ TEST(ResolveRequest, ParametersMustBeThoseOfTheRendererThatTheDatasetGets) {
   EXPECT_EQ(SetupOf(request, FullGridSummary({20, 20, 20})).parameters, std::vector{2.5});
   const auto of_volume = ResolveRequest(request, 1, std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20})));
   EXPECT_EQ(of_volume.status(), Status::InvalidArgument("sampling-rate is '2.5', but the renderer 'splat' has no such parameter"));
+}
+
+TEST(ResolveRequest, TheViewIsTheDefaultOneAsFarAsNothingElseIsSaid) {
+  for (const World world : {World::kVoxels, World::kScene, World::kPatient}) {
+    const bool patient = world == World::kPatient;
+    VolumeSummary summary = FullSummary({64, 64, 64});
+    summary.description.geometry.orientation = {world, {5, -6, 7}};
+    const VolumeGeometry& geometry = summary.description.geometry;
+    FrameRequest request = SomeRequest();
+    request.view = kUnstatedView;
+    const ResolvedRequest resolved = Resolved(request, summary);
+    const ViewParameters& view = resolved.frame.view;
+    EXPECT_EQ(view.azimuth_degrees, patient ? 180 : 30);
+    EXPECT_EQ(view.elevation_degrees, patient ? 0 : 20);
+    EXPECT_EQ(view.fit, false) << "it has been done";
+    ASSERT_TRUE(view.look_at && resolved.framed);
+    EXPECT_EQ(*view.look_at, resolved.framed->centre);
+    EXPECT_LT(Length(*view.look_at - geometry.ToWorld(geometry.centre())), 1e-9) << "all of it shows";
+
+    // Asked for again, it stays as it is, and so does the picture.
+    request.view = view;
+    EXPECT_EQ(Resolved(request, summary).frame.view, view);
+    EXPECT_EQ(MakeFrameSetup(Resolved(request, summary)).value(), MakeFrameSetup(resolved).value());
+
+    request.view = kUnstatedView;
+    request.view.fit = false;
+    EXPECT_EQ(Resolved(request, summary).frame.view.look_at, std::nullopt);
+    EXPECT_EQ(Resolved(request, summary).frame.view.zoom, 1);
+  }
 }
 
 TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {

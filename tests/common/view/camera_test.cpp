@@ -350,8 +350,8 @@ TEST(Camera, FitsABall) {
     ViewParameters view = RandomView(random);
     view.zoom = 1;
     view.fit = true;
-    const ViewParameters fitted = FitView(view, geometry, centre, radius);
-    EXPECT_FALSE(fitted.fit);
+    const ViewParameters fitted = FitView(view, geometry, {geometry.ToWorld(centre), radius});
+    EXPECT_EQ(fitted.fit, false);
     if (!CheckView(fitted, geometry).ok()) continue;
     ++seen;
     const Camera camera = MakeCamera(fitted, {200, 150}, geometry);

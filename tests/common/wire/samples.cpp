@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "common/view/default_view.h"
 #include "common/volume/light_volume.h"
 #include "common/wire/limits.h"
 
@@ -365,10 +366,14 @@ std::vector<SubmitFrame> SamplesOf() {
                               .opacities = {{1, 0}, {kMaxLabelValue, 0.25}},
                               .shown = {{1, kMaxLabelValue}, {7, 7}, {.name = kUmlaut}}};
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
+  FrameRequest unstated = Request();
+  unstated.view = kUnstatedView;
   FrameRequest highlights = layers;
   highlights.labels->mode = LabelMode::kHighlight;
-  return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers},
-          {1, 2, highlights}};
+  return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}},
+          {1, 2, sliced},    {1, 2, surfaces},
+          {1, 2, layers},    {1, 2, highlights},
+          {1, 2, unstated}};
 }
 
 template <>
@@ -384,6 +389,7 @@ std::vector<FrameReply> SamplesOf() {
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
   predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
   predicted.lowered = kUmlaut;
+  predicted.view = Request().view;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
@@ -560,6 +566,16 @@ std::vector<PickQuery> SamplesOf() {
 template <>
 std::vector<PickReply> SamplesOf() {
   return {{}, {kMax64, VolumeSample{.at = {1, 2, 3}, .inside = true, .voxel = {1, 2, 3}, .value = 4}, -1e300}};
+}
+
+template <>
+std::vector<ViewQuery> SamplesOf() {
+  return {{.frame = Request()}, {kMax64, Request(), Ball{{-1e9, 0.5, 1e300}, 1e-300}}};
+}
+
+template <>
+std::vector<ViewReply> SamplesOf() {
+  return {{}, {kMax64, Request().view, Ball{{1, 2, 3}, 4}}, {.view = kUnstatedView}};
 }
 
 template <>
