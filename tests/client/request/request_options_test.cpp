@@ -12,6 +12,7 @@
 #include "client/cli/option_groups.h"
 #include "client/request/picture_fields.h"
 #include "client/request/picture_record.h"
+#include "common/view/default_view.h"
 #include "common/wire/about.h"
 #include "common/wire/request_fields.h"
 #include "common/wire/request_json.h"
@@ -28,6 +29,7 @@ using testing::HasSubstr;
 FrameRequest Standard() {
   FrameRequest request;
   request.dataset = "head";
+  request.view = kUnstatedView;
   return request;
 }
 
