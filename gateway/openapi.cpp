@@ -127,6 +127,7 @@ Json OpenApi() {
     json[standard.empty() ? "required" : "default"] = standard.empty() ? Json(true) : Json(standard);
     return json;
   };
+  const Json path = {{"name", "path"}, {"group", "Options"}, {"type", "JSON"}, {"help", kPathHelp}};
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
       {"/readyz", "The service answers and has a worker", "text/plain", true},
@@ -140,7 +141,7 @@ Json OpenApi() {
       {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
       {"/api/v1/turntable.mp4", "A movie, as `slabstream turntable` makes it, sent while it is made", "video/mp4", false,
        With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("{}", kMovieFrames)), field("turns", kTurnsHelp, "NUMBER", "1"),
-                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second))}),
+                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second)), path}),
        true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},

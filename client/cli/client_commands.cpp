@@ -13,6 +13,7 @@
 #include "client/cli/value.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
+#include "client/request/camera_file.h"
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
@@ -54,10 +55,11 @@ void DeclareTurntable(const CommandLine& line) {
   AddParsed(
       *sub, "--frames", options->frames,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxTurntableFrames); },
-      "Number of frames, spread evenly over turns and times")
+      "Number of frames, spread evenly over turns, path and times")
       ->type_name("N")
-      ->default_str("one for each time of --time");
-  AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
+      ->default_str("one for each time of --time, or the seconds of --path");
+  CLI::Option* const turns = AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
+  CLI::Option* const path = AddParsed(*sub, "--path", options->path, ParsePathFile, kPathHelp)->type_name("FILE")->excludes(turns);
   AddParsed(*sub, "--time", options->times, ParseTimeRange,
             "Which volumes of a file with several, such as a time series; counted from 0, FIRST and LAST included")
       ->type_name("T|FIRST:LAST");
@@ -71,6 +73,8 @@ void DeclareTurntable(const CommandLine& line) {
       ->default_str(fmt::format("{:g}", MovieShape().frames_per_second));
   AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
   AddFrameOptions(*sub, options->frame, {"time"});
+  ExcludeViewOptions(*sub, path);
+  path->excludes(sub->get_option("--camera"));
   RunWith(*sub, line.run, options, RunTurntable);
 }
 

@@ -160,7 +160,8 @@ void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list
   app.option_defaults()->group(kOutputGroup);
   app.add_flag("!--no-record", options.record,
                "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");
-  app.add_option("--save-camera", options.camera_path, "Write the camera that was used to a file for --camera")->type_name("FILE");
+  app.add_option("--save-camera", options.camera_path, "Write the camera that was used to a file for --camera and --path")
+      ->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
   app.add_option("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing")->type_name("FILE");
   AddParsed(app, "--otlp", options.collector, ParseCollector,

@@ -8,6 +8,7 @@
 
 #include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
+#include "client/request/camera_file.h"
 #include "client/request/slice_request.h"
 #include "client/service/service_choice.h"
 #include "common/base/time.h"
@@ -63,9 +64,11 @@ struct TurntableOptions {
   TurntableOutput output;
   std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
   std::optional<TimeRange> times;           // of the volumes in SOURCE; none: it is one volume
-  std::optional<int> frames;                // [1, kMaxTurntableFrames], spread evenly over turns and times; none: one for each time
-  int turns = 1;                            // [0, kMaxTurns], which begin at the request's azimuth
-  int in_flight = 2;                        // [1, kMaxInFlight] frames requested and not yet complete
+  // [1, kMaxTurntableFrames], spread evenly over turns, path and times; none: one for each time, or as many as the path's seconds need.
+  std::optional<int> frames;
+  int turns = 1;                      // [0, kMaxTurns], which begin at the request's azimuth
+  std::optional<PathText> path = {};  // instead of turns
+  int in_flight = 2;                  // [1, kMaxInFlight] frames requested and not yet complete
 };
 
 struct SliceOptions {

@@ -1,6 +1,7 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iostream>
@@ -186,7 +187,9 @@ Status CheckTurntable(const TurntableOptions& options) {
     return Status::InvalidArgument(
         "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; --turns 0 fixes the view");
   }
-  if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
+  if (!options.frames && !options.times && !(options.path && options.path->timed)) {
+    return Status::InvalidArgument(options.path ? "--frames is required: the cameras of --path have no times" : "--frames is required");
+  }
   const std::string first_output = FileOf(options, 0);
   if (!options.output.movie.empty()) {
     if (Status status = CheckCanEncode(MovieOf(options)); !status.ok()) return status;
@@ -199,14 +202,25 @@ Status CheckTurntable(const TurntableOptions& options) {
   return CheckPaths(options.frame, first_output);
 }
 
+// CheckTurntable has found that one of these is there.
+std::int64_t FrameCount(const TurntableOptions& options) {
+  if (options.frames) return *options.frames;
+  if (options.times) return options.times->count();
+  // A path's first and last camera are frames.
+  const double per_second = options.frames_per_second.value_or(MovieShape().frames_per_second);
+  return std::llround(options.path->seconds() * per_second) + 1;
+}
+
 // Frame i shows the time that belongs to the i-th part of the whole.
 Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   const TimeRange times = options.times.value_or(TimeRange{});
-  const int frames = options.frames.value_or(times.count());
-  if (frames > kMaxTurntableFrames) {
-    return Status::InvalidArgument(fmt::format("--time {}:{} has {} times, but at most {} --frames are possible", times.first, times.last,
-                                               frames, kMaxTurntableFrames));
+  if (FrameCount(options) > kMaxTurntableFrames) {
+    const std::string what =
+        options.times ? fmt::format("--time {}:{} has {} times", times.first, times.last, times.count())
+                      : fmt::format("--path takes {:g} seconds, which are {} frames", options.path->seconds(), FrameCount(options));
+    return Status::InvalidArgument(fmt::format("{}, but at most {} --frames are possible", what, kMaxTurntableFrames));
   }
+  const int frames = int(FrameCount(options));
   if (times.count() > 1 && options.frame.connection.local_workers > 0) {
     if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
   }
@@ -245,7 +259,8 @@ Status RunTurntable(const TurntableOptions& given) {
   if (!jobs.ok()) return jobs.status();
   const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
   std::vector<Status> failures;
-  const CameraMove move{.turns = options.turns};
+  CameraMove move{.turns = options.turns};
+  if (options.path) move.cameras = options.path->cameras;
   const auto frames = RenderPictures(options.frame, *jobs, &move, open_pictures, options.in_flight, &failures);
   const std::string who = "slabstream turntable";
   if (!frames.ok()) {

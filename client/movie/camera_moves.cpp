@@ -38,12 +38,27 @@ Result<ViewParameters> WholeView(FrameRequest request, std::span<const std::stri
 Result<std::vector<ViewParameters>> ViewsOfMovie(const FrameRequest& request, const CameraMove& move, int frames,
                                                  std::span<const std::string> datasets, const AskView& ask) {
   std::vector<ViewParameters> views;
-  const Result<ViewParameters> first = WholeView(request, datasets, ask);
-  if (!first.ok()) return first.status();
-  for (int i = 0; i < frames; ++i) {
-    ViewParameters& view = views.emplace_back(*first);
-    if (view.azimuth_degrees) view.azimuth_degrees = TurntableAzimuth(*view.azimuth_degrees, move.turns, i, frames);
+  if (move.cameras.empty()) {
+    const Result<ViewParameters> first = WholeView(request, datasets, ask);
+    if (!first.ok()) return first.status();
+    for (int i = 0; i < frames; ++i) {
+      ViewParameters& view = views.emplace_back(*first);
+      if (view.azimuth_degrees) view.azimuth_degrees = TurntableAzimuth(*view.azimuth_degrees, move.turns, i, frames);
+    }
+    return views;
   }
+  std::vector<PathCamera> cameras = move.cameras;
+  for (PathCamera& camera : cameras) {
+    FrameRequest there = request;
+    there.view = camera.view;
+    Result<ViewParameters> view = WholeView(std::move(there), datasets, ask);
+    if (!view.ok()) return view.status();
+    camera.view = *std::move(view);
+  }
+  const Result<CameraPath> path = CameraPath::Make(cameras);
+  if (!path.ok()) return path.status();
+  const double begin = path->begin_seconds(), length = path->end_seconds() - begin;
+  for (int i = 0; i < frames; ++i) views.push_back(path->At(frames == 1 ? begin : begin + length * (double(i) / (frames - 1))));
   return views;
 }
 

@@ -324,6 +324,14 @@ def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     return draft
 
 
+def camera_draft_of(dataset: str, options: Mapping[str, Any], index: int, camera: Mapping[str, Any]) -> Draft:
+    """The request at a camera of a path."""
+    try:
+        return draft_of(dataset, {**options, "camera": camera})
+    except InvalidArgument as error:
+        raise InvalidArgument(f"camera {index + 1} of the path: {error}") from None
+
+
 # How one looks at a plane: the view, the plane's normal, and whether only patients have it (client/cli/slice_planes.h).
 _PLANES: dict[str, tuple[str, values.Vector, bool]] = {
     "axial": ("inferior", (0, 0, 1), True),

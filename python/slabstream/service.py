@@ -12,12 +12,12 @@ from . import schema
 from .address import Address, find_service
 from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
-from .drafts import Draft, draft_of, slice_drafts_of
+from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
-from .moves import turned_views
-from .options import takes_options_of
+from .moves import Path, cameras_of, turned_views
+from .options import COMMANDS, takes_options_of
 from .probe import Histogram, JointHistogram, Label, Sample, histogram_of, joint_histogram_of, labels_of, sample_of
 from .status import Dataset, Status, dataset_of, status_of
 from .uploads import upload_of
@@ -75,19 +75,28 @@ class Service(contextlib.AbstractContextManager["Service"]):
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
     @takes_options_of("render")
-    def turntable(self, dataset: str, frames: int, *, turns: int = 1, in_flight: int = 2, deadline: float = DEADLINE_SECONDS,
-                  **options: Any) -> Iterator[Image]:
-        """Pictures of full turns about the volume's z axis, one by one, in order. `in_flight` of them are asked for before they are needed,
-        so that the service never waits. Frames that are open when the iterator is closed are cancelled."""
+    def turntable(self, dataset: str, frames: int, *, turns: int = 1, path: Any = None, in_flight: int = 2,
+                  deadline: float = DEADLINE_SECONDS, **options: Any) -> Iterator[Image]:
+        """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
+        the file of one (docs/movies.md). `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
+        that are open when the iterator is closed are cancelled."""
         frames = integer("frames", frames, 1, _MOST_FRAMES)
         turns = integer("turns", turns, 0, _MOST_TURNS)
         in_flight = integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, options)
-        if draft.frame.view.HasField("eye") and turns > 0:
-            raise InvalidArgument(
-                "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
-            )
-        views = turned_views(self._whole_view(draft), frames, turns)
+        if path is None:
+            if draft.frame.view.HasField("eye") and turns > 0:
+                raise InvalidArgument(
+                    "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
+                )
+            views = turned_views(self._whole_view(draft), frames, turns)
+        else:
+            for name, value in options.items():
+                if value is not None and name in COMMANDS["render"]["camera"].excludes + ("camera",):
+                    raise InvalidArgument(f"path excludes {name}")
+            times, cameras = cameras_of(path)
+            drafts = [camera_draft_of(dataset, options, i, camera) for i, camera in enumerate(cameras)]
+            views = Path(times, [self._whole_view(each) for each in drafts]).views(frames)
         self._add_keys([draft])
         return self._pipelined(_with_views(draft, views), in_flight, deadline)
 

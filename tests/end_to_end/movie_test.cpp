@@ -303,6 +303,44 @@ TEST_F(MovieTest, FramesFrameWhatShowsInAnyOfThem) {
   EXPECT_EQ(LargestDifference(ReadPicture(Path("t1.png")), ReadPicture(Path("b.png"))), 0);
 }
 
+TEST_F(MovieTest, APathMovesThroughItsCameras) {
+  const std::vector<std::string> look = {"--local=1", "--size", "32", "--renderer", "zbuffer"};
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), look.begin(), look.end());
+    return MustRun(arguments);
+  };
+  run({"render", ball_, "--azimuth", "10", "--save-camera", "a.json", "-o", "a.png"});
+  run({"render", ball_, "--azimuth", "70", "--elevation", "40", "--zoom", "2", "--save-camera", "b.json", "-o", "b.png"});
+  run({"render", ball_, "-o", "c.png"});
+  const std::string a = ReadFile("a.json"), b = ReadFile("b.json");
+  std::ofstream(Path("path.json")) << "[" << a << "," << b << ", {}]";
+  run({"turntable", ball_, "--path", "path.json", "--frames", "5", "-o", "p%d.png"});
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p0.png")), ReadPicture(Path("a.png"))), 0);
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p2.png")), ReadPicture(Path("b.png"))), 0);
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p4.png")), ReadPicture(Path("c.png"))), 0)
+      << "what a camera leaves out is the default view's";
+  EXPECT_GT(LargestDifference(ReadPicture(Path("p1.png")), ReadPicture(Path("a.png"))), 0.1);
+  // Times say how many frames there are.
+  std::ofstream(Path("timed.json")) << R"([{"time": 1, "azimuth": 10}, {"time": 1.5, "azimuth": 50}])";
+  KeepFrames();
+  EXPECT_THAT(run({"turntable", ball_, "--path", "timed.json", "--fps", "10", "-o", "m.mp4"}).out, HasSubstr("rendered 6 frames"));
+
+  std::ofstream(Path("one.json")) << "[{}]";
+  std::ofstream(Path("mixed.json")) << R"([{"projection": "perspective"}, {}])";
+  std::ofstream(Path("wrong.json")) << R"([{}, {"zoom": -1}])";
+  const std::vector<Refusal> cases = {
+      {{"--path", "path.json"}, "--frames is required: the cameras of --path have no times"},
+      {{"--path", "none.json", "--frames", "2"}, "--path"},
+      {{"--path", "one.json", "--frames", "2"}, "--path one.json: a path is a list of 2 to 1000 cameras"},
+      {{"--path", "wrong.json", "--frames", "2"}, "--path wrong.json: camera 2 of the path: zoom"},
+      {{"--path", "mixed.json", "--frames", "2"}, "camera 2 of the path is orthographic, but the first one is perspective"},
+      {{"--path", "path.json", "--frames", "2", "--turns", "2"}, "--turns"},
+      {{"--path", "path.json", "--frames", "2", "--azimuth", "2"}, "--azimuth"},
+      {{"--path", "path.json", "--frames", "2", "--no-fit"}, "--fit"},
+  };
+  ExpectEachRefused({"turntable", ball_, "--local=1", "-o", "p%d.png"}, cases);
+}
+
 TEST_F(MovieTest, AFrameThatFailsIsToldAndTheOthersAreRendered) {
   KeepFrames();
   const std::string endpoint = "ipc://" + Path("s");

@@ -677,6 +677,16 @@ class TurntableTest(unittest.TestCase):
         frames = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**marked, "azimuth": azimuth}))[2]))
                   for azimuth in (350, 170)]
         self.assertEqual(movie, b"".join(frames))
+        # Through cameras: the first one is the first frame, the last one the last.
+        path = [{"azimuth": 10, "elevation": 30}, {"azimuth": 50, "zoom": 2}]
+        look = {"dataset": "a", "size": "24x16", "background": "#204060", "renderer": "mip"}
+        moved = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**look, "frames": 3, "path": path}))[2]
+        ends = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**look, **camera}))[2])) for camera in path]
+        self.assertEqual((moved[:len(ends[0])], moved[-len(ends[1]):]), tuple(ends))
+        self.assertEqual(len(moved), 3 * len(ends[0]))
+        timed = [{"time": 2, **path[0]}, {"time": 2.5, **path[1]}]
+        moved = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**look, "fps": 8, "path": timed}))[2]
+        self.assertEqual(len(moved), 5 * len(ends[0]), "as many frames as half a second has")
         # To clients of HTTP/1.0 the end of the connection is the movie's.
         old = gateway.raw(f"GET /api/v1/turntable.mp4?dataset=a&size=16&frames=2&token={gateway.token} HTTP/1.0\r\nHost: {gateway.authority}\r\n\r\n".encode())
         self.assertEqual(len(old.split(b"\r\n\r\n", 1)[1]), 2 * 16 * 16 * 3)
@@ -689,7 +699,9 @@ class TurntableTest(unittest.TestCase):
             ({}, 400, "dataset is missing"), ({"dataset": "none"}, 404, "none"), ({"dataset": "a", "frames": 0}, 400, "[1, 1000]"),
             ({"dataset": "a", "frames": 1001}, 400, "[1, 1000]"), ({"dataset": "a", "turns": -1}, 400, "turns"), ({"dataset": "a", "fps": "nan"}, 400, "fps"),
             ({"dataset": "a", "size": "33x32"}, 400, "must be even"), ({"dataset": "a", "size": "4096x2048"}, 400, "at most 4194304"),
-            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
+            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"),
+            ({"dataset": "a", "path": "[{}, {}]", "azimuth": 3}, 400, "path excludes azimuth"), ({"dataset": "a", "path": "[{}]"}, 400, "2 to 1000 cameras"),
+            ({"dataset": "a", "path": '[{}, {"zoom": 0}]'}, 400, "camera 2 of the path: zoom"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
             got, body = gateway.json("/api/v1/turntable.mp4?" + urllib.parse.urlencode(fields))
             self.assertEqual((got, list(body)), (status, ["error"]), fields)
             self.assertIn(why, body["error"])

@@ -189,7 +189,14 @@ class AtAService(WithAService):
             np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, azimuth=azimuth)))
         still = list(self.service.turntable("head", 2, turns=0, size=30, eye=(100, 0, 0)))
         np.testing.assert_array_equal(np.asarray(still[0]), np.asarray(still[1]))
-        for given, sentence in (({"frames": 0}, "frames 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye fixes the viewpoint"),
+        path = [{"azimuth": 10, "elevation": 20}, {"azimuth": 100, "zoom": 2}, {}]
+        moved = list(self.service.turntable("head", 5, size=30, path=path))
+        for image, camera in zip(moved[::2], path):
+            np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, **camera)))
+        for given, sentence in (({"frames": 0}, "frames 0 is out of range"),
+                                ({"frames": 2, "path": [{}]}, "path must be a list of 2 to 1000 cameras"),
+                                ({"frames": 2, "path": [{}, {}], "azimuth": 3}, "path excludes azimuth"),
+                                ({"frames": 2, "path": [{}, {"zoom": 0}]}, "camera 2 of the path: zoom 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye fixes the viewpoint"),
                                 ({"frames": 2, "in_flight": 65}, "in_flight 65 is out of range"), ({"frames": 2, "zoom": 0}, "zoom 0 is out")):
             with self.subTest(given=given), self.assertRaisesRegex(ss.InvalidArgument, sentence):
                 self.service.turntable("head", **given)
