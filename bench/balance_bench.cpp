@@ -101,7 +101,7 @@ std::vector<View> ViewsOf(const Subject& subject, const Options& options) {
   std::vector<View> views;
   for (int i = 0; i < options.views; ++i) {
     View& view = views.emplace_back(View{.request = subject.request});
-    view.request.view.azimuth_degrees += 360.0 * i / options.views;
+    *view.request.view.azimuth_degrees += 360.0 * i / options.views;
     view.request.policy = {.groups = 1};
     view.whole = Measure(subject, PlanFrame(view.request, 1, *subject.summary, RosterOf(1)).value(), 1, options.repeats).sum;
   }

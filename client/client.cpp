@@ -16,6 +16,7 @@
 #include "common/base/overloaded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/any_message.h"
+#include "common/wire/other_version.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -79,6 +80,7 @@ struct Client::Impl {
   Impl(Context& client_context, const ServiceAddress& service, Socket service_socket, ClientTiming client_timing)
       : context(client_context),
         endpoint(service.endpoint),
+        has_keys(service.keys.has_value()),
         takes_pictures(service.keys.has_value() && service.direct_pictures),
         socket(std::move(service_socket)),
         timing(client_timing) {}
@@ -92,6 +94,14 @@ struct Client::Impl {
   bool Pump(Time limit);
 
   Status NoAnswer(Duration timeout) const {
+    if (socket.refused() && !has_keys) {
+      return Status::InvalidArgument("the service at " + endpoint + " has keys: name its service file, client.json (--service)");
+    }
+    // Whoever listens with keys may end the connection before its greeting, which says so, has come.
+    if (!has_keys && !socket.connected() && !socket.local_host().empty()) {
+      return Status::Unavailable("no service answers at " + endpoint + ", but somebody listens there; a service with keys needs its " +
+                                 "service file, client.json (--service)");
+    }
     if (socket.refused()) return Status::Unavailable("the service at " + endpoint + " refuses the key: it was revoked or is another's");
     return Status::Unavailable("no service answers at " + endpoint + " within " + Milliseconds(timeout));
   }
@@ -118,18 +128,22 @@ struct Client::Impl {
   void SubmitAgain(OpenRequest& lost);
   void End(RequestId request, decltype(Event::what) end);  // nothing happens if it has ended
   bool ExpireQuestions(Time now);                          // true: some have ended
-  void FailAll(const std::string& reason);
+  void FailAll(const Status& reason);
+  Status OtherRelease() const { return Status::InvalidArgument("the service at " + endpoint + " " + TextOfOtherVersion(*other_version)); }
 
   // The reason, once the service counts as gone.
   std::optional<std::string> Loss(Time now) const;
 
   Context& context;
   std::string endpoint;
+  const bool has_keys;
   const bool takes_pictures;  // straight from workers, if they reach this host
   Socket socket;
   ClientTiming timing;
   const bool same_process = ParseEndpoint(endpoint, false)->scheme == Scheme::kInproc;
-  bool unreachable = false;  // the last ping could not be queued
+  std::optional<std::uint32_t> other_version;  // that the service speaks, if it is not ours
+  bool unreachable = false;                    // the last ping could not be queued
+  std::optional<Status> wrong_endpoint;        // clients are not heard there
   Wakeup wakeup;
   std::uint64_t last_id = 0;                         // of requests and nonces
   std::uint64_t received_bytes = 0, told_bytes = 0;  // of payloads; those that the last ping told
@@ -177,7 +191,7 @@ bool Client::Impl::Pump(Time limit) {
   if (!open.empty() || !questions.empty()) {
     if (now >= next_ping) SendPing(now);
     if (const std::optional<std::string> loss = Loss(now)) {
-      FailAll("the service at " + endpoint + " " + *loss);
+      FailAll(Status::Unavailable("the service at " + endpoint + " " + *loss));
       return false;
     }
     limit = std::min(limit, next_ping);
@@ -201,9 +215,14 @@ bool Client::Impl::Receive() {
     const Bytes payload = incoming->payload();
     Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(incoming->header(), payload.size());
     if (!message.ok()) {
+      if ((other_version = OtherVersion(incoming->header()))) {
+        FailAll(OtherRelease());
+        continue;
+      }
       LogWarning("client plane: dropped a message: " + message.status().message());
       continue;
     }
+    other_version.reset();
     unanswered_since.reset();
     received_bytes += payload.size();
     Handle(*message, payload);
@@ -226,7 +245,10 @@ void Client::Impl::Handle(CoordinatorToClient& message, const Bytes& payload) {
                  [&](FrameReply& reply) { Handle(reply, payload); },
                  [&](const FrameFailed& failed) { End(failed.request, failed.status); },
                  [&](const ClientPong& pong) { Handle(pong); },
-                 [&](const OrderRefused& refused) { End(refused.nonce, refused.status); },
+                 [&](const OrderRefused& refused) {
+                   if (refused.nonce == 0) wrong_endpoint = refused.status;
+                   End(refused.nonce, refused.status);
+                 },
                  [&](Answer auto& reply) { End(reply.nonce, std::move(reply)); },
                  [](const VolumeCredit&) { LogWarning("client plane: dropped a VolumeCredit: this client sends no volumes"); }};
   std::visit(handle, message);
@@ -292,7 +314,7 @@ void Client::Impl::Handle(DirectPictures::Reply complete) {
 
 void Client::Impl::Handle(const ClientPong& pong) {
   const auto ping = pinged.find(pong.nonce);
-  if (pong.senders && direct) direct->Admit(*pong.senders);
+  if (pong.senders && direct) direct->Admit(*pong.senders, MonotonicNow());
   if (ping == pinged.end()) return;
   const std::vector<RequestId> asked = std::move(ping->second);
   pinged.erase(pinged.begin(), std::next(ping));  // older ones will not be answered any more
@@ -342,9 +364,9 @@ bool Client::Impl::ExpireQuestions(Time now) {
   return questions.size() < asked;
 }
 
-void Client::Impl::FailAll(const std::string& reason) {
-  while (!questions.empty()) End(questions.begin()->first, Status::Unavailable(reason));
-  while (!open.empty()) End(open.begin()->first, Status::Unavailable(reason));
+void Client::Impl::FailAll(const Status& reason) {
+  while (!questions.empty()) End(questions.begin()->first, reason);
+  while (!open.empty()) End(open.begin()->first, reason);
   pinged.clear();
   if (direct) direct->Clear();
   unanswered_since.reset();
@@ -357,11 +379,14 @@ Result<Client> Client::Connect(Context& context, const ServiceAddress& service, 
   if (Status connected = socket->Connect(service.endpoint); !connected.ok()) return connected;
   Client client(std::make_unique<Impl>(context, service, std::move(*socket), timing));
   client.impl_->SendPing(MonotonicNow());
-  constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up
+  constexpr Duration kEachLook = std::chrono::milliseconds(100);  // at give_up, and whether the service admits it
   for (const Time end = MonotonicNow() + timeout; !client.impl_->pinged.empty();) {
     const Time now = MonotonicNow();
     if (now >= end || (give_up && give_up())) return client.impl_->NoAnswer(timeout);
-    client.impl_->Pump(give_up ? std::min(end, now + kEachLook) : end);
+    client.impl_->Pump(std::min(end, now + kEachLook));
+    if (client.impl_->other_version) return client.impl_->OtherRelease();
+    if (const auto& wrong = client.impl_->wrong_endpoint) return Status(wrong->code(), service.endpoint + ": " + wrong->message());
+    if (client.impl_->socket.refused()) return client.impl_->NoAnswer(timeout);
   }
   return client;
 }
@@ -464,10 +489,12 @@ Result<std::vector<VolumeSample>> Client::SampleAt(const std::string& dataset, s
   return std::move(reply->samples);
 }
 
-Result<BoxStatistics> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, Duration deadline) {
-  Result<StatisticsReply> reply = impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box}, deadline));
-  if (!reply.ok()) return reply.status();
-  return reply->statistics;
+Result<StatisticsReply> Client::StatisticsIn(const std::string& dataset, const ClipBox& box, bool labels, Duration deadline) {
+  return impl_->Await<StatisticsReply>(impl_->Ask(StatisticsQuery{.dataset = dataset, .box = box, .labels = labels}, deadline));
+}
+
+Result<ViewReply> Client::ChooseView(ViewQuery query, Duration deadline) {
+  return impl_->Await<ViewReply>(impl_->Ask(std::move(query), deadline));
 }
 
 Result<StatusReply> Client::QueryStatus(Duration timeout) { return impl_->Await<StatusReply>(impl_->Ask(StatusQuery{}, timeout)); }

@@ -14,6 +14,7 @@ namespace {
 // A worker may connect before the coordinator has named it here.
 constexpr Duration kPatience = std::chrono::seconds(3);
 constexpr std::size_t kMaxConnections = 4096;
+constexpr Duration kLastPictures = std::chrono::minutes(1);  // those of a worker that has left may still be on their way
 
 }  // namespace
 
@@ -44,8 +45,19 @@ std::unique_ptr<DirectPictures> DirectPictures::Open(Context& context, const std
 
 DirectPictures::~DirectPictures() { context_.authenticator().Forget(plane_); }
 
-void DirectPictures::Admit(const PictureSenders& senders) {
-  context_.authenticator().AdmitOnly(plane_, {senders.keys.begin(), senders.keys.end()});
+void DirectPictures::Admit(const PictureSenders& senders, Time now) {
+  std::set<std::string> keys(senders.keys.begin(), senders.keys.end());
+  for (const std::string& key : admitted_) {
+    if (!keys.contains(key)) left_.emplace(key, now);
+  }
+  std::erase_if(left_, [&](const auto& entry) {
+    if (keys.contains(entry.first)) return true;
+    if (now - entry.second < kLastPictures) return false;
+    socket_.EndConnections(entry.first);
+    return true;
+  });
+  context_.authenticator().AdmitOnly(plane_, keys);
+  admitted_ = std::move(keys);
   senders_ = senders.version;
 }
 

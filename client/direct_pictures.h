@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,7 +32,7 @@ class DirectPictures {
   std::uint64_t senders() const { return senders_; }  // PictureSenders::version
   Socket& socket() { return socket_; }
 
-  void Admit(const PictureSenders& senders);
+  void Admit(const PictureSenders& senders, Time now);
 
   // Takes what has come; returns the bytes of it.
   std::uint64_t Receive();
@@ -67,6 +69,8 @@ class DirectPictures {
   const PicturesDoor door_;
   const std::string plane_;
   std::uint64_t senders_ = 0;
+  std::set<std::string> admitted_;
+  std::map<std::string, Time> left_;                     // keys that are admitted no more, and since when
   std::deque<std::pair<std::uint64_t, Bytes>> arrived_;  // by digest, oldest first
   std::uint64_t arrived_bytes_ = 0;
   std::vector<Awaited> awaited_;

@@ -1,8 +1,8 @@
 # What `cmake --install` puts where, by components that a packager can pick (docs/cpp.md):
-#   server              coordinator and workers, without OpenImageIO
+#   server              coordinator and workers
 #   cli                 the command line; needs client-runtime
 #   gateway             HTTP and the viewer's page; needs client-runtime
-#   client-runtime      libslabstream.so.N, and the module that writes pictures by OpenImageIO
+#   client-runtime      libslabstream.so.N, and the module that writes EXR, TIFF, PDF and SVG
 #   client-development  header, CMake package, pkg-config file, examples; needs client-runtime
 #   python              the Python client
 #   lab                 slabstream-lab, the pages of experiments

@@ -1,14 +1,18 @@
 #include "coordinator/answer_question.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "common/planning/frame_plan.h"
+#include "common/planning/levels.h"
 #include "common/planning/shown_zones.h"
-#include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
 #include "coordinator/probe/percentiles.h"
@@ -21,7 +25,18 @@ struct Dataset {
   const ProbeVolume& volume;
   std::shared_ptr<const VolumeSummary> summary;
   DatasetId id;
+  std::optional<WholeNumbers> exact = {};  // where stored samples round them
 };
+
+WholeNumbers WholeNumbersOf(const ExactSamples& exact) {
+  WholeNumbers found;
+  found.mapping = exact.of.mapping;
+  VisitSampleType(exact.of.type, [&]<class T>(const T*) {
+    const std::span<const T> samples(reinterpret_cast<const T*>(exact.bytes.data()), exact.bytes.size() / sizeof(T));
+    if constexpr (requires { found.samples = samples; }) found.samples = samples;
+  });
+  return found;
+}
 
 Result<QuestionReply> AnswerSummary(const SummaryQuery& query, const VolumeSummary& summary) {
   Result<TransferFunction> transfer = ResolveTransfer(query.transfer, summary);
@@ -47,10 +62,23 @@ Result<QuestionReply> Answer(const SampleQuery& query, const Dataset& dataset) {
   return QuestionReply(std::move(reply));
 }
 
+Status NoLabels(const StatisticsQuery& query) {
+  return Status::InvalidArgument(
+      fmt::format("dataset \"{}\" has no labels to measure: --data NAME=FILE,labels=FILE gives it some", query.dataset));
+}
+
 Result<QuestionReply> Answer(const StatisticsQuery& query, const Dataset& dataset) {
-  Result<BoxStatistics> statistics = StatisticsIn(*dataset.volume.voxels.held(), dataset.summary->description, query.box);
+  const MeasuredVolume measured{*dataset.volume.voxels.held(), dataset.summary->description, dataset.exact};
+  const Result<BoxStatistics> statistics = StatisticsIn(measured, query.box);
   if (!statistics.ok()) return statistics.status();
-  return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = *statistics});
+  StatisticsReply reply{.nonce = query.nonce, .statistics = *statistics, .description = dataset.summary->description};
+  if (!query.labels) return QuestionReply(std::move(reply));
+  if (dataset.volume.labels == nullptr) return NoLabels(query);
+  const std::vector<Label>& labels = dataset.summary->label_table->labels;
+  const Result<std::vector<BoxStatistics>> of_labels = StatisticsByLabel(measured, query.box, *dataset.volume.labels, labels.size());
+  if (!of_labels.ok()) return of_labels.status();
+  for (std::size_t i = 0; i < labels.size(); ++i) reply.labels.push_back({labels[i], (*of_labels)[i]});
+  return QuestionReply(std::move(reply));
 }
 
 Result<QuestionReply> AnswerJointHistogram(const JointHistogramQuery& query, const VolumeSummary& summary, const ReadJointBox& read) {
@@ -77,9 +105,20 @@ Result<QuestionReply> Answer(const PickQuery& query, const Dataset& dataset) {
   if (const std::optional<Picked> picked = Pick(*setup, dataset.volume, query.x, query.y)) {
     reply.sample =
         SampleAtVoxel(dataset.volume, *dataset.summary, dataset.summary->description.geometry.ToWorld(picked->at), picked->voxel);
-    reply.depth = picked->depth;
+    reply.depth = picked->depth * setup->unit;
   }
   return QuestionReply(std::move(reply));
+}
+
+Result<QuestionReply> AnswerView(const ViewQuery& query, const VolumeGeometry& finest,
+                                 const std::shared_ptr<const VolumeSummary>& overview) {
+  const Result<ChosenView> chosen = ChooseView(query.frame, finest, overview, query.framed);
+  if (!chosen.ok()) return chosen.status();
+  if (Status status = CheckView(chosen->view, finest); !status.ok()) return status;
+  return QuestionReply(ViewReply{.nonce = query.nonce, .view = chosen->view, .framed = chosen->framed});
+}
+Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
+  return AnswerView(query, dataset.summary->description.geometry, dataset.summary);
 }
 
 Result<QuestionReply> Answer(const PrefetchQuery& query, const Dataset&) { return QuestionReply(PrefetchReply{.nonce = query.nonce}); }
@@ -150,16 +189,30 @@ Result<QuestionReply> ReadAnswer(const Query& query, const AnswerQuestion& asked
   return read.status().ok() ? std::move(answer) : Result<QuestionReply>(read.status());
 }
 
+// Adds the pieces of a box that the region may keep, halving it again and again: a volume may say that it has any number of voxels.
+void AddKept(const ClipRegion& region, const Box& box, Box& kept) {
+  constexpr std::int32_t kPiece = 64;
+  if (kept.Contains(box) || !region.MayKeep(box)) return;
+  const Index3 size = box.size();
+  const Axis longest = *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return size[axis]; });
+  if (size[longest] <= kPiece) {
+    kept = Hull(kept, box);
+    return;
+  }
+  Box low = box, high = box;
+  low.end[longest] = high.begin[longest] = (box.begin[longest] + size[longest] / 2 + kPiece - 1) / kPiece * kPiece;
+  AddKept(region, low, kept);
+  AddKept(region, high, kept);
+}
+
 Result<QuestionReply> ReadAnswer(const StatisticsQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts& from) {
   const VolumeDescription& description = asked.summary->description;
+  if (query.labels) return NoLabels(query);  // who reads in parts has no layers
   const Result<ClipRegion> region = MakeClipRegion({.box = query.box}, description.geometry);
   if (!region.ok()) return region.status();
-  constexpr std::int32_t kPiece = 64;
   Box needed;
-  for (const Box& piece : CutAtBlocks(description.geometry.bounds(), Uniform(kPiece))) {
-    if (region->MayKeep(piece)) needed = Hull(needed, piece);
-  }
-  if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce});
+  AddKept(*region, description.geometry.bounds(), needed);
+  if (needed.empty()) return QuestionReply(StatisticsReply{.nonce = query.nonce, .statistics = {}, .description = description});
   const Result<VoxelBlock> block = ReadBox(from, needed);
   if (!block.ok()) return block.status();
   const ProbeVolume volume{.voxels = VoxelBricks(*block)};
@@ -172,6 +225,10 @@ Result<QuestionReply> ReadAnswer(const JointHistogramQuery& query, const AnswerQ
 
 Result<QuestionReply> ReadAnswer(const SummaryQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
   return AnswerSummary(query, *asked.summary);
+}
+
+Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& asked, const VoxelServer::Samples::InParts&) {
+  return AnswerView(query, asked.summary->description.geometry, asked.summary);
 }
 
 Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& asked, Prefetcher& prefetcher) {
@@ -188,6 +245,9 @@ Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& as
 }  // namespace
 
 Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher) {
+  if (asked.levels != nullptr) {
+    return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary);
+  }
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
@@ -200,7 +260,8 @@ Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::S
       return ExactValueOf(exact->of, exact->bytes.data() + NumberIn(size, voxel) * BytesPerSample(exact->of.type));
     };
   }
-  const Dataset dataset{volume, asked.summary, asked.dataset};
+  Dataset dataset{volume, asked.summary, asked.dataset};
+  if (samples.exact != nullptr) dataset.exact = WholeNumbersOf(*samples.exact);
   return std::visit([&](const auto& query) { return Answer(query, dataset); }, asked.question);
 }
 

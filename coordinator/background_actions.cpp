@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -19,6 +21,7 @@
 #include "common/renderers/renderer_kind.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/answer_question.h"
+#include "coordinator/client_file.h"
 #include "coordinator/dataset_id.h"
 #include "data/survey/brick_index.h"
 #include "data/survey/survey.h"
@@ -26,7 +29,15 @@
 namespace slabstream {
 namespace {
 
-constexpr std::size_t kAnswersAtOnce = 2;
+// The server that a source is read from, whose tasks may hold up each other. 0: it lies in files.
+FairTasks::Owner ServerOf(std::string_view source) {
+  if (SchemeOf(source).empty()) return 0;
+  if (const std::size_t endpoint = source.find(kEndpointMark); endpoint != std::string_view::npos) {
+    source.remove_prefix(endpoint + kEndpointMark.size());
+  }
+  while (!SchemeOf(source).empty()) source.remove_prefix(SchemeOf(source).size() + 3);
+  return std::hash<std::string_view>()(source.substr(0, source.find('/')));
+}
 
 // Whether at least half of the volume's bricks hold one value each.
 bool MostBricksAreEqual(const VolumeSummary& summary) {
@@ -90,8 +101,7 @@ BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count
     : make_plan_(std::move(make_plan)),
       count_occupied_(std::move(count_occupied)),
       planner_(std::make_shared<Planner>(surroundings)),
-      voxels_(voxels),
-      answers_(kAnswersAtOnce) {}
+      voxels_(voxels) {}
 
 void BackgroundActions::HandleEvents(const std::function<void(CoordinatorEvent)>& handle) {
   for (News& news : inbox_->TakeAll()) {
@@ -221,12 +231,18 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
 
 BackgroundActions::AtOnce BackgroundActions::Perform(LoadDataset& action) {
   const std::string barrier = "dataset \"" + action.name + "\" could not be loaded";
-  return Post(
-      loads_, barrier.c_str(),
-      [action, inbox = inbox_] {
-        return Load(action, [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); });
-      },
-      EndOf<DatasetFailed>(action.name, action.load));
+  const auto load = [action, inbox = inbox_] {
+    const auto tell = [&](const ReadShare& read) { inbox->Post(News{DatasetReading{action.name, action.load, read}}); };
+    Result<News> news = Load(action, tell);
+    if (news.ok() || action.source.sent == nullptr) return news;
+    return Result<News>(action.source.sent->ForClient(news.status()));
+  };
+  const auto failed = EndOf<DatasetFailed>(action.name, action.load);
+  const DataSource& source = action.source;
+  FairTasks::Owner server = ServerOf(source.at_level != nullptr ? source.at_level->stored.source : source.path);
+  for (const std::string& layer : {source.layers.labels, source.layers.overlay}) server = server != 0 ? server : ServerOf(layer);
+  if (server != 0) return Post(far_loads_.Of(server), barrier.c_str(), load, failed);
+  return Post(loads_, barrier.c_str(), load, failed);
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(UnloadDataset& action) {
@@ -255,8 +271,9 @@ BackgroundActions::AtOnce BackgroundActions::Perform(FindDatasets& action) {
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
+  const std::optional<StoredAt>& stored = action.summary->stored;
   return PostResult(
-      answers_, "an answer to a question",
+      answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
       [action, samples = voxels_.Find(action.dataset), prefetcher = prefetcher_] { return AnswerTo(action, samples, *prefetcher); },
       EndOf<QuestionAnswered>(action.id));
 }

@@ -1,8 +1,9 @@
-// BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets or
-// take memory for uploads, up to kChecksAtOnce check files, two answer questions about voxels, up to kCountsAtOnce count occupied voxels,
-// each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open policies. None waits for
-// another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as
-// events for the machines. A plan that is dropped stops soon. So does a choice if its client has left.
+// BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets
+// from files or take memory for uploads, up to kFarLoadsAtOnce load datasets from servers, kLoadsAtOnce from each, up to kChecksAtOnce
+// check files, up to kAnswersAtOnce answer questions about voxels, two about those of one server or of all files, up to kCountsAtOnce count
+// occupied voxels, each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open
+// policies. None waits for another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What
+// they find comes back as events for the machines. A plan that is dropped stops soon. So does a choice if its client has left.
 //
 // One thread uses an object of this class: the one that runs the machines.
 #pragma once
@@ -36,7 +37,9 @@ using CountFunction = std::function<OccupancyGrid(const VoxelBricks&, const Clas
 using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(Planner&, const PlanRequest&)>;
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
-inline constexpr std::size_t kChecksAtOnce = 4;  // so one file system that does not answer leaves the others alone
+inline constexpr std::size_t kFarLoadsAtOnce = 16;  // so three servers that do not answer leave the others alone
+inline constexpr std::size_t kAnswersAtOnce = 8;    // likewise
+inline constexpr std::size_t kChecksAtOnce = 4;     // so one file system that does not answer leaves the others alone
 inline constexpr std::size_t kCountsAtOnce = 4;
 inline constexpr std::size_t kPlansAtOnce = 8;
 inline constexpr std::size_t kChoicesAtOnce = 2;
@@ -97,7 +100,8 @@ class BackgroundActions {
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
   std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen
-  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce}, answers_;
+  BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce};
+  FairTasks far_loads_{kFarLoadsAtOnce, kLoadsAtOnce}, answers_{kAnswersAtOnce, 2};         // by server
   const std::shared_ptr<FairTasks> choices_ = std::make_shared<FairTasks>(kChoicesAtOnce);  // plans share it
   FairTasks counts_{kCountsAtOnce}, planning_{kPlansAtOnce};
 };

@@ -18,13 +18,16 @@
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
 #include "common/wire/limits.h"
+#include "coordinator/client_file.h"
 #include "data/brick_store/brick_store.h"
 #include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/source_name.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/read_progress.h"
+#include "data/volume_io/slice_stack.h"
 
 namespace slabstream {
 namespace {
@@ -35,13 +38,6 @@ namespace fs = std::filesystem;
 std::string Shown(const std::string& argument) {
   constexpr std::size_t kMost = 512;
   return argument.size() <= kMost ? argument : argument.substr(0, kMost) + "...";
-}
-
-// The file name without its ending; ".nii.gz" is one ending.
-std::string Stem(const fs::path& path) {
-  fs::path name = path.filename();
-  if (name.extension() == ".gz") name = name.stem();
-  return name.stem().string();
 }
 
 bool IsFolder(const fs::path& path) {
@@ -70,17 +66,19 @@ bool IsOneVolume(const std::string& folder, const std::vector<fs::path>& volumes
 
 Status Repeated(const std::string& name) { return Status::InvalidArgument("there is already a dataset named \"" + name + "\""); }
 
-// Adds what is in the folder; what cannot be added is left out.
+// Adds what is in the folder, by its names (NamesOfSources). What is named already has precedence.
 void AddContents(FoundData& found, const std::string& folder, const std::vector<fs::path>& files) {
-  const auto add = [&](const std::string& name, const std::string& path) {
-    Status added = CheckDatasetName(name);
-    if (added.ok() && !found.datasets.emplace(name, DataSource(path, folder)).second) added = Repeated(name);
-    if (!added.ok()) found.complaints.push_back(path + ": left out: " + added.message());
-  };
-  if (IsOneVolume(folder, files)) {
-    add(fs::path(folder).filename().string(), folder);
-  } else {
-    for (const fs::path& file : files) add(IsFolder(file) ? file.filename().string() : Stem(file), file.string());
+  std::vector<std::string> volumes = {folder};
+  if (!IsOneVolume(folder, files)) volumes.assign(files.begin(), files.end());
+  const std::vector<std::string> names = NamesOfSources(volumes);
+  for (std::size_t i = 0; i < volumes.size(); ++i) {
+    const std::string usual = NameOfSource(volumes[i]);
+    if (!found.datasets.emplace(names[i], DataSource(volumes[i], folder)).second) {
+      found.complaints.push_back(volumes[i] + ": left out: " + Repeated(names[i]).message());
+    } else if (names[i] != usual) {
+      found.complaints.push_back(
+          fmt::format("{}: its dataset is named \"{}\", since \"{}\" is that of another file", volumes[i], names[i], usual));
+    }
   }
 }
 
@@ -90,7 +88,8 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path& path = entry->path();
-    if (!IsHidden(path) && LooksLikeAnyVolume(path.string())) files.push_back(path);
+    if (IsHidden(path) || IsPicture(path.string())) continue;  // pictures lie about for other reasons
+    if (LooksLikeAnyVolume(path.string())) files.push_back(path);
   }
   if (error) {
     const bool missing = error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
@@ -122,10 +121,20 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
   return Status::Ok();
 }
 
+// Whether a path without a name is a folder to watch. A store of objects such as an OME-Zarr is one volume. A folder of slices is watched:
+// it is one volume as long as nothing else lies in it.
+bool IsWatched(const std::string& path) {
+  if (!IsFolder(path)) return false;
+  return FindFormat(path, {}) != nullptr || !LooksLikeAnyVolume(path);
+}
+
+// As the name of a dataset, or of several times.
+bool HasName(const FoundData& found, const std::string& name) {
+  const auto next = found.datasets.lower_bound(name + "@");
+  return found.datasets.contains(name) || (next != found.datasets.end() && NameWithoutTime(next->first) == name);
+}
+
 Status AddFolder(FoundData& found, const std::string& path) {
-  std::error_code error;
-  if (!fs::exists(path, error)) return Status::NotFound("does not exist");
-  if (!fs::is_directory(path, error)) return Status::InvalidArgument("is a file; give it a name as in NAME=" + path);
   const std::string folder = WatchedFolder(path);
   if (std::ranges::find(found.folders, folder) != found.folders.end()) return Status::InvalidArgument("the folder is given before it");
   const Result<std::vector<fs::path>> files = VolumeFilesIn(folder);
@@ -152,8 +161,9 @@ void LeaveOutMost(FoundData& found) {
 
 // The files of a source, by its headers.
 Result<std::vector<std::string>> FilesOf(const DataSource& data) {
-  const Result<SourceText> source = ParseSourceText(data.path);
+  Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
+  source->options.describe = true;
   Result<std::vector<std::string>> files = CheckAnyVolumeHeaders(source->path, source->options);
   if (!files.ok() || !data.layers.any()) return files;
   const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
@@ -257,7 +267,7 @@ WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& d
   WayToRead way{source->info().files, {}};
   if (in_parts) {
     way.read = [source, source_text = data.path, place = PlaceOf(data, text), text, progress] {
-      WarnOfChannel(text.path, text.options, FileInfoOf(source->info()));
+      WarnOfPart(text.path, text.options, FileInfoOf(source->info()));
       return Surveyed(source, place, FindIndex(source_text, source->info()), *progress);
     };
   } else if (IsReadWhole(text.path, text.options)) {
@@ -285,7 +295,7 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   Result<SourceText> text = ParseSourceText(data.path);
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
-  text->options.describe = data.describe && !IsReadWhole(text->path, text->options);
+  text->options.describe = true;
   if (!data.layers.any()) {
     const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
     const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };
@@ -322,7 +332,9 @@ const std::string* DataArgument::RelativePath() const {
 }
 
 Result<DataArgument> ParseDataArgument(const std::string& argument) {
-  const std::size_t equals = argument.find('=');
+  // What stands before an '=' is no name if it is an address, or ends in an option or a layer.
+  const std::size_t first = argument.find('='),
+                    equals = argument.find_first_of("?,") < first || argument.find("://") < first ? std::string::npos : first;
   DataArgument parsed;
   if (equals != std::string::npos) parsed.name = argument.substr(0, equals);
   parsed.path = equals == std::string::npos ? argument : argument.substr(equals + 1);
@@ -334,7 +346,6 @@ Result<DataArgument> ParseDataArgument(const std::string& argument) {
     return wrong(fmt::format("a path of {} bytes, must have 1 to {}", parsed.path.size(), kMaxPathBytes));
   }
   if (parsed.path.find('\0') != std::string::npos) return wrong("a path with a zero byte");
-  if (parsed.name.empty()) return parsed;
   if (Status layers = TakeLayers(parsed.path, parsed.layers); !layers.ok()) return wrong(layers.message());
   if (parsed.path.empty()) return wrong("layers without a volume");
   return parsed;
@@ -348,7 +359,7 @@ std::string WatchedFolder(const std::string& path) {
 
 FoundData FindData(const std::vector<std::string>& arguments, const std::string& prefix) {
   FoundData found;
-  std::vector<std::pair<std::string, DataArgument>> folders;
+  std::vector<std::pair<std::string, DataArgument>> folders, unnamed;
   const auto note = [&](const std::string& argument, const Status& status) {
     if (!status.ok()) found.errors.emplace_back(status.code(), prefix + Shown(argument) + ": " + status.message());
   };
@@ -358,9 +369,20 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
     if (!parsed.ok()) {
       found.errors.emplace_back(parsed.status().code(), prefix + parsed.status().message());
     } else if (parsed->name.empty()) {
-      folders.emplace_back(argument, *parsed);
+      (IsWatched(parsed->path) ? folders : unnamed).emplace_back(argument, *parsed);
     } else {
       note(argument, AddNamed(found, *parsed));
+    }
+  }
+  for (auto& [argument, volume] : unnamed) {
+    const std::string usual = NameOfSource(volume.path);
+    volume.name = usual;
+    for (int number = 2; HasName(found, volume.name); ++number) volume.name = fmt::format("{}-{}", usual, number);
+    const Status added = AddNamed(found, volume);
+    note(argument, added);
+    if (added.ok() && volume.name != usual) {
+      found.complaints.push_back(
+          fmt::format("{}: its dataset is named \"{}\", since \"{}\" is that of another file", volume.path, volume.name, usual));
     }
   }
   if (found.datasets.size() > kMaxListed) {
@@ -368,7 +390,10 @@ FoundData FindData(const std::vector<std::string>& arguments, const std::string&
         fmt::format("{}{} volumes are named, the catalogue has at most {}", prefix, found.datasets.size(), kMaxListed)));
     return found;
   }
-  for (const auto& [argument, folder] : folders) note(argument, AddFolder(found, folder.path));
+  for (const auto& [argument, folder] : folders) {
+    note(argument, folder.layers.any() ? Status::InvalidArgument("layers belong to one volume, and this is a folder to watch")
+                                       : AddFolder(found, folder.path));
+  }
   LeaveOutMost(found);
   return found;
 }
@@ -418,6 +443,7 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     ReadProgress progress(tell);
     const Result<WayToRead> way = FindWay(source, most_bytes, progress);
     if (!way.ok()) return way.status();
+    if (const Status alone = source.sent ? source.sent->CheckAlone(way->files) : Status::Ok(); !alone.ok()) return alone;
     const Result<FileStamp> before = StampFiles(way->files);
     if (!before.ok()) return before.status();
     AwaitRest(*before);

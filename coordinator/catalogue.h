@@ -5,11 +5,12 @@
 //   NAME=PATH   one volume: a file, or a folder of slices; with options for reading it behind a question mark (read_options.h)
 //   NAME=PATH?time=FIRST:LAST
 //               a volume for each time of a file that holds several: NAME@FIRST ... NAME@LAST (NameAtTime)
+//   PATH        the same, named after its file (NameOfSource, data/open/source_name.h), for anything but a folder to watch
 //   NAME=PATH,labels=FILE[:COLOURS],overlay=FILE
 //               the same with layers (data/layers/layer_reader.h); either one may be left out
-//   DIR         a watched folder: every volume file in it by its stem ("head.nii.gz" is "head"), also those that come later, and every
-//               folder in it that is a volume by its name; a watched folder of nothing but slices, or DICOM, is one volume and has its
-//               name; in one of nothing but folders each may be a volume. What has a name that begins with a dot is left out
+//   DIR         a watched folder: every volume file in it, named after the file, also those that come later, and every folder in it that
+//               is a volume; a watched folder of nothing but slices, or DICOM, is one volume and has its name; in one of nothing but
+//               folders each may be a volume. What has a name that begins with a dot is left out
 //
 // Everything here may take as long as the file system does. Any thread.
 #pragma once
@@ -34,20 +35,20 @@ inline constexpr int kMaxTimes = 10'000;  // that one argument names
 
 // Help of --data.
 inline constexpr char kDataHelp[] =
-    "A volume to serve, as NAME=FILE or NAME=FILE?OPTION=VALUE,... with the options for reading of `slabstream render`, or a folder of "
-    "volumes, which are named after their files. A folder is watched: files may come, change and go. Layers follow a named volume, as "
-    "NAME=FILE,labels=FILE[:COLOURS],overlay=FILE. NAME=FILE?time=FIRST:LAST names several volumes of one file: NAME@FIRST to NAME@LAST";
+    "A volume to serve, as FILE or NAME=FILE, or a folder of volumes. Without a name it is named after its file: head.nii.gz is head. A "
+    "folder is watched: files may come, change and go. Options for reading follow, as FILE?OPTION=VALUE,..., and layers, as "
+    "FILE,labels=FILE[:COLOURS],overlay=FILE. NAME=FILE?time=FIRST:LAST names several volumes of one file: NAME@FIRST to NAME@LAST";
 
 struct DataArgument {
-  std::string name;  // empty: `path` is a folder
-  std::string path;  // of a named one: with its options
+  std::string name;  // empty: none is given
+  std::string path;  // with its options
   LayerFiles layers = {};
 
   // The first path that is not absolute, of the volume or of a layer. Null: all are.
   const std::string* RelativePath() const;
 };
 // Looks at no file. InvalidArgument: a name that is empty, too long (kMaxNameBytes) or has other characters than letters, digits and
-// "._-"; a path that is empty or longer than kMaxPathBytes, of the volume or of a layer; a layer that is given twice, or one of a folder.
+// "._-"; a path that is empty or longer than kMaxPathBytes, of the volume or of a layer; a layer that is given twice.
 // Messages begin with the argument.
 Result<DataArgument> ParseDataArgument(const std::string& argument);
 

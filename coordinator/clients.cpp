@@ -45,13 +45,14 @@ void ClientTable::Sent(PeerToken token, std::size_t bytes) {
   unread_of_all_ += bytes;
 }
 
-void ClientTable::Read(PeerToken token, std::uint64_t bytes) {
+void ClientTable::Read(PeerToken token, std::uint64_t bytes, std::uint64_t unsent) {
   const auto found = clients_.find(token);
   if (found == clients_.end()) return;
   Client& client = found->second;
   unread_of_all_ -= client.unread();
   if (!client.read_before) client.read_before = bytes - std::min(bytes, client.sent_bytes);
-  client.read_bytes = std::min(client.sent_bytes, bytes - std::min(bytes, *client.read_before));
+  const std::uint64_t left = client.sent_bytes - std::min(client.sent_bytes, unsent);
+  client.read_bytes = std::min(left, bytes - std::min(bytes, *client.read_before));
   unread_of_all_ += client.unread();
 }
 

@@ -51,8 +51,8 @@ class ClientTable {
   Time NextWake() const;  // the next silence
 
   void Sent(PeerToken client, std::size_t bytes);
-  // What it says to have read since its connection began.
-  void Read(PeerToken client, std::uint64_t bytes);
+  // What it says to have read since its connection began. Bytes that have not left this process it cannot have read.
+  void Read(PeerToken client, std::uint64_t bytes, std::uint64_t unsent = 0);
   // It has left kMaxUnreadBytes unread, or its part of most_unread. A client that is behind gets no previews, and none of its frames
   // begins.
   bool IsBehind(PeerToken client) const;

@@ -24,6 +24,7 @@
 namespace slabstream {
 
 struct BrickIndex;
+class ClientFile;
 
 // A level of a source that is open.
 struct SourceAtLevel {
@@ -56,12 +57,12 @@ struct DataSource {
           return LoadedData{{.volume = *std::move(volume)}};
         }) {}
 
-  std::string path;       // a file, or a folder of slices; a named one may have options for reading it behind a question mark
-  std::string folder;     // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;      // of a named one
-  bool describe = false;  // as of ReadOptions, of a source that can be read in parts alone
+  std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
+  std::string folder;  // the watched folder that it was found in; empty: it was named
+  LayerFiles layers;   // of a named one
   std::shared_ptr<const SourceAtLevel> at_level = {};  // of one that has several: this one, which is loaded as a dataset of its own
   DataLoader load;                                     // set: `path` and `layers` are not used
+  std::shared_ptr<const ClientFile> sent;              // `path` is this file, which is deleted with the last source of it
   std::uint64_t held_bytes = 0;                        // of memory that it takes itself, whether it is loaded or not: a client has sent it
 };
 

@@ -40,6 +40,7 @@ void DatasetMachine::State::On(const ForgetClient& event) {
   if (const Upload upload = UploadOf(event.client); upload != uploads.end()) {
     EndUpload(upload, Status::Unavailable("its client has gone"));
   }
+  RemoveFilesOf(event.client);
   std::erase_if(questions, [&](const auto& open) { return open.second.client == event.client; });
 }
 
@@ -86,7 +87,11 @@ CheckId DatasetMachine::State::Seek(const std::string& name) {
 Status DatasetMachine::State::DescendUse(Use& use) {
   const std::shared_ptr<const VolumeLevels> levels = datasets.Find(use.entries.front().name)->levels;
   if (levels == nullptr) return Status::Ok();
-  Result<LevelMap> map = LevelsOf(*use.request, *levels);
+  FrameRequest seen = *use.request;
+  const Result<ChosenView> chosen = ChooseView(seen, levels->levels.front().geometry, levels->overview);
+  if (!chosen.ok()) return chosen.status();
+  use.view = seen.view = chosen->view;
+  Result<LevelMap> map = LevelsOf(seen, *levels);
   if (!map.ok()) return map.status();
   if (use.most_level_bytes > 0) map = NoneLarger(*std::move(map), use.most_level_bytes, *levels);
   use.map = std::make_shared<const LevelMap>(*std::move(map));
@@ -128,6 +133,7 @@ void DatasetMachine::State::TellUse(const std::pair<const UseId, Use>& each) {
   if (use.map != nullptr) {
     ready.levels = datasets.Find(use.request->dataset)->levels;
     ready.drawn = use.map->levels;
+    ready.view = use.view;
   }
   if (use.map != nullptr && !use.map->one_level()) ready.map = use.map;
   news.uses[id] = std::move(ready);

@@ -159,8 +159,10 @@ struct FindDatasets {
 struct AnswerQuestion {
   QuestionId id = 0;
   Question question;
-  DatasetId dataset = 0;  // 0: a SummaryQuery about a dataset with several levels, which needs no voxels
+  // 0: a SummaryQuery or ViewQuery about a dataset with several levels, which needs no voxels
+  DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
+  std::shared_ptr<const VolumeLevels> levels = nullptr;  // of a ViewQuery about such a dataset, whose summary is the overview's
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

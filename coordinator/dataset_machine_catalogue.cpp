@@ -74,7 +74,7 @@ void DatasetMachine::State::AddData(const std::string& name, const DataSource& s
   datasets.Add(name, source, now);
   hidden.erase(name);
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "dataset {} is in the catalogue: {}", InQuotes(name),
-       source.held_bytes > 0 ? "a client has sent it" : source.path);
+       source.held_bytes > 0 || source.sent != nullptr ? "a client has sent it" : source.path);
   if (IsWanted(name)) LoadData(name);
 }
 
@@ -82,6 +82,7 @@ void DatasetMachine::State::RemoveData(const std::string& name, const std::strin
   const Status removed = Status::NotFound("dataset " + InQuotes(name) + " is not in the catalogue any more: " + why);
   Tell(NoteAbout::kDatasets, LogLevel::kInfo, "{}", removed.message());
   datasets.Remove(name);
+  files.erase(name);
   Lose(name, removed);
 }
 

@@ -39,6 +39,9 @@ void DatasetMachine::State::Ask(PeerToken client, Question question) {
 Status DatasetMachine::State::DescendQuestion(OpenQuestion& open, const VolumeLevels& levels) {
   int level = 0;
   if (FrameRequest* const frame = FrameOf(open.question)) {
+    const Result<ChosenView> chosen = ChooseView(*frame, levels.levels.front().geometry, levels.overview);
+    if (!chosen.ok()) return chosen.status();
+    frame->view = chosen->view;
     const Result<LevelMap> drawn = LevelsOf(*frame, levels);
     if (!drawn.ok()) return drawn.status();
     level = drawn->levels.front();
@@ -59,9 +62,12 @@ void DatasetMachine::State::AskExecutor() {
     };
     if (open.asked || !can_be_asked(open)) continue;
     const std::shared_ptr<const VolumeLevels> levels = datasets.Find(open.entry)->levels;
+    const bool about_view = std::holds_alternative<ViewQuery>(open.question);
     std::shared_ptr<const VolumeSummary> summary;
     if (levels != nullptr && std::holds_alternative<SummaryQuery>(open.question)) {
       summary = std::make_shared<const VolumeSummary>(StatisticsOf(*levels));
+    } else if (levels != nullptr && about_view) {
+      summary = levels->overview;
     } else if (levels != nullptr) {
       if (const Status found = DescendQuestion(open, *levels); !found.ok()) {
         wrong.emplace_back(id, found);
@@ -71,7 +77,8 @@ void DatasetMachine::State::AskExecutor() {
     }
     const DatasetTable::Entry& entry = *datasets.Find(open.entry);
     open.asked = true;
-    actions.emplace_back(AnswerQuestion{id, open.question, entry.id, summary != nullptr ? summary : entry.summary});
+    actions.emplace_back(
+        AnswerQuestion{id, open.question, entry.id, summary != nullptr ? summary : entry.summary, about_view ? levels : nullptr});
   }
   for (const auto& [id, why] : wrong) {
     ++refused.bad_request;

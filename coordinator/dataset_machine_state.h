@@ -44,6 +44,7 @@ struct DatasetMachine::State {
     };
     std::vector<Entry> entries;
     std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
+    std::optional<ViewParameters> view = {};   // likewise (DatasetReady::view)
     bool has_light = false;                    // likewise: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
@@ -79,7 +80,8 @@ struct DatasetMachine::State {
   OrderId last_order = 0;
   std::map<QuestionId, OpenQuestion> questions;  // in order of arrival
   QuestionId last_question = 0;
-  std::map<UploadId, OpenUpload> uploads;  // at most one of each client
+  std::map<UploadId, OpenUpload> uploads;   // at most one of each client
+  std::map<std::string, OpenUpload> files;  // by dataset: those that have come and last as long as their clients
   UploadId last_upload = 0;
   CheckCounter folder_checks;
   Time next_round;                                          // when the folders are looked through, if there are any
@@ -124,6 +126,7 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const StatisticsQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
+  void OnMessage(PeerToken client, const ViewQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PrefetchQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
@@ -172,11 +175,12 @@ struct DatasetMachine::State {
 
   // ---- uploads
   Status AdmitUpload(const AddVolume& order);
-  std::uint64_t UploadBytes() const;  // of those under way
+  std::uint64_t UploadBytes() const;  // of those under way, and of files that clients have sent
   void GrantCredit(OpenUpload& upload);
   using Upload = std::map<UploadId, OpenUpload>::iterator;
   Upload UploadOf(PeerToken client, std::optional<std::uint64_t> nonce = {});  // end: it has none, or another one
   void EndUpload(Upload upload, const Status& why);                            // without a dataset
+  void RemoveFilesOf(PeerToken client);
 
   Time NextWake() const;
 

@@ -50,6 +50,7 @@ Status DatasetMachine::State::NameIsFree(const std::string& name) const {
 std::uint64_t DatasetMachine::State::UploadBytes() const {
   std::uint64_t total = 0;
   for (const auto& [id, upload] : uploads) total += upload.order.bytes();
+  for (const auto& [name, file] : files) total += file.order.bytes();
   return total;
 }
 
@@ -95,13 +96,28 @@ void DatasetMachine::State::On(const UploadFinished& event) {
   // A file of that name may have come into a watched folder.
   const Status status = event.source.ok() ? NameIsFree(order.name) : event.source.status();
   if (!status.ok()) return Send(upload.mapped().client, OrderRefused{.nonce = order.nonce, .status = Bounded(status)});
+  if (order.file) files.emplace(order.name, upload.mapped());
   AddData(order.name, *event.source);
   Send(upload.mapped().client, DataReply{.nonce = order.nonce, .datasets = datasets.Report(now)});
 }
 
 void DatasetMachine::State::OnMessage(PeerToken client, const DropVolume& message, const Bytes&) {
   const Upload upload = UploadOf(client, message.nonce);
-  if (upload != uploads.end()) EndUpload(upload, Status::Cancelled("the client gave the volume up"));
+  if (upload != uploads.end()) return EndUpload(upload, Status::Cancelled("the client gave the volume up"));
+  const auto file = std::ranges::find_if(
+      files, [&](const auto& each) { return each.second.client == client && each.second.order.nonce == message.nonce; });
+  if (file == files.end()) return;
+  const std::string name = file->first;
+  RemoveData(name, "its client has removed it");
+  Send(client, OrderRefused{.nonce = message.nonce, .status = Status::Cancelled("the client has removed the dataset")});
+}
+
+void DatasetMachine::State::RemoveFilesOf(PeerToken client) {
+  std::vector<std::string> names;
+  for (const auto& [name, file] : files) {
+    if (file.client == client) names.push_back(name);
+  }
+  for (const std::string& name : names) RemoveData(name, "its client has gone");
 }
 
 void DatasetMachine::State::EndUpload(Upload upload, const Status& why) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/natural_order.h"
 #include "common/frame/dataset_name.h"
 
@@ -50,10 +51,11 @@ Status DatasetTable::NoSuchDataset(const std::string& name) const {
     if (entry.awaited == 0) names.push_back(known);
   }
   std::ranges::sort(names, {}, InNaturalOrder);
+  const std::string meant = DidYouMean(name, names);
   if (names.size() > kNamesInMessage) names.resize(kNamesInMessage);
   if (names.empty()) return Status::NotFound("no dataset \"" + name + "\": the catalogue is empty");
   const std::string more = size() > names.size() ? fmt::format(" and {} more", size() - names.size()) : "";
-  return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}", name, fmt::join(names, ", "), more));
+  return Status::NotFound(fmt::format("no dataset \"{}\": the catalogue has {}{}{}", name, fmt::join(names, ", "), more, meant));
 }
 
 std::size_t DatasetTable::size() const {

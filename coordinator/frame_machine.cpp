@@ -149,7 +149,9 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
                   .share_pixels = in_shares ? config.share_pixels : 0,
                   .limits = WorkerLimits()};
   if (const OpenRequest::HasDataset& dataset = *request.dataset(); dataset.levels != nullptr) {
-    ask.frame = std::make_shared<const FrameRequest>(request.submit.frame);
+    FrameRequest frame = request.submit.frame;
+    frame.view = dataset.view;
+    ask.frame = std::make_shared<const FrameRequest>(std::move(frame));
     ask.levels = dataset.levels;
     ask.level = dataset.drawn.front();
   }
@@ -183,8 +185,10 @@ void FrameMachine::State::AfterGroupDone(const RunningFrame& frame) {
   SendProgress(frame);
 }
 
-void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
+void FrameMachine::State::EndFrame(FrameId id, std::string_view result, DeadlineForecast::Ended how) {
   const RunningFrame& frame = *frames.Find(id);
+  if (!frame.request().coarse) forecast.End(id, how, now);
+  forecast_due = true;
   const std::vector<WorkerId> workers = frame.Participants();
   const OpenRequest& request = frame.request();
   Tell(NoteAbout::kFrames, LogLevel::kInfo, "frame {} of client {}: dataset {}, {}, {}x{}, {:.1f} ms, workers {}, attempts {}: {}", id,
@@ -199,7 +203,8 @@ void FrameMachine::State::EndFrame(FrameId id, std::string_view result) {
 
 void FrameMachine::State::FailFrame(const RunningFrame& frame, const Status& status) {
   AnswerFailure(frame.request(), status);
-  EndFrame(frame.id(), status.message());
+  const bool late = status.code() == StatusCode::kDeadlineExceeded;
+  EndFrame(frame.id(), status.message(), late ? DeadlineForecast::Ended::kLate : DeadlineForecast::Ended::kGivenUp);
 }
 
 void FrameMachine::State::Expire() {
@@ -255,6 +260,7 @@ std::string_view FrameMachine::State::WhatLacks(const OpenRequest& request) cons
 // Workers that are leaving finish what they have. If nobody else is there, that includes the frames that run; the others wait.
 void FrameMachine::State::Advance() {
   if (roster.empty()) return;
+  RefuseLate();
   const std::size_t staying = roster.staying();
   if (staying < roster.members().size()) {
     for (RunningFrame& frame : frames) frame.HandOver(roster.Refill(frame.roster()));
@@ -322,14 +328,47 @@ bool FrameMachine::State::StartNextFrame(std::size_t workers) {
   const auto ready = [&](const OpenRequest& open) {
     const PlanMade* const plan = ReadyPlan(open);
     return plan != nullptr && open.dataset()->seen && !AwaitsCoarse(open) && !clients.IsBehind(open.client) &&
-           frames.MayStart(open.client, *plan, workers);
+           frames.MayStart(open.client, *plan, workers) && MayBegin(open);
   };
   const OpenRequest* const next = queue.FindNext(ready);
   if (next == nullptr || !frames.HasRoomFor(*ReadyPlan(*next))) return false;
   actions.emplace_back(std::in_place_type<ToDatasets>, KeepDataset{next->use, next->dataset()->datasets()});
   const RunningFrame& running = frames.Add(RunningFrame(frames.next_id(), queue.Take(*next), limits, now));
+  const OpenRequest& begun = running.request();
+  if (!begun.coarse) forecast.Begin(running.id(), {begun.client, begun.kind, begun.deadline(), begun.used}, now);
   SendProgress(running);
   return true;
+}
+
+bool FrameMachine::State::MayBegin(const OpenRequest& request) const {
+  return request.coarse || forecast.MayBegin({request.client, request.kind, request.deadline(), queue.UsedBy(request.client)}, now);
+}
+
+// Requests that could not be in time even if everything cost half as much as is expected. Clients that ask for too much hear it at once,
+// rather than at the deadline.
+void FrameMachine::State::RefuseLate() {
+  if (!std::exchange(forecast_due, false) || frames.size() == 0) return;
+  const PeerToken first = frames.begin()->request().client;
+  const bool runs_alone = std::ranges::all_of(frames, [first](const RunningFrame& frame) { return frame.request().client == first; });
+  if (runs_alone && queue.clients() == (queue.CountOf(first) > 0 ? 1 : 0)) return;
+  std::map<UseId, Duration> late;  // when they would be ready
+  Duration ahead = forecast.Left(now);
+  queue.VisitInTurn([&](const OpenRequest& request) {
+    const Duration cost = request.coarse ? Duration::zero() : forecast.Expected(request.kind);
+    if (cost == Duration::zero()) return true;
+    if (now + (ahead + cost) / 2 > request.deadline()) {
+      late.emplace(request.use, ahead + cost);
+    } else {
+      ahead += cost;
+    }
+    return true;
+  });
+  if (late.empty()) return;
+  for (const OpenRequest& request : queue.Extract([&](const OpenRequest& each) { return late.contains(each.use); })) {
+    FailRequest(request, Status::DeadlineExceeded(fmt::format(
+                             "the service has too much to do: the frame would be ready in some {} ms, and its deadline is in {} ms",
+                             Milliseconds(late.at(request.use)), Milliseconds(std::max(request.deadline() - now, Duration::zero())))));
+  }
 }
 
 void FrameMachine::State::HandOut(RunningFrame& frame) {

@@ -85,7 +85,8 @@ struct FromWorker {
 struct FromClient {
   PeerToken from = 0;
   ClientToFrames message;
-  std::string host = {};  // that it has connected from, as in an endpoint; empty: not known
+  std::string host = {};           // that it has connected from, as in an endpoint; empty: not known
+  std::uint64_t unsent_bytes = 0;  // of payloads for it that wait in this process
 };
 // The client has said something to the DatasetMachine, too.
 struct ClientHeard {

@@ -20,6 +20,11 @@ std::optional<PicturesAddress> AddressOf(const std::optional<PicturesDoor>& door
   return PicturesAddress{fmt::format("tcp://{}:{}", host, door->port), door->key};
 }
 
+FrameKind KindOf(const FrameRequest& frame) {
+  return std::hash<std::string>()(
+      fmt::format("{}\n{}\n{}\n{} {} {}", frame.dataset, frame.renderer, frame.level, frame.detail, frame.size.width, frame.size.height));
+}
+
 }  // namespace
 
 void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& message) {
@@ -34,6 +39,8 @@ void FrameMachine::State::OnSubmit(const FromClient& event, const SubmitFrame& m
   if (Status quota = WithinQuota(client); !quota.ok()) return FailRequest(request, quota, &RefusedRequests::over_quota);
   if (message.frame.previews) QueueCoarse(request);
   request.use = ++last_use;
+  request.kind = KindOf(message.frame);
+  forecast_due = true;
   queue.Push(std::move(request));
   actions.emplace_back(std::in_place_type<ToDatasets>, SeekDataset{last_use, std::make_shared<const FrameRequest>(message.frame)});
 }
@@ -66,7 +73,8 @@ void FrameMachine::State::On(const DatasetNews& event) {
 
 // Errors as of ResolveRequest.
 Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& ready) const {
-  const FrameRequest& asked = request.submit.frame;
+  FrameRequest asked = request.submit.frame;
+  if (ready.view) asked.view = *ready.view;
   if (ready.levels == nullptr && LevelNumber(asked.level).value_or(0) > 0) {
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has level 0 alone", asked.level, asked.dataset));
   }
@@ -81,10 +89,12 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   const bool counted = !resolved->summary->stored && resolved->map == nullptr;
   request.uses_occupancy = NeedsOccupancy(asked.policy) && counted;
   request.needs_occupancy = request.uses_occupancy && !LeavesChoice(asked.policy);
+  const ViewParameters view = ready.view.value_or(resolved->frame.view);
   request.state = OpenRequest::HasDataset{.resolved = std::make_shared<const ResolvedRequest>(*std::move(resolved)),
                                           .seen = ready.seen,
                                           .levels = ready.levels,
-                                          .drawn = ready.drawn};
+                                          .drawn = ready.drawn,
+                                          .view = view};
   return Status::Ok();
 }
 
@@ -117,8 +127,9 @@ void FrameMachine::State::OnClientMessage(PeerToken client, const CancelFrame& m
   }
 }
 
-void FrameMachine::State::OnClientMessage(PeerToken client, const ClientPing& message) {
-  clients.Read(client, message.received_bytes);
+void FrameMachine::State::OnPing(const FromClient& event, const ClientPing& message) {
+  const PeerToken client = event.from;
+  clients.Read(client, message.received_bytes, event.unsent_bytes);
   ClientPong pong{.epoch = config.epoch, .nonce = message.nonce};
   for (const RequestId request : message.open) {
     Answer* answer = clients.FindAnswer(client, request);

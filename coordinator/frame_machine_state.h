@@ -51,6 +51,8 @@ struct FrameMachine::State {
   ClientTable clients;
   RequestQueue queue;
   FramesInFlight frames;
+  DeadlineForecast forecast;
+  bool forecast_due = false;  // requests have come, or a frame has ended
   OccupancyTable occupancy;
   std::set<PlanId> planning;  // requested and neither answered nor dropped
   PlanId last_plan = 0;
@@ -74,6 +76,7 @@ struct FrameMachine::State {
   void On(const FromClient& event) {
     clients.Touch(event.from, now);
     std::visit(Overloaded{[&](const SubmitFrame& message) { OnSubmit(event, message); },
+                          [&](const ClientPing& message) { OnPing(event, message); },
                           [&](const auto& message) { OnClientMessage(event.from, message); }},
                event.message);
   }
@@ -103,7 +106,7 @@ struct FrameMachine::State {
   // ---- messages of clients
   void OnSubmit(const FromClient& event, const SubmitFrame& message);
   void OnClientMessage(PeerToken client, const CancelFrame& message);
-  void OnClientMessage(PeerToken client, const ClientPing& message);
+  void OnPing(const FromClient& event, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);
   std::vector<WebTraffic> WebTrafficOfAll() const;  // of this process and its workers, by server
   void OnClientMessage(PeerToken client, const ShutDown& message);
@@ -127,6 +130,8 @@ struct FrameMachine::State {
   // ---- frames and workers
   void Expire();
   void Advance();
+  bool MayBegin(const OpenRequest& request) const;
+  void RefuseLate();
   void BeginAttempts();
   bool AwaitsTrial(const RunningFrame& frame);
   std::set<WorkerId> HoldersOf(const RunningFrame& frame) const;
@@ -150,7 +155,7 @@ struct FrameMachine::State {
     if (!frame.request().coarse) SendClient(frame.request().client, frame.Progress());
   }
   void AfterGroupDone(const RunningFrame& frame);
-  void EndFrame(FrameId id, std::string_view result);
+  void EndFrame(FrameId id, std::string_view result, DeadlineForecast::Ended how = DeadlineForecast::Ended::kGivenUp);
   void FailFrame(const RunningFrame& frame, const Status& status);
   void LoseWorker(WorkerId worker, LiveRoster::Loss loss);
   void RemoveWorker(WorkerId worker, LiveRoster::Loss loss);

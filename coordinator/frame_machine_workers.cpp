@@ -64,7 +64,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
                    .group_count = message.group_count,
                    .shares = std::move(shares),
                    .statistics = {},
-                   .geometry = GeometryOf(frame->plan().setup.camera, frame->plan().setup.description.geometry)};
+                   .geometry = PictureGeometryOf(frame->plan().setup)};
   for (const PictureShare& share : reply.shares) {
     if (share.direct) clients.Sent(request.client, share.runs.encoded_bytes);
   }
@@ -77,7 +77,7 @@ void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const FrameIm
   if (frame->planned()->teaches()) actions.emplace_back(FrameMeasured{frame->planned(), reply.statistics.reports});
   EndRequest(request.client, request.submit.request, std::move(reply), std::move(payload));
   ++frames_done;
-  EndFrame(message.frame, "done");
+  EndFrame(message.frame, "done", DeadlineForecast::Ended::kDone);
 }
 
 void FrameMachine::State::OnWorkerMessage(const FromWorker& event, const WorkerTrouble& message) {

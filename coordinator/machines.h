@@ -82,7 +82,8 @@ struct DatasetReady {
   std::shared_ptr<const VolumeSummary> summary;
   // Of a dataset with several levels; null: it has one. The voxels are those of the finest one that is drawn (AtLevel).
   std::shared_ptr<const VolumeLevels> levels = nullptr;
-  std::vector<int> drawn = {0};  // numbers of levels, finest first
+  std::optional<ViewParameters> view = {};  // of such a dataset: the view that the levels were chosen for (ChooseView)
+  std::vector<int> drawn = {0};             // numbers of levels, finest first
   // If there are several of these: which parts, and those beside the finest one (ResolvedRequest).
   std::shared_ptr<const LevelMap> map = {};
   std::vector<CoarserVolume> coarser = {};

@@ -65,7 +65,7 @@ int Run(int argc, char** argv) {
                  "Encrypt tcp connections with the keys in this folder; make it, with the service files client.json, worker.json and "
                  "admin.json, if it does not exist; required for addresses that are not loopback")
       ->type_name("FOLDER");
-  AddRepeated(app, "--data", data, kDataHelp)->type_name("NAME=FILE");
+  AddRepeated(app, "--data", data, kDataHelp)->type_name("[NAME=]FILE|FOLDER");
   app.add_flag("--compress", compress,
                "Pack voxels for workers with zstd: saves time on links slower than about 300 MB/s, not within a machine");
   options.machine.memory_bytes = DefaultMemory().coordinator;

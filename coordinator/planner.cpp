@@ -26,10 +26,10 @@ bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const Vol
   constexpr Index3 kSomeBlock = {32, 32, 32};
   auto summary = std::make_shared<VolumeSummary>(UnreadSummary(level, *levels.overview));
   summary->stored = StoredAt{.source = {}, .block = {{0, 0, 0}, kSomeBlock}};
-  FrameRequest at_level = AtLevel(frame, levels.levels.front().geometry, level.geometry);
-  at_level.shading = {};  // its light volume is that of the dataset, whichever level is drawn
-  const Result<ResolvedRequest> resolved = ResolveRequest(std::move(at_level), request.resolved->volume.dataset(), summary);
+  Result<ResolvedRequest> resolved =
+      ResolveRequest(AtLevel(frame, levels.levels.front().geometry, level.geometry), request.resolved->volume.dataset(), summary);
   if (!resolved.ok()) return false;
+  resolved->frame.shading = {};  // its light volume is that of the dataset, whichever level is drawn
   Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return false;
   const std::size_t slots = request.roster.slots.size();

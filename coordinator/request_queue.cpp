@@ -30,6 +30,7 @@ OpenRequest RequestQueue::Take(const OpenRequest& next) {
   const auto found = std::ranges::find_if(queue.requests, [&](const OpenRequest& request) { return &request == &next; });
   OpenRequest request = std::move(*found);
   queue.requests.erase(found);
+  request.used = UsedBy(request.client);
   request.charged = queue.expected;
   turns_.Take(request.client);
   turns_.Charge(request.client, request.charged);
@@ -126,6 +127,10 @@ std::size_t RequestQueue::size() const {
   std::size_t count = 0;
   for (const auto& [client, queue] : clients_) count += queue.requests.size();
   return count;
+}
+
+std::size_t RequestQueue::clients() const {
+  return std::size_t(std::ranges::count_if(clients_, [](const auto& each) { return !each.second.requests.empty(); }));
 }
 
 std::size_t RequestQueue::CountOf(PeerToken client) const {

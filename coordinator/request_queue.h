@@ -18,6 +18,7 @@
 #include "common/base/fair_turns.h"
 #include "common/base/time.h"
 #include "common/wire/client_messages.h"
+#include "coordinator/deadline_forecast.h"
 #include "coordinator/machines.h"
 #include "coordinator/peer_token.h"
 #include "coordinator/plan_request.h"
@@ -42,6 +43,7 @@ struct OpenRequest {
   UseId use = 0;             // of its dataset
   std::string lowered = {};  // FrameStatistics::lowered
   bool coarse = false;       // it makes a preview of the client's request of this number (frame_machine_previews.cpp)
+  FrameKind kind = 0;        // for the forecast; not of coarse ones
   // Once it has its dataset.
   bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
   bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
@@ -53,6 +55,7 @@ struct OpenRequest {
     bool seen = false;                                // DatasetReady::seen: its frame may begin
     std::shared_ptr<const VolumeLevels> levels;       // DatasetReady::levels and drawn
     std::vector<int> drawn = {0};
+    ViewParameters view = {};  // of the picture, complete, in terms of the finest level (ChooseView)
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
     // The voxels that its frame is drawn from: the volume first.
@@ -70,6 +73,7 @@ struct OpenRequest {
   };
   std::variant<Submitted, AwaitsDataset, HasDataset> state = {};
 
+  Duration used{};     // by its client before it; once taken
   Duration charged{};  // for it, until it is settled; once taken
 
   Time deadline() const { return arrived + std::chrono::milliseconds(submit.deadline_ms); }
@@ -104,6 +108,8 @@ class RequestQueue {
   const OpenRequest* Find(PeerToken client, RequestId request) const;
   const OpenRequest* FindCoarse(PeerToken client, RequestId request) const;  // that makes a preview of it
   std::size_t size() const;
+  Duration UsedBy(PeerToken client) const { return turns_.TurnOf(client).used; }
+  std::size_t clients() const;                  // that have requests in it
   std::size_t CountOf(PeerToken client) const;  // of what the client has asked for
   // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);

@@ -399,7 +399,8 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .grid = FrameBounds(plan_.setup),
                              .predicted = planned_->prediction,
                              .levels = {},
-                             .lowered = request_.lowered};
+                             .lowered = request_.lowered,
+                             .view = request_.dataset()->view};
   for (const int level : request_.dataset()->drawn) statistics.levels.push_back({.level = std::uint32_t(level)});
   for (const GroupPlan& group : plan_.groups) {
     for (const Placement& placement : group.placements) {

@@ -19,6 +19,7 @@
 #include "common/base/printable.h"
 #include "common/base/shared_arena.h"
 #include "common/transport/endpoint.h"
+#include "common/wire/other_version.h"
 #include "coordinator/background_actions.h"
 #include "coordinator/coordinator_metrics.h"
 #include "coordinator/peer_table.h"
@@ -77,8 +78,10 @@ struct CoordinatorService::Impl {
   void HandleEvent(CoordinatorEvent event);  // and what follows from it
   void ReceiveFromClients();
   void ReceiveFromWorkers();
+  // True: a program of another version wrote the message. Its sender hears our version, so that both sides say both.
+  bool AnswerOtherVersion(Socket& socket, const Incoming& incoming, Plane plane);
   // What the sender may do; nullopt: its key was revoked. Without keys only this machine can connect, and may do everything.
-  std::optional<Role> RoleOf(const Incoming& incoming) const { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
+  std::optional<Role> RoleOf(const Incoming& incoming) { return incoming.user.empty() ? Role::kAdmin : keys->RoleOf(incoming); }
   bool CarryOut(const Incoming& incoming, const ClientToCoordinator& message, Role role);
   // The same to each of them. Who cannot be told is Gone.
   template <class Gone>
@@ -224,6 +227,15 @@ void CoordinatorService::Impl::Send(Socket& socket, PeerTable& peers, std::span<
   }
 }
 
+bool CoordinatorService::Impl::AnswerOtherVersion(Socket& socket, const Incoming& incoming, Plane plane) {
+  const std::optional<std::uint32_t> version = OtherVersion(incoming.header());
+  if (!version) return false;
+  complaints.Warning(fmt::format("{} plane: a peer {} {}", NameOf(plane), incoming.host.empty() ? "of this machine" : "at " + incoming.host,
+                                 TextOfOtherVersion(*version)));
+  (void)socket.Send(incoming.identity, VersionNotice());  // a peer that has gone needs none
+  return true;
+}
+
 void CoordinatorService::Impl::ReceiveFromWorkers() {
   for (int i = 0; i < kReceiveBatch; ++i) {
     std::optional<Incoming> incoming = control.TryReceive();
@@ -233,7 +245,12 @@ void CoordinatorService::Impl::ReceiveFromWorkers() {
     Result<WorkerToCoordinator> message =
         Guarded("decoding", [&] { return Decode<WorkerToCoordinator>(incoming->header(), payload.size()); });
     if (!message.ok()) {
+      if (AnswerOtherVersion(control, *incoming, Plane::kControl)) continue;
       complaints.Warning("control plane: dropped a message: " + message.status().message());
+      if (Decode<ClientToCoordinator>(incoming->header()).ok()) {
+        const Status why = Status::InvalidArgument("this is the endpoint for workers; clients connect to " + client_endpoint);
+        (void)control.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
+      }
       continue;
     }
     HandleEvent(FromWorker{worker_peers.Heard(incoming->identity, MonotonicNow()), std::move(*message), std::move(payload)});
@@ -249,7 +266,13 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     Result<ClientToCoordinator> message =
         Guarded("decoding", [&] { return Decode<ClientToCoordinator>(incoming->header(), incoming->payload().size()); });
     if (!message.ok()) {
+      if (AnswerOtherVersion(clients, *incoming, Plane::kClient)) continue;
       complaints.Warning("client plane: refused a message: " + message.status().message());
+      if (Decode<WorkerToCoordinator>(incoming->header()).ok()) {  // it would wait for ever
+        const Status why = Status::InvalidArgument("this is the endpoint for clients; workers connect to " + worker_endpoint);
+        (void)clients.Send(incoming->identity, Encode(OrderRefused{.nonce = 0, .status = why}));
+        continue;
+      }
       // A refused request whose id can be read gets an answer, so that nobody waits for it in vain.
       if (std::optional<CoordinatorToClient> refusal = RefusalOf(incoming->header(), message.status())) {
         HandleEvent(BadRequest{client_peers.Heard(incoming->identity, MonotonicNow()), *std::move(refusal), message.status()});
@@ -260,7 +283,7 @@ void CoordinatorService::Impl::ReceiveFromClients() {
     std::visit(
         [&, from = client_peers.Heard(incoming->identity, MonotonicNow())]<class Message>(Message& each) {
           if constexpr (std::constructible_from<ClientToFrames, Message>) {
-            HandleEvent(FromClient{from, std::move(each), incoming->host});
+            HandleEvent(FromClient{from, std::move(each), incoming->host, clients.UnsentBytes(incoming->identity)});
           } else if constexpr (std::constructible_from<ClientToDatasets, Message>) {
             HandleEvent(ClientHeard{from, std::is_same_v<Message, AddVolume>});
             HandleEvent(ClientAsked{from, std::move(each), incoming->payload()});

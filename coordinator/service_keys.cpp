@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+
 #include "common/transport/authenticator.h"
 
 namespace slabstream {
@@ -31,9 +33,21 @@ void ServiceKeys::Admit() {
   for (const Plane plane : {Plane::kControl, Plane::kVoxels}) authenticator.AdmitOnly(NameOfPlane(plane), folder_.KeysOf({Role::kWorker}));
 }
 
-std::optional<Role> ServiceKeys::RoleOf(const Incoming& incoming) const {
+std::optional<Role> ServiceKeys::RoleOf(const Incoming& incoming) {
   const AdmittedKey* const key = folder_.Find(incoming.user);
-  return key == nullptr ? std::nullopt : std::optional(key->role);
+  if (key == nullptr) return std::nullopt;
+  heard_[key->public_key] = MonotonicNow();
+  return key->role;
+}
+
+std::vector<AdmittedKey> ServiceKeys::Listed() const {
+  std::vector<AdmittedKey> keys = folder_.admitted();
+  const Time now = MonotonicNow();
+  for (AdmittedKey& key : keys) {
+    const auto heard = heard_.find(key.public_key);
+    if (heard != heard_.end()) key.silent_ms = std::uint64_t((now - heard->second) / std::chrono::milliseconds(1));
+  }
+  return keys;
 }
 
 ServiceKeys::Done ServiceKeys::CarryOut(const KeysOrder& order) {
@@ -45,13 +59,16 @@ ServiceKeys::Done ServiceKeys::CarryOut(const KeysOrder& order) {
     const Result<std::string> revoked = folder_.Revoke(order.key);
     status = revoked.status();
     if (revoked.ok()) done.revoked = *revoked;
+    if (revoked.ok()) heard_.erase(*revoked);
+  } else if (order.action == KeysAction::kIssue) {
+    status = folder_.Issue(order.key, order.role, order.name).status();
   }
   if (!status.ok()) {
     done.answer = OrderRefused{order.nonce, status};
     return done;
   }
   Admit();
-  done.answer = KeysReply{order.nonce, folder_.admitted()};
+  done.answer = KeysReply{order.nonce, Listed()};
   return done;
 }
 

@@ -4,7 +4,10 @@
 
 #include <optional>
 #include <string>
+#include <unordered_map>
+#include <vector>
 
+#include "common/base/time.h"
 #include "common/service/key_folder.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
@@ -21,8 +24,8 @@ class ServiceKeys {
   // Once the planes are bound: writes the service files, with new keys where they are missing. Errors of KeyFolder::Publish.
   Status Publish(const std::string& client_endpoint, const std::string& worker_endpoint);
 
-  // Of the sender of a message that came over an encrypted connection; nullopt: its key is no longer admitted.
-  std::optional<Role> RoleOf(const Incoming& incoming) const;
+  // Of the sender of a message that came over an encrypted connection, and was heard thereby; nullopt: its key is no longer admitted.
+  std::optional<Role> RoleOf(const Incoming& incoming);
 
   struct Done {
     CoordinatorToClient answer;          // KeysReply or OrderRefused
@@ -34,10 +37,12 @@ class ServiceKeys {
   ServiceKeys(Context& context, KeyFolder folder, Epoch epoch) : context_(&context), folder_(std::move(folder)), epoch_(epoch) {}
   std::string NameOfPlane(Plane plane) const;
   void Admit();
+  std::vector<AdmittedKey> Listed() const;  // with the time since each was heard
 
   Context* context_;
   KeyFolder folder_;
   Epoch epoch_;
+  std::unordered_map<std::string, Time> heard_;  // last, by admitted public key
 };
 
 }  // namespace slabstream

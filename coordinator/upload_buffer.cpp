@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/volume/memory_budget.h"
+#include "coordinator/client_file.h"
 #include "data/layers/color_table.h"
 
 namespace slabstream {
@@ -24,6 +25,10 @@ LabelTable TableOf(const std::vector<NewLabel>& labels) {
 Result<std::shared_ptr<UploadBuffer>> UploadBuffer::Make(const AddVolume& order) {
   if (Status fits = CheckFitsMemory(std::int64_t(order.bytes()), "dataset \"" + order.name + "\""); !fits.ok()) return fits;
   std::shared_ptr<UploadBuffer> buffer(new UploadBuffer(order));
+  if (order.file) {
+    buffer->file_.resize(order.file->bytes);
+    return buffer;
+  }
   const SampleTypes types(order.description.type, order.layers);
   for (const Layer layer : kLayers) {
     const std::optional<ScalarType> type = types.Of(layer);
@@ -38,6 +43,11 @@ Result<std::shared_ptr<UploadBuffer>> UploadBuffer::Make(const AddVolume& order)
 }
 
 void UploadBuffer::Store(std::uint64_t begin, std::span<const std::byte> bytes) {
+  if (order_.file) {
+    CHECK(begin + bytes.size() <= file_.size());
+    std::ranges::copy(bytes, file_.begin() + std::ptrdiff_t(begin));
+    return;
+  }
   std::uint64_t part_begin = 0;
   for (const std::shared_ptr<Volume>& part : parts_) {
     if (part == nullptr) continue;
@@ -54,6 +64,14 @@ void UploadBuffer::Store(std::uint64_t begin, std::span<const std::byte> bytes) 
 }
 
 Result<DataSource> UploadBuffer::Finish() {
+  if (order_.file) {
+    const AlignedVector<std::byte> bytes = std::move(file_);
+    Result<std::shared_ptr<const ClientFile>> file = ClientFile::Write(order_.file->name, bytes);
+    if (!file.ok()) return file.status();
+    DataSource source((*file)->path(), "");
+    source.sent = *std::move(file);
+    return source;
+  }
   LayeredVolume whole;
   whole.volume = std::move(parts_[std::size_t(Layer::kVolume)]);
   whole.layers.overlay = std::move(parts_[std::size_t(Layer::kOverlay)]);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
 #include "common/wire/volume_messages.h"
 #include "coordinator/data_source.h"
@@ -18,7 +19,8 @@ class UploadBuffer {
 
   // Bytes from `begin` on, within the dataset.
   void Store(std::uint64_t begin, std::span<const std::byte> bytes);
-  // Once all bytes are stored; the buffer is empty then. InvalidArgument: a number of a label that the order does not have.
+  // Once all bytes are stored; the buffer is empty then. InvalidArgument: a number of a label that the order does not have. Unavailable: a
+  // file cannot be written.
   Result<DataSource> Finish();
 
  private:
@@ -26,6 +28,7 @@ class UploadBuffer {
 
   const AddVolume order_;
   std::shared_ptr<Volume> parts_[kLayers.size()];  // by Layer; null: there is none
+  AlignedVector<std::byte> file_;                  // instead of them
 };
 
 }  // namespace slabstream

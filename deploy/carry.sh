@@ -25,7 +25,7 @@ pick_programs() {
   for program in "${@:2}"; do cp "$work/programs/usr/bin/$program" "$root/usr/bin/"; done
 }
 
-# What writes pictures, by OpenImageIO, into a root.
+# What writes EXR, TIFF, PDF and SVG, into a root.
 pick_modules() { (cd "$work/programs" && find usr/lib -path '*/slabstream/*.so' -exec cp --parents -t "$1" {} +); }
 
 # A file of this machine, into a root at the same place, and the links that lead to it. Notes in $work/carried what it copied.

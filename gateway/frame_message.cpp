@@ -8,6 +8,7 @@
 #include "client/report/frame_json.h"
 #include "client/report/frame_spans.h"
 #include "client/report/frame_summary.h"
+#include "client/request/camera_file.h"
 #include "client/request/picture_record.h"
 #include "client/request/slice_request.h"
 
@@ -111,6 +112,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
                     {"background", {Decimal(background.r), Decimal(background.g), Decimal(background.b), Decimal(background.a)}},
                     {"geometry", GeometryJson(view.panes.front())},
                     {"statistics", std::move(statistics)}};
+  if (view.statistics.view) encoded.header["view"] = CameraJson(*view.statistics.view);
   encoded.bytes = std::make_shared<const std::vector<std::byte>>(std::move(bytes));
   return encoded;
 }

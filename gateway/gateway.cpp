@@ -29,6 +29,7 @@
 #include "gateway/service_link.h"
 #include "gateway/service_monitor.h"
 #include "gateway/target.h"
+#include "gateway/uploads.h"
 #include "gateway/view_session.h"
 
 namespace slabstream {
@@ -51,6 +52,7 @@ class Gateway::Impl : public HttpApplication {
         traces_(options_.collector ? std::make_shared<TraceSender>(*options_.collector, ThisProcess("slabstream-gateway")) : nullptr),
         encoders_(std::max(2U, std::thread::hardware_concurrency())),
         movies_(std::make_unique<MovieRequests>(io_, context_, service_, metrics_)),
+        uploads_(std::make_unique<Uploads>(io_, context_, service_, metrics_, options_.max_upload_bytes)),
         routes_(Routes()) {}
 
   ~Impl() override {
@@ -77,18 +79,19 @@ class Gateway::Impl : public HttpApplication {
     monitor_ = std::make_unique<ServiceMonitor>(context_, service_, [this](std::shared_ptr<const ServiceNews> news) {
       asio::post(io_, [this, news = std::move(news)]() mutable { OnNews(std::move(news)); });
     });
+    asio::post(io_, [this] { Beat(); });
     thread_ = std::thread([this] { io_.run(); });
     return Status::Ok();
   }
 
   std::uint16_t port() const { return port_; }
 
-  std::string url() const {
+  std::string url(bool with_token) const {
     const bool v6 = options_.listen.host.find(':') != std::string::npos;
     const std::string host = v6 ? "[" + options_.listen.host + "]" : options_.listen.host;
     const std::string origin =
         !options_.proxy_origin.empty() ? options_.proxy_origin : fmt::format("{}://{}:{}", options_.tls ? "https" : "http", host, port_);
-    return fmt::format("{}/#token={}", origin, options_.token);
+    return origin + (with_token ? "/#token=" + options_.token : "/");
   }
 
   void RequestStop() {
@@ -122,6 +125,9 @@ class Gateway::Impl : public HttpApplication {
       return counted(Failure(404, fmt::format("there is nothing at '{}'", Shown(target->path))));
     }
     if (!route->second.open && !MayAsk(request, *target)) return counted(NoToken());
+    for (const PictureField& field : target->fields) {
+      if (field.name == "dataset") uploads_->Touch(field.text, MonotonicNow());
+    }
     const bool get = request.method == "GET" || request.method == "HEAD";
     if (!get && !(request.method == "POST" && route->second.takes_post)) {
       HttpReply answer = Failure(405, fmt::format("{} is not a method of {}", Shown(request.method), target->path));
@@ -160,6 +166,7 @@ class Gateway::Impl : public HttpApplication {
 
   std::vector<std::pair<std::string, std::string>> CommonHeaders() const override {
     std::string frames = "'self' http://localhost:* http://127.0.0.1:*";  // notebooks
+    for (const std::string& source : options_.frame_sources) frames += " " + source;
     if (!options_.proxy_origin.empty()) frames += " " + options_.proxy_origin;
     return {
         {"Content-Security-Policy",
@@ -221,15 +228,18 @@ class Gateway::Impl : public HttpApplication {
         std::invoke(method, *requests, *std::move(fields), std::move(reply), request.gone);
       };
     };
-    const auto picture = [this](auto method) {
-      return [this, method](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
+    const auto picture = [this](auto method, PictureFileType type) {
+      return [this, method, type](const HttpRequest& request, const Target& target, ReplyFunction reply, RequestTracePointer trace) {
         Result<PictureFields> fields = FieldsOf(target, request);
         if (!fields.ok()) return reply(Failure(fields.status()));
-        std::invoke(method, *pictures_, *std::move(fields), std::move(reply), request.gone, std::move(trace));
+        std::invoke(method, *pictures_, type, *std::move(fields), std::move(reply), request.gone, std::move(trace));
       };
     };
-    routes["/api/v1/render.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render)};
-    routes["/api/v1/slice.png"] = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice)};
+    for (const PictureFileTypeNames& names : PictureFileTypes()) {
+      const auto route = [&](const char* kind) -> Route& { return routes[fmt::format("/api/v1/{}{}", kind, names.ending)]; };
+      route("render") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Render, names.type)};
+      route("slice") = {.takes_post = true, .traced = true, .handle = picture(&PictureRequests::Slice, names.type)};
+    }
     routes["/api/v1/command"] = {.takes_post = true, .handle = bind(pictures_, &PictureRequests::Command)};
     routes["/api/v1/turntable.mp4"] = {.takes_post = true, .handle = bind(movies_, &MovieRequests::Turntable)};
     routes["/api/v1/histogram"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Histogram)};
@@ -240,6 +250,16 @@ class Gateway::Impl : public HttpApplication {
     routes["/api/v1/statistics"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Statistics)};
     routes["/api/v1/pick"] = {.takes_post = true, .traced = true, .handle = bind(questions_, &QuestionRequests::Pick)};
     routes["/api/v1/transfer"] = {.traced = true, .handle = bind(questions_, &QuestionRequests::Transfer)};
+    routes["/api/v1/upload"] = {
+        .takes_post = true,
+        .handle = [this](const HttpRequest& request, const Target& target, ReplyFunction reply, const RequestTracePointer&) {
+          if (request.method != "POST") return reply(Failure(405, "files are sent by POST"));
+          PictureFields fields = target.fields;
+          std::erase_if(fields, [](const PictureField& field) { return field.name == "token"; });
+          std::vector<std::string> taken;
+          for (const DatasetStatus& dataset : news_->status.datasets) taken.push_back(dataset.name);
+          uploads_->Handle(std::move(fields), request.body, taken, std::move(reply), request.gone);
+        }};
     routes["/api/v1/view"] = {.handle = answer([] { return Failure(426, "this is a WebSocket"); })};
     return routes;
   }
@@ -276,7 +296,8 @@ class Gateway::Impl : public HttpApplication {
 
   HttpReply NoToken() {
     CountRefusal("token");
-    HttpReply answer = Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed");
+    HttpReply answer =
+        Failure(401, "the token is missing or wrong; it is part of the address that the gateway printed, or in its --token-file");
     answer.headers.emplace_back("WWW-Authenticate", "Bearer");
     return answer;
   }
@@ -290,10 +311,26 @@ class Gateway::Impl : public HttpApplication {
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->OnNews(news_);
   }
 
+  // Once a second, even while the service does not answer: so pages notice when their connection has died without a word.
+  void Beat() {
+    const Time now = MonotonicNow();
+    for (ViewSession* session : std::set<ViewSession*>(sessions_)) {
+      session->SendStatus();
+      uploads_->Touch(session->dataset(), now);
+    }
+    uploads_->RemoveUnseen(now);
+    beat_.expires_after(std::chrono::seconds(1));
+    beat_.async_wait([this](boost::system::error_code error) {
+      if (!error) Beat();
+    });
+  }
+
   void Stop() {
+    beat_.cancel();
     monitor_->RequestStop();
     link_->RequestStop();
     movies_->Stop();
+    uploads_->Stop();
     for (ViewSession* session : std::set<ViewSession*>(sessions_)) session->End();
     // Farewells get a moment to leave.
     auto timer = std::make_shared<asio::steady_timer>(io_, std::chrono::milliseconds(200));
@@ -310,6 +347,7 @@ class Gateway::Impl : public HttpApplication {
   Metrics metrics_;
   asio::io_context io_{1};
   asio::executor_work_guard<asio::io_context::executor_type> work_;
+  asio::steady_timer beat_{io_};
   const std::shared_ptr<TraceSender> traces_;  // null: nobody wants any
   asio::thread_pool encoders_;
   std::unique_ptr<HttpServer> server_;
@@ -319,6 +357,7 @@ class Gateway::Impl : public HttpApplication {
   std::optional<PictureRequests> pictures_;
   std::optional<QuestionRequests> questions_;
   const std::unique_ptr<MovieRequests> movies_;
+  const std::unique_ptr<Uploads> uploads_;
   const std::map<std::string, Route, std::less<>> routes_;
   std::atomic<bool> stopping_ = false;
   // Of the io thread.
@@ -340,7 +379,7 @@ Result<std::unique_ptr<Gateway>> Gateway::Start(Context& context, ServiceAddress
 }
 
 std::uint16_t Gateway::port() const { return impl_->port(); }
-std::string Gateway::url() const { return impl_->url(); }
+std::string Gateway::url(bool with_token) const { return impl_->url(with_token); }
 void Gateway::RequestStop() { impl_->RequestStop(); }
 void Gateway::WaitUntilStopped() { impl_->WaitUntilStopped(); }
 

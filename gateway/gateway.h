@@ -19,23 +19,27 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/client.h"
 #include "common/base/status.h"
 #include "common/http/address.h"
 #include "common/http/http.h"
+#include "gateway/uploads.h"
 
 namespace slabstream {
 
 struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
-  std::string proxy_origin;          // of --behind-proxy, as ParseOrigin gives it; empty: none
-  std::string token;                 // CheckToken
-  std::optional<HttpUrl> collector;  // of OpenTelemetry, which gets traces of requests; none: there are no traces
+  std::string proxy_origin;                // of --behind-proxy, as ParseOrigin gives it; empty: none
+  std::vector<std::string> frame_sources;  // whose pages may show the viewer in a frame, as ParseFrameSource gives them
+  std::string token;                       // CheckToken
+  std::optional<HttpUrl> collector;        // of OpenTelemetry, which gets traces of requests; none: there are no traces
   HttpLimits limits;
   int max_sessions = 64;
-  int max_renders = 16;  // pictures over HTTP under way
+  int max_renders = 16;                           // pictures over HTTP under way
+  std::uint64_t max_upload_bytes = kUploadBytes;  // of a file that a page sends; 0: none are taken
 };
 
 class Gateway {
@@ -46,7 +50,7 @@ class Gateway {
   ~Gateway();
 
   std::uint16_t port() const;
-  std::string url() const;  // with the token
+  std::string url(bool with_token) const;
 
   void RequestStop();  // any thread, signal handlers too
   void WaitUntilStopped();

@@ -13,6 +13,7 @@
 #include "common/http/address.h"
 #include "common/otlp/trace_sender.h"
 #include "common/transport/context.h"
+#include "common/volume/memory_budget.h"
 #include "gateway/gateway.h"
 
 namespace slabstream {
@@ -24,6 +25,10 @@ struct Options {
   TlsFiles tls;
   std::string token_file;
 };
+
+Result<std::uint64_t> ParseUploadLimit(const std::string& option, const std::string& text) {
+  return text == "0" ? Result<std::uint64_t>(0) : ParseMemoryLimit(option, text);
+}
 
 Status Serve(Options options) {
   BlockStopSignals();
@@ -41,8 +46,8 @@ Status Serve(Options options) {
   Context context;
   const Result<std::unique_ptr<Gateway>> gateway = Gateway::Start(context, *service, options.gateway);
   if (!gateway.ok()) return gateway.status();
-  // Whoever started this process reads the address from this line.
-  (void)std::printf("ready %s\n", (*gateway)->url().c_str());
+  // Whoever started this process reads the address from this line. A token that lasts is not in it: logs would keep it.
+  (void)std::printf("ready %s\n", (*gateway)->url(options.token_file.empty()).c_str());
   if (Status told = FlushOutput(); !told.ok()) return told;
   NotifyReady();
   const sigset_t signals = StopSignals();
@@ -68,6 +73,15 @@ int Run(int argc, char** argv) {
   AddParsed(app, "--behind-proxy", options.gateway.proxy_origin, ParseOrigin,
             "Public address of a proxy that ends TLS, such as https://viewer.example.org")
       ->type_name("ORIGIN");
+  AddParsedList(
+      app, "--frame-in", options.gateway.frame_sources, ParseFrameSource,
+      "Let pages of this origin show the viewer in a frame, such as https://notebooks.example.org, or all pages of a scheme, such as "
+      "vscode-webview: for notebooks of VS Code")
+      ->type_name("ORIGIN");
+  AddParsed(app, "--max-upload", options.gateway.max_upload_bytes, ParseUploadLimit,
+            "Largest file that a page may send to the service as a dataset; 0: none may")
+      ->type_name("SIZE")
+      ->default_str(MemoryText(kUploadBytes));
   app.add_option("--token-file", options.token_file, "Use the token in this file: 16 to 128 letters, digits, - and _")
       ->type_name("FILE")
       ->default_str("a new random one at each start");

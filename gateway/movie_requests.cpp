@@ -3,12 +3,16 @@
 #include <fmt/format.h>
 
 #include <boost/asio/post.hpp>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "client/image_io/annotations.h"
 #include "client/movie/movie_encoder.h"
 #include "client/movie/turntable.h"
+#include "client/request/camera_file.h"
+#include "client/request/request_options.h"
 #include "common/base/printable.h"
 #include "common/cli/parse.h"
 #include "gateway/request_fields.h"
@@ -16,9 +20,30 @@
 namespace slabstream {
 namespace {
 
+// The path replaces what the request would say of its view.
+Result<PathText> ParsePath(const std::string& text, const PictureFields& fields) {
+  for (const PictureField& field : fields) {
+    const RequestOption* const option = FindRequestOption(field.name);
+    if (field.name == "view" || field.name == "turns" || (option != nullptr && option->path.starts_with("view."))) {
+      return Status::InvalidArgument(fmt::format("path excludes {}", field.name));
+    }
+  }
+  Result<PathText> path = ParseCameraPath(text);
+  if (!path.ok()) return Printable(path.status());
+  return path;
+}
+
 Result<TurntableRequest> ParseTurntable(PictureFields fields) {
   TurntableRequest request;
-  const Result<std::string> frames_text = TakeOr(fields, "frames", std::to_string(kMovieFrames)), turns_text = TakeOr(fields, "turns", "1"),
+  const Result<std::string> path_text = TakeOr(fields, "path", "");
+  if (!path_text.ok()) return path_text.status();
+  std::optional<PathText> path;
+  if (!path_text->empty()) {
+    Result<PathText> parsed = ParsePath(*path_text, fields);
+    if (!parsed.ok()) return parsed.status();
+    path = *std::move(parsed);
+  }
+  const Result<std::string> frames_text = TakeOr(fields, "frames", ""), turns_text = TakeOr(fields, "turns", "1"),
                             fps_text = TakeOr(fields, "fps", fmt::format("{:g}", MovieShape().frames_per_second));
   for (const Result<std::string>* text : {&frames_text, &turns_text, &fps_text}) {
     if (!text->ok()) return text->status();
@@ -26,21 +51,23 @@ Result<TurntableRequest> ParseTurntable(PictureFields fields) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return render.status();
   request.render = *std::move(render);
-  const Result<int> frames = ParseInteger("frames", *frames_text, 1, kMaxMovieFrames);
-  if (!frames.ok()) return Printable(frames.status());
   const Result<int> turns = ParseInteger("turns", *turns_text, 0, kMaxTurns);
   if (!turns.ok()) return Printable(turns.status());
   const Result<double> fps = ParseNumber("fps", *fps_text, {kMinFramesPerSecond, kMaxFramesPerSecond});
   if (!fps.ok()) return Printable(fps.status());
+  const std::string usual_frames = std::to_string(path && path->timed ? std::llround(path->seconds() * *fps) + 1 : kMovieFrames);
+  const Result<int> frames = ParseInteger("frames", frames_text->empty() ? usual_frames : *frames_text, 1, kMaxMovieFrames);
+  if (!frames.ok()) return Printable(frames.status());
   request.frames = *frames;
-  request.turns = *turns;
+  request.move.turns = *turns;
+  if (path) request.move.cameras = std::move(path->cameras);
   request.frames_per_second = *fps;
   const auto [width, height] = request.render.frame.size;
   if (std::int64_t{width} * height > kMaxMoviePixels) {
     return Status::InvalidArgument(fmt::format("--size {}x{} has {} pixels, frames of movies at most {}", width, height,
                                                std::int64_t{width} * height, kMaxMoviePixels));
   }
-  if (request.render.frame.view.eye && request.turns > 0) {
+  if (request.render.frame.view.eye && request.move.turns > 0) {
     return Status::InvalidArgument(
         "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; turns=0 fixes the view");
   }

@@ -11,7 +11,7 @@
 
 namespace slabstream {
 
-inline constexpr char kFramesHelp[] = "Number of frames, spread evenly over the turns: at most 1000";
+inline constexpr char kFramesHelp[] = "Number of frames, spread evenly over the turns or the path: at most 1000";
 inline constexpr int kMaxMovies = 2;             // under way
 inline constexpr int kMaxMovieFrames = 1000;     // of a movie
 inline constexpr int kMovieFrames = 120;         // if the request does not say

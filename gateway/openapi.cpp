@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "client/image_io/picture_file_type.h"
 #include "client/movie/turntable.h"
 #include "client/request/picture_fields.h"
 #include "common/base/version.h"
@@ -81,10 +82,13 @@ Json Responses(const char* type, bool open, const Json& schema, bool takes_optio
 }
 
 struct Operation {
-  const char *path, *summary, *type;
+  const char* path;
+  std::string summary;
+  const char* type;
   bool open = false;
   Json fields = Json::array();
   bool takes_post = false;
+  bool takes_bytes = false;  // by POST alone
 };
 
 // Those of `fields` with these names.
@@ -110,6 +114,12 @@ Json Describe(const Operation& operation) {
   if (operation.open) get["security"] = Json::array();
   if (!options) return {{"get", std::move(get)}};
   Json post = get;
+  if (operation.takes_bytes) {
+    post["parameters"] = Parameters(operation.fields);
+    post["requestBody"] = {{"required", false},
+                           {"content", {{"application/octet-stream", {{"schema", {{"type", "string"}, {"format", "binary"}}}}}}}};
+    return {{"post", std::move(post)}};
+  }
   get["parameters"] = Parameters(operation.fields);
   if (!operation.takes_post) return {{"get", std::move(get)}};
   post["requestBody"] = Body(operation.fields);
@@ -127,6 +137,10 @@ Json OpenApi() {
     json[standard.empty() ? "required" : "default"] = standard.empty() ? Json(true) : Json(standard);
     return json;
   };
+  const auto optional = [](const char* name, const char* help, const char* type) {
+    return Json{{"name", name}, {"group", "Options"}, {"type", type}, {"help", help}};
+  };
+  const Json path = {{"name", "path"}, {"group", "Options"}, {"type", "JSON"}, {"help", kPathHelp}};
   const Operation operations[] = {
       {"/livez", "The gateway runs", "text/plain", true},
       {"/readyz", "The service answers and has a worker", "text/plain", true},
@@ -136,11 +150,14 @@ Json OpenApi() {
        true},
       {"/api/v1/status", "The service: workers, frames, memory", "application/json"},
       {"/api/v1/datasets", "The datasets of the service", "application/json"},
-      {"/api/v1/render.png", "A picture, as `slabstream render` makes it", "image/png", false, render, true},
-      {"/api/v1/slice.png", "Planes through a volume, as `slabstream slice` makes them", "image/png", false, SliceFields(), true},
+      {"/api/v1/render.png", "A picture, as `slabstream render` makes it; other endings make other files: " + PictureEndings(), "image/png",
+       false, render, true},
+      {"/api/v1/slice.png",
+       "Planes through a volume, as `slabstream slice` makes them; other endings make other files: " + PictureEndings(), "image/png", false,
+       SliceFields(), true},
       {"/api/v1/turntable.mp4", "A movie, as `slabstream turntable` makes it, sent while it is made", "video/mp4", false,
        With(render, {field("frames", kFramesHelp, "NUMBER", fmt::format("{}", kMovieFrames)), field("turns", kTurnsHelp, "NUMBER", "1"),
-                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second))}),
+                     field("fps", kFramesPerSecondHelp, "NUMBER", fmt::format("{:g}", MovieShape().frames_per_second)), path}),
        true},
       {"/api/v1/command", "The command line that makes a picture", "application/json", false, render, true},
       {"/api/v1/histogram", "The histogram of a dataset, its range and percentiles", "application/json", false, dataset},
@@ -152,12 +169,20 @@ Json OpenApi() {
        With(dataset,
             {field("from", kLineHelp, "X,Y,Z"), field("to", kLineHelp, "X,Y,Z"),
              field("samples", "Number of points along the line, both ends included: 2 to 4096", "N", fmt::format("{}", kProfileSamples))})},
-      {"/api/v1/statistics", "Mean, deviation and range of the values in a box", "application/json", false,
-       With(dataset, {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1")})},
+      {"/api/v1/statistics", "Mean, deviation and range of the values in a box, or of those of each label", "application/json", false,
+       With(dataset,
+            {field("box", kBoxHelp, "X0:X1,Y0:Y1,Z0:Z1", kWholeBox),
+             {{"name", "labels"}, {"group", "Options"}, {"help", "The values of each label there, and its volume"}, {"default", "false"}},
+             field("format", "Of labels: json, or csv for a table", "json|csv", "json")})},
       {"/api/v1/pick", "The point that a pixel of a picture shows", "application/json", false,
        With(render, {field("x", kPixelXHelp, "NUMBER"), field("y", kPixelYHelp, "NUMBER")}), true},
       {"/api/v1/transfer", "The colour map of a preset for a dataset, as `slabstream transfer` prints it", "application/json", false,
        Named(render, {"dataset", "transfer", "scalar-range"})},
+      {"/api/v1/upload", "Sends a file that becomes a dataset, in parts (docs/http.md)", "application/json", false,
+       Json::array({optional("file", "To begin: the name of the file, whose ending says its format", "NAME"),
+                    optional("bytes", "To begin: the size of the file", "N"), optional("upload", "Then: what the first answer says", "ID"),
+                    optional("begin", "Then: where in the file the body begins", "N"), optional("drop", "Remove the dataset", "true")}),
+       false, true},
   };
   Json paths = Json::object();
   for (const Operation& operation : operations) paths[operation.path] = Describe(operation);

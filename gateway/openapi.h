@@ -10,6 +10,7 @@ inline constexpr char kPixelYHelp[] = "Pixels from the upper side of the whole p
 inline constexpr char kPointHelp[] = "A point of the world";
 inline constexpr char kLineHelp[] = "An end of the line, a point of the world";
 inline constexpr char kBoxHelp[] = "A box in the form of --clip-box; voxels whose centres lie in it or on its sides count";
+inline constexpr char kWholeBox[] = ":,:,:";
 inline constexpr int kProfileSamples = 256;
 
 Json OpenApi();

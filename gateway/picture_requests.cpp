@@ -1,5 +1,6 @@
 #include "gateway/picture_requests.h"
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/thread_pool.hpp>
 #include <memory>
@@ -12,22 +13,22 @@
 namespace slabstream {
 namespace {
 
-HttpReply PngReply(const Result<std::vector<std::byte>>& png) {
-  if (!png.ok()) return Failure(png.status());
-  return {.type = "image/png",
-          .body = std::string(reinterpret_cast<const char*>(png->data()), png->size()),
-          .headers = {{"Cache-Control", "no-store"}}};
+HttpReply FileReply(PictureFileType type, const Result<std::vector<std::byte>>& file, const std::string& renderer) {
+  if (!file.ok()) return Failure(file.status());
+  return {.type = std::string(std::ranges::find(PictureFileTypes(), type, &PictureFileTypeNames::type)->media),
+          .body = std::string(reinterpret_cast<const char*>(file->data()), file->size()),
+          .headers = {{"Cache-Control", "no-store"}, {"Slabstream-Renderer", renderer}}};
 }
 
 }  // namespace
 
-void PictureRequests::MakePng(std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode, ReplyFunction reply,
-                              const Gone& gone, RequestTracePointer trace) {
+void PictureRequests::MakeFile(PictureFileType type, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode,
+                               ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
   const Annotations& annotations = format.annotations;
-  for (FrameRequest& frame : frames) frame.straight8 = HoldsStraight8(format);
+  for (FrameRequest& frame : frames) frame.straight8 = type == PictureFileType::kPng && HoldsStraight8(format);
   if (const Status status = CheckCanDraw(annotations); !status.ok()) return reply(Failure(status));
   under_way_.Begin(std::move(reply), gone, [&](const RequestsUnderWay::Finish& finish) {
-    const auto done = [this, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
+    const auto done = [this, type, encode = std::move(encode), finish, trace = std::move(trace), dataset = frames.front().dataset,
                        asked = MonotonicNow()](Result<ServiceLink::Rendered> rendered) {
       if (!rendered.ok()) {
         if (trace != nullptr) trace->AddFailure(dataset, asked, rendered.status());
@@ -38,47 +39,52 @@ void PictureRequests::MakePng(std::vector<FrameRequest> frames, const PictureFor
       metrics_.CountFrame(first.statistics, first.latency);
       // Handlers of asio are copied nowhere, but std::function would copy the pictures.
       auto held = std::make_shared<ServiceLink::Rendered>(*std::move(rendered));
-      boost::asio::post(encoders_, [this, encode, finish, held, trace] {
+      boost::asio::post(encoders_, [this, type, encode, finish, held, trace] {
         const Time begin = MonotonicNow();
-        auto png = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
-        if (png->ok()) metrics_.CountPicture("file", (*png)->size(), MonotonicNow() - begin);
+        const std::string renderer = held->pictures.front().statistics.renderer;
+        auto file = std::make_shared<const Result<std::vector<std::byte>>>(encode(std::move(*held)));
+        if (file->ok()) metrics_.CountPicture("file", (*file)->size(), MonotonicNow() - begin);
         if (trace != nullptr) trace->AddEncoding(begin);
-        finish([png] { return PngReply(*png); });
+        finish([type, file, renderer] { return FileReply(type, *file, renderer); });
       });
     };
     return link_.Render(std::move(frames), annotations, kAnswerDeadline, {.progress = {}, .done = done});
   });
 }
 
-void PictureRequests::Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
+void PictureRequests::Render(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone,
+                             RequestTracePointer trace) {
   Result<RenderRequest> render = ParseRenderFields(fields);
   if (!render.ok()) return reply(Failure(render.status()));
-  const auto encode = [request = *render](const ServiceLink::Rendered& rendered) {
+  if (const Status status = CheckPictureSize(type, render->frame.size); !status.ok()) return reply(Failure(status));
+  const auto encode = [type, request = *render](const ServiceLink::Rendered& rendered) {
     const Picture& picture = rendered.pictures.front();
     const FrameRequest made = AsMade(request.frame, picture.statistics);
     const PictureNotes notes{.geometry = picture.geometry,
                              .key = rendered.key,
                              .record = RecordText(made.dataset, made, request.format, picture.geometry, {}, picture.statistics.levels)};
-    return PngFile(picture.image, picture.size, request.format, notes);
+    return PictureFile(type, picture.image, picture.size, request.format, notes);
   };
-  MakePng({render->frame}, render->format, encode, std::move(reply), gone, std::move(trace));
+  MakeFile(type, {render->frame}, render->format, encode, std::move(reply), gone, std::move(trace));
 }
 
-void PictureRequests::Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace) {
+void PictureRequests::Slice(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone,
+                            RequestTracePointer trace) {
   Result<SliceRequest> slice = ParseSliceFields(fields);
   if (!slice.ok()) return reply(Failure(slice.status()));
   Result<std::vector<FrameRequest>> frames = FramesOf(*slice);
   if (!frames.ok()) return reply(Failure(frames.status()));
-  const auto encode = [request = *slice](ServiceLink::Rendered rendered) {
+  if (const Status status = CheckPictureSize(type, slice->size()); !status.ok()) return reply(Failure(status));
+  const auto encode = [type, request = *slice](ServiceLink::Rendered rendered) {
     PictureNotes notes{.key = std::move(rendered.key)};
     std::vector<PictureImage> images;
     for (Picture& picture : rendered.pictures) {
       images.push_back(std::move(picture.image));
       notes.panes.push_back(picture.geometry);
     }
-    return PngFile(SideBySide(images, request.frame.size), request.size(), request.format, notes);
+    return PictureFile(type, SideBySide(images, request.frame.size), request.size(), request.format, notes);
   };
-  MakePng(*std::move(frames), slice->format, encode, std::move(reply), gone, std::move(trace));
+  MakeFile(type, *std::move(frames), slice->format, encode, std::move(reply), gone, std::move(trace));
 }
 
 void PictureRequests::Command(const PictureFields& fields, const ReplyFunction& reply, const Gone&) {

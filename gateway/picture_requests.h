@@ -1,6 +1,7 @@
-// Requests for pictures, and for the command that makes one. All calls on the io thread.
+// Requests for pictures in files of any type, and for the command that makes one. All calls on the io thread.
 #pragma once
 
+#include "client/image_io/picture_file_type.h"
 #include "client/request/picture_fields.h"
 #include "gateway/request_trace.h"
 #include "gateway/requests_under_way.h"
@@ -18,15 +19,15 @@ class PictureRequests {
       : encoders_(encoders), metrics_(metrics), link_(link), under_way_(io, metrics, link, "pictures", most) {}
 
   // `trace` may be null.
-  void Render(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
-  void Slice(const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
+  void Render(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
+  void Slice(PictureFileType type, const PictureFields& fields, ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
   void Command(const PictureFields& fields, const ReplyFunction& reply, const Gone& gone);
 
  private:
-  // Renders the frames, has `encode` make a PNG of the pictures on an encoder's thread, and replies with it.
+  // Renders the frames, has `encode` make a file of the pictures on an encoder's thread, and replies with it.
   using EncodeFunction = std::function<Result<std::vector<std::byte>>(ServiceLink::Rendered)>;
-  void MakePng(std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode, ReplyFunction reply, const Gone& gone,
-               RequestTracePointer trace);
+  void MakeFile(PictureFileType type, std::vector<FrameRequest> frames, const PictureFormat& format, EncodeFunction encode,
+                ReplyFunction reply, const Gone& gone, RequestTracePointer trace);
 
   boost::asio::thread_pool& encoders_;
   Metrics& metrics_;

@@ -97,14 +97,27 @@ void QuestionRequests::Profile(PictureFields fields, ReplyFunction reply, const 
 }
 
 void QuestionRequests::Statistics(PictureFields fields, ReplyFunction reply, const Gone& gone) {
-  const Result<std::string> text = Take(fields, "box", kBoxHelp);
-  if (!text.ok()) return reply(Failure(text.status()));
+  const Result<std::string> text = TakeOr(fields, "box", kWholeBox), labels = TakeOr(fields, "labels", "false"),
+                            format = TakeOr(fields, "format", "json");
+  for (const Result<std::string>* each : {&text, &labels, &format}) {
+    if (!each->ok()) return reply(Failure(each->status()));
+  }
   const Result<ClipBox> box = ParseClipBox("box", *text);
   if (!box.ok()) return reply(Failure(Printable(box.status())));
+  const bool by_label = *labels == "true" || labels->empty();
+  if (!by_label && *labels != "false")
+    return reply(Failure(400, fmt::format("labels '{}' is neither true nor false", Printable(labels->substr(0, 64)))));
+  if (*format != "json" && *format != "csv")
+    return reply(Failure(400, fmt::format("format '{}' is not one of json, csv", Printable(format->substr(0, 64)))));
+  if (*format == "csv" && !by_label) return reply(Failure(400, "format 'csv' is the table of labels: it needs labels=true"));
   const Result<std::string> dataset = OnlyDataset(std::move(fields));
   if (!dataset.ok()) return reply(Failure(dataset.status()));
-  const auto make = [](const QuestionReply& answer) { return JsonReply(BoxStatisticsJson(std::get<StatisticsReply>(answer).statistics)); };
-  Ask("statistics", StatisticsQuery{.dataset = *dataset, .box = *box}, make, std::move(reply), gone);
+  const auto make = [by_label, csv = *format == "csv"](const QuestionReply& answer) {
+    const auto& found = std::get<StatisticsReply>(answer);
+    if (csv) return HttpReply{.type = "text/csv; charset=utf-8", .body = LabelStatisticsCsv(found), .headers = {}};
+    return JsonReply(by_label ? LabelStatisticsJson(found) : BoxStatisticsJson(found.statistics));
+  };
+  Ask("statistics", StatisticsQuery{.dataset = *dataset, .box = *box, .labels = by_label}, make, std::move(reply), gone);
 }
 
 void QuestionRequests::Pick(PictureFields fields, ReplyFunction reply, const Gone& gone) {

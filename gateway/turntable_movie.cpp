@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "client/image_io/composed_picture.h"
-#include "client/movie/turntable.h"
 #include "gateway/requests_under_way.h"
 
 namespace slabstream {
@@ -41,9 +40,13 @@ Status TurntableMovie::Make() {
 
 Status TurntableMovie::RenderAndEncode() {
   ServiceLink link(context_, service_);  // a client of its own, so that others get their share
+  const FrameRequest& first = request_.render.frame;
+  const AskView ask = [&](ViewQuery query) { return Ask(link, std::move(query)); };
+  const Result<std::vector<ViewParameters>> views = ViewsOfMovie(first, request_.move, request_.frames, {&first.dataset, 1}, ask);
+  if (!views.ok()) return views.status();
   const auto request = [&](int index) {
-    FrameRequest frame = request_.render.frame;
-    frame.view.azimuth_degrees = TurntableAzimuth(frame.view.azimuth_degrees, request_.turns, index, request_.frames);
+    FrameRequest frame = first;
+    frame.view = (*views)[std::size_t(index)];
     const auto done = [this, index](Result<ServiceLink::Rendered> rendered) {
       const std::lock_guard lock(mutex_);
       pictures_.emplace(index, std::move(rendered));
@@ -61,7 +64,8 @@ Status TurntableMovie::RenderAndEncode() {
     if (i == 0) key = rendered->key;
     const Picture& picture = rendered->pictures.front();
     metrics_.CountFrame(picture.statistics, picture.latency);
-    const auto composed = ComposedPicture::Make(picture.image, picture.size, request_.render.format, picture.geometry, key);
+    const auto composed =
+        ComposedPicture::Make(picture.image, picture.size, WithoutTransparency(request_.render.format), picture.geometry, key);
     if (!composed.ok()) return composed.status();
     const std::vector<std::byte> frame = MovieFrame(*composed);
     // Not before there is a frame: so an error of the service comes before the first byte.
@@ -89,6 +93,20 @@ Status TurntableMovie::StartEncoder() {
     if (self->next_) self->ReadSome();
   });
   return Status::Ok();
+}
+
+Result<ViewReply> TurntableMovie::Ask(ServiceLink& link, ViewQuery query) {
+  link.Ask(std::move(query), kAnswerDeadline, [this](Result<QuestionReply> reply) {
+    const std::lock_guard lock(mutex_);
+    answer_ = std::move(reply);
+    changed_.notify_one();
+  });
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [&] { return abandoned_ || answer_; });
+  if (abandoned_) return Status::Cancelled("nobody reads it");
+  const Result<QuestionReply> reply = *std::exchange(answer_, std::nullopt);
+  if (!reply.ok()) return reply.status();
+  return std::get<ViewReply>(*reply);
 }
 
 Result<ServiceLink::Rendered> TurntableMovie::Take(int index) {

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "client/client.h"
+#include "client/movie/camera_moves.h"
 #include "client/movie/movie_encoder.h"
 #include "client/request/picture_fields.h"
 #include "common/http/http.h"
@@ -24,7 +25,7 @@ namespace slabstream {
 struct TurntableRequest {
   RenderRequest render;  // of the first frame
   int frames = 0;
-  int turns = 1;
+  CameraMove move = {};
   double frames_per_second = 25;
 };
 
@@ -45,6 +46,8 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
  private:
   Status RenderAndEncode();
   Status StartEncoder();
+  // Waits for the answer. Errors as of Take.
+  Result<ViewReply> Ask(ServiceLink& link, ViewQuery query);
   // Waits for the frame. Errors are the service's; Cancelled: it is no longer read.
   Result<ServiceLink::Rendered> Take(int index);
   void ReadSome();
@@ -65,6 +68,7 @@ class TurntableMovie final : public BodyStream, public std::enable_shared_from_t
   std::condition_variable changed_;
   std::unique_ptr<MovieEncoder> encoder_;                  // made and ended by Make's thread
   std::map<int, Result<ServiceLink::Rendered>> pictures_;  // that have come, and were not taken yet
+  std::optional<Result<QuestionReply>> answer_;            // likewise
   bool abandoned_ = false;
 };
 

@@ -16,6 +16,12 @@ constexpr Duration kSmallAbove = milliseconds(100), kLargeBelow = milliseconds(5
 // Pictures become coarser above the first, and finer below the second: the next finer level has eight times as many voxels.
 constexpr Duration kCoarserAbove = milliseconds(200), kFinerBelow = milliseconds(25);
 
+// Where there is no coarser level, as of grids, pictures while moving get half the width and height above the first, and twice as much
+// below the second: a quarter of the pixels takes at least a quarter of the time. If it takes more than this share of the time before, the
+// voxels take the time and not the pixels, so pictures are whole again for a while.
+constexpr Duration kSmallerAbove = milliseconds(120), kWiderBelow = milliseconds(25), kWholeFor = std::chrono::seconds(20);
+constexpr double kLeastScale = 0.25, kHelpfulShare = 0.7;
+
 // Pictures while moving lose their shadows above the first, and get them back below the second: at most they double the time.
 constexpr Duration kPlainAbove = milliseconds(50), kShadowedBelow = milliseconds(25);
 
@@ -55,12 +61,29 @@ ViewMachine::Actions ViewMachine::OnRendered(bool finest, bool shadowed, Time no
   rendered_ = std::exchange(rendering_, std::nullopt);
   if (!rendered_->for_still && time > kCoarserAbove) coarseness_ = std::min(2 * coarseness_, kMostCoarseness);
   if (!rendered_->for_still && time < kFinerBelow) coarseness_ = std::max(coarseness_ / 2, 1.0);
+  if (!rendered_->for_still) AdaptScale(finest && rendered_->coarseness > 1, time, now);
   if (!rendered_->for_still && shadowed) plain_ = time > (rendered_->plain ? kShadowedBelow : kPlainAbove);
   if (!shadowed) rendered_->plain = false;
   still_coarseness_ = time < kFinerBelow ? 1 : rendered_->coarseness / 2;
   if (finest) rendered_->coarseness = 1;
   to_be_shown_ = !rendered_->for_still || !rendered_->as_asked();  // the lossless one is encoded only once
   return Next(now);
+}
+
+void ViewMachine::AdaptScale(bool no_coarser, Duration time, Time now) {
+  if (scale_ < 1 && double(time.count()) > kHelpfulShare * double(wider_time_.count())) {
+    scale_ = 1;
+    whole_until_ = now + kWholeFor;
+  } else if (no_coarser && time > kSmallerAbove && now >= whole_until_ && scale_ > kLeastScale) {
+    wider_time_ = time;
+    scale_ /= 2;
+  } else if (time < kWiderBelow) {
+    scale_ = std::min(2 * scale_, 1.0);
+  }
+}
+
+void ViewMachine::OnLoading(Time now) {
+  if (rendering_) rendering_since_ = now;
 }
 
 ViewMachine::Actions ViewMachine::OnRefused(Time now) {
@@ -157,7 +180,7 @@ bool ViewMachine::MayRender(Time now) {
 
 void ViewMachine::Render(Time now, Actions& actions) {
   if (latest_ == 0 || refused_ || unavailable_ || rendering_) return;
-  Picture next{.seq = latest_, .scale = small_ ? 0.5 : 1, .coarseness = coarseness_, .plain = plain_};
+  Picture next{.seq = latest_, .scale = std::min(small_ ? 0.5 : 1, scale_), .coarseness = coarseness_, .plain = plain_};
   if (IsRenderedOrRenders(latest_)) {
     const bool still_needs_it = !rendered_->as_asked() && !to_be_shown_;
     if (!still_needs_it) return;

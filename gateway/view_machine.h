@@ -54,6 +54,7 @@ class ViewMachine {
   Actions OnView(std::uint64_t seq, Time now);
   // finest: with less coarseness the picture would be the same. shadowed: the view has shadows or ambient occlusion.
   Actions OnRendered(bool finest, bool shadowed, Time now);
+  void OnLoading(Time now);         // the dataset is still read: that is no time of rendering
   Actions OnRefused(Time now);      // the view cannot be rendered: it is done with
   Actions OnUnavailable(Time now);  // the service is gone: the view waits for OnServiceBack
   Actions OnServiceBack(Time now);
@@ -85,6 +86,7 @@ class ViewMachine {
   void Render(Time now, Actions& actions);
   bool IsRenderedOrRenders(std::uint64_t seq) const;
   bool MayRender(Time now);
+  void AdaptScale(bool no_coarser, Duration time, Time now);
   void WakeAt(Time time);
 
   std::uint64_t latest_ = 0;  // the newest view; 0: none yet
@@ -103,7 +105,10 @@ class ViewMachine {
   bool sent_final_ = false;
   std::uint64_t frames_ = 0;
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
-  bool small_ = false;                     // pictures while moving have half the size
+  bool small_ = false;                     // pictures while moving have half the size, for the connection's sake
+  double scale_ = 1;                       // likewise, for the service's sake
+  Duration wider_time_{};                  // what the last picture of twice the scale took
+  Time whole_until_{};                     // scale_ stays 1
   double coarseness_ = kFirstCoarseness;   // of pictures while moving
   bool plain_ = false;                     // pictures while moving have no shadows
   double still_coarseness_ = 1;            // of the next picture of a view that stands still

@@ -16,6 +16,7 @@ namespace {
 namespace asio = boost::asio;
 
 constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to be loaded first
+constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
 constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
 std::string TextOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
@@ -66,6 +67,12 @@ void ViewSession::End() {
   if (peer_ != nullptr) peer_->Close(1001, "the gateway ends");
 }
 
+std::string_view ViewSession::dataset() const {
+  if (!view_) return {};
+  const auto named = std::ranges::find(view_->options, "dataset", &PictureField::name);
+  return named == view_->options.end() ? std::string_view() : std::string_view(named->text);
+}
+
 void ViewSession::OnText(std::string_view text) {
   Result<PageMessage> message = ParsePageMessage(text);
   if (!message.ok()) {
@@ -88,13 +95,15 @@ void ViewSession::Handle(ViewMessage view) {
 }
 
 void ViewSession::OnNews(std::shared_ptr<const ServiceNews> news) {
+  const bool differs = news->health != news_->health;
   news_ = std::move(news);
   if (peer_ == nullptr) return;
-  SendStatus();
+  if (differs) SendStatus();
   if (news_->health != ServiceHealth::kGone) Do(machine_.OnServiceBack(MonotonicNow()));
 }
 
 void ViewSession::SendStatus() {
+  if (peer_ == nullptr) return;
   Json json = {{"type", "status"}, {"service", slabstream::NameOf(news_->health)}, {"reason", news_->reason}};
   const Json status = StatusJson(news_->status);
   for (const char* field : {"workers", "workers_lost", "queued", "running", "frames_done", "datasets"}) json[field] = status[field];
@@ -208,6 +217,7 @@ void ViewSession::PrefetchAhead(const std::vector<FrameRequest>& frames) {
 
 void ViewSession::OnProgress(std::uint64_t order, const FrameProgress& progress) {
   if (peer_ == nullptr || !rendering_ || rendering_->order != order) return;
+  if (progress.phase == FramePhase::kLoading) machine_.OnLoading(MonotonicNow());
   peer_->SendText(TextOf({{"type", "progress"},
                           {"seq", rendering_->view.seq},
                           {"phase", NameOf(progress.phase)},
@@ -267,6 +277,7 @@ void ViewSession::OnEncoded(std::uint64_t number, Result<EncodedView> encoded) {
 void ViewSession::Send(std::uint64_t frame) {
   EncodedView encoded = *std::exchange(encoded_, std::nullopt);
   sent_at_ = MonotonicNow();
+  if (encoded.bytes->size() >= kLargePicture) peer_->SendText(TextOf({{"type", "picture"}, {"bytes", encoded.bytes->size()}}));
   peer_->SendBinary(HeadOf(std::move(encoded.header), frame, machine_.round_trip()), std::move(encoded.bytes));
 }
 

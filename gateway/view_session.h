@@ -40,7 +40,9 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnClosed(const std::string& reason) override;
 
   void OnNews(std::shared_ptr<const ServiceNews> news);
-  void End();  // the gateway stops
+  void SendStatus();
+  void End();                        // the gateway stops
+  std::string_view dataset() const;  // of the latest view; empty: none has come
 
  private:
   void Handle(ViewMessage view);
@@ -55,7 +57,6 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnEncoded(std::uint64_t number, Result<EncodedView> encoded);
   void Send(std::uint64_t frame);
   void SendError(std::uint64_t seq, const Status& status);
-  void SendStatus();
   void SetTimer();
 
   SessionSurroundings around_;

@@ -97,6 +97,7 @@ void GroupRun::LeaveOut(Rank rank, RankReport report, WorkerActions& actions) {
 void GroupRun::OnPartial(PartialImage&& message, const Bytes& payload, WorkerActions& actions) {
   const GroupPlan& group = assignment_.group;
   if (!failure_.ok() || group.placements.empty() || PixelCount(message.pixels) == 0) return;
+  if (message.image.format != assignment_.setup.format) return;  // such pixels combine with no others of the frame
   if (message.step == step_count()) return CollectGroupPiece(std::move(message), payload);
   const std::optional<std::uint32_t> turn = runner_.order().Awaited(message.step);
   if (!turn) return;
@@ -318,7 +319,8 @@ void GroupRun::SendFragments(Rank rank, std::span<const Held> fragments, std::ui
                                               .key = key(),
                                               .step = step,
                                               .interval = fragment.value.ranks,
-                                              .pixels = fragment.pixels},
+                                              .pixels = fragment.pixels,
+                                              .image = {.format = assignment_.setup.format}},
                                   .image = fragment.value.image,
                                   .frame = FrameBounds(assignment_.setup),
                                   .color = assignment_.group.color,

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <optional>
 #include <random>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -22,6 +23,7 @@
 #include "common/transport/authenticator.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"
+#include "common/wire/other_version.h"
 #include "worker/executor.h"
 #include "worker/images_endpoint.h"
 #include "worker/peer_sockets.h"
@@ -51,6 +53,13 @@ WorkerId SenderOf(const MessageToWorker& message) {
   return received == nullptr ? 0 : received->from_worker;
 }
 
+// What a coordinator says to a worker that has come to the endpoint for clients.
+std::optional<Status> RefusalIn(std::span<const std::byte> header) {
+  const Result<CoordinatorToClient> message = Decode<CoordinatorToClient>(header);
+  const auto* const refused = message.ok() ? std::get_if<OrderRefused>(&*message) : nullptr;
+  return refused == nullptr ? std::nullopt : std::optional(refused->status);
+}
+
 std::string HostName() {
   std::array<char, 256> name{};
   if (::gethostname(name.data(), name.size() - 1) != 0 || name[0] == '\0') return "localhost";
@@ -62,6 +71,9 @@ struct ImagesKeys {
   KeyPair own;
   std::string plane;
 };
+
+// What pictures that clients do not take may take of a worker's memory. `memory_bytes` 0: no limit was given.
+std::uint64_t UnsentShare(std::uint64_t memory_bytes) { return memory_bytes == 0 ? std::uint64_t{256} << 20 : memory_bytes / 16; }
 
 constexpr Duration kPeerPatience = std::chrono::seconds(3);  // less than a handshake may take
 
@@ -78,7 +90,7 @@ struct WorkerService::Impl {
         images(std::move(images_socket)),
         images_endpoint(std::move(endpoint_of_images)),
         peers(service_context, keys ? std::optional(keys->own) : std::nullopt),
-        pictures(service_context, keys ? std::optional(keys->own) : std::nullopt),
+        pictures(service_context, keys ? std::optional(keys->own) : std::nullopt, UnsentShare(options.machine.memory_bytes)),
         executor(std::in_place, outbox, options.machine.compression == Compression::kOn ? Codec::kZstd : Codec::kRaw,
                  int(options.machine.threads), options.make_renderer, options.task_hook) {}
 
@@ -122,9 +134,11 @@ struct WorkerService::Impl {
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
-  Status ended;           // set before `stopped`
-  bool stop_now = false;  // set by the machine
-  LimitedLog complaints;  // about messages
+  Status ended;                                // set before `stopped`
+  bool stop_now = false;                       // set by the machine
+  std::optional<std::uint32_t> other_version;  // of the coordinator's messages, if it is not ours
+  LimitedLog complaints;                       // about messages
+  std::optional<Status> wrong_endpoint;        // nobody registers workers there
   WorkerMetrics metrics{options.machine.memory_bytes};
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
@@ -180,6 +194,16 @@ Status WorkerService::Impl::Loop() {
     peers.CloseIdle(now);
     pictures.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
+    if (other_version) {
+      return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " " + TextOfOtherVersion(*other_version));
+    }
+    if (wrong_endpoint) {
+      return Status(wrong_endpoint->code(), "--coordinator " + options.coordinator_endpoint + ": " + wrong_endpoint->message());
+    }
+    if (control.refused() && !options.keys) {
+      return Status::InvalidArgument("the coordinator at " + options.coordinator_endpoint +
+                                     " has keys: name its service file, worker.json (--service)");
+    }
     if (control.refused()) {
       return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " refuses the key: it was revoked or is another's");
     }
@@ -201,6 +225,10 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
     Bytes payload = incoming->payload();
     Result<Messages> decoded = Guarded("decoding", [&] { return Decode<Messages>(incoming->header(), payload.size()); });
     if (!decoded.ok()) {
+      if (plane == Plane::kControl) {
+        other_version = OtherVersion(incoming->header());
+        wrong_endpoint = RefusalIn(incoming->header());
+      }
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + decoded.status().message());
       continue;
     }

@@ -10,7 +10,6 @@
 
 #include "client/client.h"
 #include "client/image_io/image_writer.h"
-#include "client/picture_codec/picture_codec.h"
 #include "client/report/status_text.h"
 #include "client/request/key_of_picture.h"
 #include "client/request/picture_fields.h"
@@ -124,14 +123,14 @@ std::vector<float> Image::Depth() const {
 }
 
 std::vector<std::byte> Image::Png() const {
-  return ValueOf(PngFile(impl_->picture.image, impl_->picture.size, impl_->format, impl_->notes));
+  return ValueOf(PictureFile(PictureFileType::kPng, impl_->picture.image, impl_->picture.size, impl_->format, impl_->notes));
 }
 
 std::vector<std::byte> Image::Jpeg(int quality) const {
   if (quality < 1 || quality > 100) throw Error(ErrorCode::kInvalidArgument, "quality " + std::to_string(quality) + " is not in [1, 100]");
-  const ComposedPicture composed =
-      ValueOf(ComposedPicture::Make(impl_->picture.image, impl_->picture.size, impl_->format, impl_->notes.geometry, impl_->notes.key));
-  return EncodeJpeg(composed, {0, 0, width(), height()}, quality);
+  PictureFormat format = impl_->format;
+  format.quality = quality;
+  return ValueOf(PictureFile(PictureFileType::kJpeg, impl_->picture.image, impl_->picture.size, format, impl_->notes));
 }
 
 void Image::Save(const std::string& path) const {

@@ -4,11 +4,13 @@
 #include <cstddef>
 #include <iostream>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "client/image_io/annotations.h"
+#include "client/image_io/image_writer.h"
 #include "client/request/json_value.h"
 #include "common/cli/program.h"
 #include "common/view/camera.h"
@@ -21,8 +23,9 @@ constexpr double kMost = 1e300;
 struct Order {
   ImageSize size;
   std::vector<PictureGeometry> panes;
-  Annotations annotations;
+  PictureFormat format;
   PictureKey key;
+  std::optional<PictureFileType> file;
 };
 
 std::vector<double> Numbers(const JsonValue& value, std::size_t count) {
@@ -98,7 +101,7 @@ Result<Order> ParseOrder(const std::string& text) {
   const Result<Json> json = ParseJson(text);
   if (!json.ok()) return json.status();
   Order order;
-  Annotations& annotations = order.annotations;
+  Annotations& annotations = order.format.annotations;
   std::optional<std::string> mistake;
   const auto line = [](const JsonValue& v) {
     std::string read = v.Text();
@@ -112,8 +115,26 @@ Result<Order> ParseOrder(const std::string& text) {
     }
     order.size = {int(sides[0]), int(sides[1])};
   };
+  const auto background = [&](const JsonValue& v) {
+    const std::vector<double> channels = Numbers(v, 4);
+    const bool opaque = channels[3] == 1;  // of another one only the pixels tell
+    if (opaque) order.format.background = {float(channels[0]), float(channels[1]), float(channels[2]), 1};
+  };
+  const auto file = [&](const JsonValue& v) {
+    order.file = PictureFileTypeOf("picture." + v.Text());
+    if (!order.file) v.Complain("is no ending of pictures");
+  };
   JsonValue(*json, "", mistake)
       .Fields({{"size", size},
+               {"background", background},
+               {"file", file},
+               {"depth", [&](const JsonValue& v) { order.format.png_bits = v.Integer(8, 16) == 16 ? 16 : 8; }},
+               {"quality", [&](const JsonValue& v) { order.format.quality = v.Integer(1, 100); }},
+               {"dpi", [&](const JsonValue& v) { order.format.dots_per_inch = v.Integer(1, kMaxDotsPerInch); }},
+               {"font_size",
+                [&](const JsonValue& v) {
+                  annotations.font_size = v.Number({kMinFontSize, kMaxFontSize});
+                }},
                {"panes", [&](const JsonValue& v) { v.Each([&](const JsonValue& pane) { order.panes.push_back(Geometry(pane)); }, 1); }},
                {"title", [&](const JsonValue& v) { annotations.title = line(v); }},
                {"scale_bar", [&](const JsonValue& v) { annotations.scale_bar = v.Boolean(); }},
@@ -127,6 +148,22 @@ Result<Order> ParseOrder(const std::string& text) {
   return order;
 }
 
+bool ReadRow(std::span<float> rgba) {
+  return bool(std::cin.read(reinterpret_cast<char*>(rgba.data()), std::streamsize(rgba.size_bytes())));
+}
+
+Status TooFewPixels() { return Status::InvalidArgument("there are fewer pixels than the size says"); }
+
+Status WriteFile(const Order& order) {
+  LocalImage image = MakeLocalImage(PixelFormat::kRgba, {0, 0, order.size.width, order.size.height});
+  if (!ReadRow(image.rgba)) return TooFewPixels();
+  PictureNotes notes{.geometry = order.panes.front(), .panes = order.panes, .key = order.key, .record = {}};
+  const Result<std::vector<std::byte>> file = PictureFile(*order.file, image, order.size, order.format, notes);
+  if (!file.ok()) return file.status();
+  std::cout.write(reinterpret_cast<const char*>(file->data()), std::streamsize(file->size()));
+  return FlushOutput();
+}
+
 }  // namespace
 
 Status RunAnnotate() {
@@ -134,15 +171,16 @@ Status RunAnnotate() {
   std::getline(std::cin, text);
   const Result<Order> order = ParseOrder(text);
   if (!order.ok()) return order.status();
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(order->annotations, order->size, order->panes, order->key);
+  if (order->file) return WriteFile(*order);
+  const Result<std::vector<Mark>> marks = MarksOf(order->format, order->size, order->panes, order->key);
+  if (!marks.ok()) return marks.status();
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(*marks);
   if (!layers.ok()) return layers.status();
   std::vector<float> row(4 * std::size_t(order->size.width));
-  const auto bytes = std::streamsize(row.size() * sizeof(float));
   for (int y = 0; y < order->size.height; ++y) {
-    if (!std::cin.read(reinterpret_cast<char*>(row.data()), bytes))
-      return Status::InvalidArgument("there are fewer pixels than the size says");
+    if (!ReadRow(row)) return TooFewPixels();
     layers->PutOver(y, row);
-    std::cout.write(reinterpret_cast<const char*>(row.data()), bytes);
+    std::cout.write(reinterpret_cast<const char*>(row.data()), std::streamsize(row.size() * sizeof(float)));
   }
   return FlushOutput();
 }

@@ -1,10 +1,12 @@
-// `annotate`, for the Python package: draws annotations onto pixels, so that its pictures have those of the command line.
+// `annotate`, for the Python package: draws annotations onto pixels, or makes a file of them, so that its pictures are those of the command
+// line.
 //
 // stdin: a line of JSON, and behind it the pixels: width * height * 4 floats of this machine, premultiplied, row 0 first.
 //   {"size": [W, H], "panes": [the "geometry" of a picture's record, ...], "title", "scale_bar", "orientation_marker", "sides_only",
-//    "color_bar", "legend",
+//    "color_bar", "legend", "font_size", "dpi", "background": [R, G, B, A] (it lies behind the pixels already),
+//    "file": "jpg" or another ending, "depth", "quality",
 //    "key": {"bar": {"colors": [[value, r, g, b], ...], "low", "high"}, "entries": [{"name", "color": [r, g, b]}, ...]}}
-// Only size and panes must be there. stdout: the pixels with the annotations on them.
+// Only size and panes must be there. stdout: the file; without "file" the pixels with the annotations on them.
 #pragma once
 
 #include "common/base/status.h"

@@ -10,12 +10,16 @@
 #include "client/cli/cores.h"
 #include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
+#include "client/cli/picture_orders.h"
 #include "client/cli/value.h"
+#include "client/image_io/picture_file_type.h"
 #include "client/movie/movie_format.h"
 #include "client/movie/turntable.h"
+#include "client/request/camera_file.h"
 #include "client/request/layer_options.h"
 #include "common/base/find_named.h"
 #include "common/cli/program.h"
+#include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/tuning/service_machine.h"
@@ -33,10 +37,14 @@ void RunWith(CLI::App& sub, std::function<Status()>& run, std::shared_ptr<Option
 }
 
 void DeclareRender(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("render", "Render one picture of a volume");
+  CLI::App* sub = line.app.add_subcommand("render", "Render a picture of a volume, or of each of several");
   auto options = std::make_shared<RenderOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
-  AddFrameOptions(*sub, options->frame);
+  sub->add_option("-o,--output", options->output,
+                  fmt::format("The picture: {}; of several SOURCEs, with {} in the place of their names", PictureEndings(), kNamePlace))
+      ->required()
+      ->type_name("FILE")
+      ->group(kOutputGroup);
+  AddFrameOptions(*sub, options->frame, {}, &options->sources);
   AddRequestOption(*sub, *FindRequestOption("previews"), options->frame.request);
   RunWith(*sub, line.run, options, RunRender);
 }
@@ -54,10 +62,11 @@ void DeclareTurntable(const CommandLine& line) {
   AddParsed(
       *sub, "--frames", options->frames,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxTurntableFrames); },
-      "Number of frames, spread evenly over turns and times")
+      "Number of frames, spread evenly over turns, path and times")
       ->type_name("N")
-      ->default_str("one for each time of --time");
-  AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
+      ->default_str("one for each time of --time, or the seconds of --path");
+  CLI::Option* const turns = AddInteger(*sub, "--turns", options->turns, 0, kMaxTurns, kTurnsHelp);
+  CLI::Option* const path = AddParsed(*sub, "--path", options->path, ParsePathFile, kPathHelp)->type_name("FILE")->excludes(turns);
   AddParsed(*sub, "--time", options->times, ParseTimeRange,
             "Which volumes of a file with several, such as a time series; counted from 0, FIRST and LAST included")
       ->type_name("T|FIRST:LAST");
@@ -71,13 +80,15 @@ void DeclareTurntable(const CommandLine& line) {
       ->default_str(fmt::format("{:g}", MovieShape().frames_per_second));
   AddInteger(*sub, "--in-flight", options->in_flight, 1, kMaxInFlight, "Number of frames requested at the same time");
   AddFrameOptions(*sub, options->frame, {"time"});
+  ExcludeViewOptions(*sub, path);
+  path->excludes(sub->get_option("--camera"));
   RunWith(*sub, line.run, options, RunTurntable);
 }
 
 void DeclareSlice(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("slice", "Render planes or thick slabs of a volume");
   auto options = std::make_shared<SliceOptions>();
-  sub->add_option("-o,--output", options->output, "The picture: .png or .exr")->required()->type_name("FILE")->group(kOutputGroup);
+  sub->add_option("-o,--output", options->output, "The picture: " + PictureEndings())->required()->type_name("FILE")->group(kOutputGroup);
   AddSliceOptions(*sub, *options);
   RunWith(*sub, line.run, options, RunSlice);
 }
@@ -109,7 +120,7 @@ void DeclareValue(const CommandLine& line) {
 }
 
 void DeclareMeasure(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles and boxes in a dataset or a volume file");
+  CLI::App* sub = line.app.add_subcommand("measure", "Measure distances, angles, profiles, boxes and labels in a dataset or a volume file");
   auto options = std::make_shared<MeasureOptions>();
   AddSource(*sub, options->source, options->connection);
   sub->option_defaults()->group("Measures, in the unit of the world (mm of a patient); each may be repeated");
@@ -121,8 +132,19 @@ void DeclareMeasure(const CommandLine& line) {
   AddRepeated(*sub, "--box", options->boxes,
               "Mean, standard deviation and extremes of the voxels with their centres in a box, given as for --clip-box of `render`")
       ->type_name("X0:X1,Y0:Y1,Z0:Z1");
+  sub->add_option(
+         "--labels", CLI::callback_t([options](const CLI::results_t& texts) {
+           options->labels = true;
+           if (!texts.back().empty()) SetLabelFiles(texts.back(), options->layers);
+           return true;
+         }),
+         "Volume, mean, standard deviation and extremes of each label: of the dataset's labels, or with --local of those in FILE, which "
+         "are laid onto the voxels of SOURCE")
+      ->type_name("[FILE]")
+      ->expected(0, 1);
   sub->option_defaults()->group("Options");
-  sub->add_flag("--json", options->json, "Print JSON");
+  CLI::Option* const json = sub->add_flag("--json", options->json, "Print JSON");
+  sub->add_flag("--csv", options->csv, "Print the table of --labels as comma-separated values")->excludes(json);
   RunWith(*sub, line.run, options, RunMeasure);
 }
 
@@ -143,7 +165,7 @@ void DeclareTransfer(const CommandLine& line) {
   sub->add_option("SOURCE", options->path, "The volume file: a preset depends on its values");
   CLI::Option* const list =
       sub->add_flag("--list", options->list, "Print the names of all presets; on a terminal with the colours of colour maps");
-  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture, .png or .exr")
+  sub->add_option("--preview", options->preview, "With --list: draw the colour maps into a picture: " + PictureEndings())
       ->type_name("FILE")
       ->needs(list);
   AddRequestOption(*sub, *FindRequestOption("scalar-range"), options->request);
@@ -261,11 +283,11 @@ void DeclareClusters(const CommandLine& line) {
 void DeclareUp(const CommandLine& line) {
   CLI::App* sub = line.app.add_subcommand("up", "Start a coordinator and workers on this machine");
   auto options = std::make_shared<UpOptions>();
-  options->listen = "tcp://127.0.0.1:7420";
+  options->listen = fmt::format("tcp://{}:7420", OwnHost());
   AddInteger(*sub, "--workers", options->workers, 1, kMaxUpWorkers, "Worker processes")
       ->default_str("one a core, but no more than one for each GiB of --memory");
   AddThreads(*sub, options->threads, "Render threads of each worker");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->type_name("[NAME=]FILE|FOLDER");
   AddParsed(*sub, "--listen", options->listen, EndpointText(true),
             "Address of this machine for clients; port * takes any free port. An address that is not loopback gets keys")
       ->type_name("ENDPOINT")
@@ -295,6 +317,7 @@ void DeclareUp(const CommandLine& line) {
              "Serve metrics for Prometheus on loopback: the coordinator at this port, each worker at one of the next")
       ->type_name("PORT")
       ->default_str("no metrics");
+  sub->add_flag("--unlisted", options->unlisted)->group(kHidden);
   sub->add_flag("--detach", options->detach, "Return when the service is ready; `slabstream down` ends it");
   AddLogLevel(*sub, line.log_level)->default_str("info for the processes that it starts, warning for itself");
   sub->callback([&run = line.run, options, &log_level = line.log_level] {
@@ -304,6 +327,12 @@ void DeclareUp(const CommandLine& line) {
       return RunUp(*options);
     };
   });
+}
+
+Result<std::string> ParseLoopbackPort(std::string_view option, std::string_view text) {
+  const Result<int> port = ParseInteger(option, text, 0, 65535);
+  if (!port.ok()) return port.status();
+  return fmt::format("{}:{}", OwnHost(), *port);
 }
 
 void DeclareView(const CommandLine& line) {
@@ -317,9 +346,16 @@ void DeclareView(const CommandLine& line) {
   sub->parse_complete_callback([sub, options] { options->source = WithReadOptions(*sub, options->source); });
   AddService(*sub, options->service);
   AddCacheOption(*sub, options->cache);
-  sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
-      ->type_name("HOST:PORT")
-      ->default_str(options->listen);
+  options->listen = OwnHost() + ":0";
+  CLI::Option* const listen = sub->add_option("--listen", options->listen, "Address of the gateway; port 0 takes any free port")
+                                  ->type_name("HOST:PORT")
+                                  ->default_str(options->listen);
+  AddParsed(*sub, "--port", options->listen, ParseLoopbackPort,
+            "Port of the gateway on this machine: with --token-file, an address that stays")
+      ->type_name("PORT")
+      ->excludes(listen);
+  sub->add_option("--token-file", options->token_file, "Use the token in this file; make the file, with a new token, if it does not exist")
+      ->type_name("FILE");
   sub->add_flag("!--no-browser", options->browser, "Only print the address");
   RunWith(*sub, line.run, options, RunView);
 }
@@ -343,7 +379,7 @@ void DeclareStatus(const CommandLine& line) {
 }
 
 void DeclareKeys(const CommandLine& line) {
-  CLI::App* sub = line.app.add_subcommand("keys", "List, change and revoke the keys that a service admits; for admins");
+  CLI::App* sub = line.app.add_subcommand("keys", "List, issue, change and revoke the keys that a service admits; for admins");
   sub->require_subcommand(1);
   const auto declare = [&](const char* name, const char* purpose, KeysAction action) {
     CLI::App* order = sub->add_subcommand(name, purpose);
@@ -353,14 +389,26 @@ void DeclareKeys(const CommandLine& line) {
     RunWith(*order, line.run, options, RunKeys);
     return std::pair(order, options);
   };
-  declare("list", "List the public keys, their roles and when they were made", KeysAction::kList);
+  declare("list", "List the keys: id, role, when they were made, public key, name, and when each was heard last", KeysAction::kList);
+  const auto [issue, issue_options] = declare("issue", "Make a key for one person, and write a service file with it", KeysAction::kIssue);
+  issue->add_option("--name", issue_options->order.name, "Whose key it is; `status`, `keys list` and `keys revoke` know it by this name")
+      ->required()
+      ->type_name("NAME");
+  AddChoice<Role, 2>(*issue, "--role", issue_options->order.role, {NameOf(Role::kClient), NameOf(Role::kAdmin)},
+                     {Role::kClient, Role::kAdmin}, "What its holder may do: client or admin")
+      ->default_str("client");
+  issue->add_option("-o,--output", issue_options->output, "The service file, which must not exist yet")
+      ->type_name("FILE")
+      ->default_str("NAME.json");
   const auto [rotate, rotate_options] =
       declare("rotate", "Put a new key into the service file of a role; old keys stay valid until they are revoked", KeysAction::kRotate);
   AddChoice<Role, kRoles.size()>(*rotate, "ROLE", rotate_options->order.role, {NameOf(kRoles[0]), NameOf(kRoles[1]), NameOf(kRoles[2])},
                                  kRoles, "client, worker or admin")
       ->required();
   const auto [revoke, revoke_options] = declare("revoke", "Revoke a key and end its connections", KeysAction::kRevoke);
-  revoke->add_option("KEY", revoke_options->order.key, "The id of a key, or the public key itself, as `slabstream keys list` shows them")
+  revoke
+      ->add_option("KEY", revoke_options->order.key,
+                   "The name or the id of a key, or the public key itself, as `slabstream keys list` shows them")
       ->required();
 }
 
@@ -380,7 +428,7 @@ void DeclareData(const CommandLine& line) {
   declare("list", "Print each dataset: state, size, samples and last error", DataAction::kList);
   const auto [add, add_options] =
       declare("add", "Add volumes, or folders to watch, until the coordinator ends; paths are on the coordinator's host", DataAction::kAdd);
-  add->add_option("DATA", add_options->order.items, "NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
+  add->add_option("DATA", add_options->order.items, "FILE, NAME=FILE or a folder, as for --data of `slabstream up`, with an absolute path")
       ->required();
   const auto [remove, remove_options] =
       declare("remove", "Remove datasets from the catalogue, or stop watching folders. Files are not deleted, and running frames finish",
@@ -419,7 +467,7 @@ void DeclareSlurm(const CommandLine& line) {
       ->type_name("TIME")
       ->default_str("the partition's");
   AddInteger(*sub, "--notice", options->notice_seconds, 1, kMaxNoticeSeconds, "Seconds before the time limit at which workers leave");
-  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("NAME=FILE");
+  AddRepeated(*sub, "--data", options->data, kDataHelp)->required()->type_name("[NAME=]FILE|FOLDER");
   sub->add_option("--folder", options->folder, "Folder shared by all nodes; each job makes a folder in it for its service files")
       ->type_name("FOLDER")
       ->default_str("the folder from which the job is submitted");

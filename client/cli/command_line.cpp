@@ -7,12 +7,14 @@
 #include <cctype>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/completion.h"
+#include "client/cli/help_pages.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"
 #include "common/base/log.h"
@@ -23,14 +25,6 @@
 
 namespace slabstream {
 namespace {
-
-std::string CommandNames(const CLI::App& app) {
-  std::string names;
-  for (const CLI::App* sub : app.get_subcommands(nullptr)) {
-    if (sub->get_group() != kHidden) names += (names.empty() ? "" : ", ") + sub->get_name();
-  }
-  return names;
-}
 
 // Also behind the name of the command, where its help does not mention it.
 void AllowLogLevel(CLI::App& command, std::string& level) {
@@ -50,7 +44,7 @@ CLI::App* DeclareAbout(const CommandLine& line, const std::string& name, const s
       std::string full_name = app.get_name();
       for (const std::string& part : *names) {
         const auto named = found->get_subcommands([&](const CLI::App* command) { return command->get_name() == part; });
-        if (named.empty()) return Status::InvalidArgument(fmt::format("there is no command '{}', but {}", part, CommandNames(*found)));
+        if (named.empty()) return NoCommand(*found, part);
         found = named.front();
         full_name += " " + part;
       }
@@ -81,7 +75,6 @@ CLI::App* DeclareMan(const CommandLine& line) {
 }
 
 // A number after --local is its value, as with --local=4; anything else is not, so that a SOURCE after a bare --local stays the source.
-// Last argument first, as CLI::App::parse wants them.
 std::vector<std::string> Arguments(int argc, const char* const* argv) {
   std::vector<std::string> arguments;
   for (int i = 1; i < argc; ++i) {
@@ -93,7 +86,6 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
       arguments.push_back(text);
     }
   }
-  std::reverse(arguments.begin(), arguments.end());
   return arguments;
 }
 
@@ -102,6 +94,7 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
 int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more) {
   CLI::App app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream");
   SetUp(app, fmt::format("slabstream {}", Version()));
+  app.set_help_all_flag("--help-all", "Print all options");
   app.require_subcommand(0, 1);  // so that words after a command are never taken for another command
   std::function<Status()> run;
   const std::string typed = fmt::format("{}", fmt::join(argv, argv + argc, " "));
@@ -117,27 +110,20 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
     sub->group(sub == options || sub == man || sub->get_name() == kAnnotateCommand ? kHidden : "Commands");
     AllowLogLevel(*sub, log_level);
   }
+  AddHelpPages(app);
   if (argc > 1 && argv[1] == kCompleteCommand) {  // before the parse: the words need not be complete
     return Finish("slabstream", RunComplete(app, std::vector<std::string>(argv + 2, argv + argc)));
   }
 
-  const auto name = [&app] {
-    const auto used = app.get_subcommands();
-    return used.empty() ? std::string("slabstream") : "slabstream " + used.front()->get_name();
-  };
-  try {
-    app.parse(Arguments(argc, argv));
-  } catch (const CLI::Success& asked) {  // --help, --version
-    return app.exit(asked);
-  } catch (const CLI::ParseError& error) {
-    return Finish(name(), Status::InvalidArgument(error.what()));
+  if (const std::optional<int> ended = Parse(app, Arguments(argc, argv))) return *ended;
+  if (!run) {
+    std::cout << app.help();
+    return 0;
   }
-  if (!run) return Finish("slabstream", Status::InvalidArgument("a command is needed: " + CommandNames(app)));
-
-  InitLog(name(), log_level.empty() ? LogLevel::kWarning : LogLevelNames().at(log_level));
+  InitLog(CommandName(app), log_level.empty() ? LogLevel::kWarning : LogLevelNames().at(log_level));
   Status status = LimitSimdTargetByEnvironment();
   if (status.ok()) status = run();
-  return Finish(name(), status);
+  return Finish(CommandName(app), status);
 }
 
 }  // namespace slabstream

@@ -21,7 +21,7 @@ Result<SourceToConvert> Open(const ConvertOptions& options, const SourceText& so
   if (IsReadInParts(source.path, source.options)) {
     Result<std::shared_ptr<VolumeSource>> opened = OpenSource(source.path, source.options, std::make_shared<ReadContext>(limits));
     if (!opened.ok()) return AsInput(opened.status());
-    WarnOfChannel(source.path, source.options, FileInfoOf((*opened)->info()));
+    WarnOfPart(source.path, source.options, FileInfoOf((*opened)->info()));
     return SourceToConvert{*std::move(opened)};
   }
   if (!options.converts_part() && SliceStream::Recognises(source.path, source.options)) {

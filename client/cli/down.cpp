@@ -56,6 +56,7 @@ Status EndAll() {
   if (states.empty()) std::cout << "no service that `up` started runs here\n";
   std::vector<Status> failures;
   for (const ServiceState& state : states) {
+    if (state.unlisted && IsRunning(state.coordinator, kCoordinatorProgram)) continue;  // it ends with its `view`
     if (Status status = EndOne({.endpoint = state.endpoint, .file = {}}); !status.ok()) failures.push_back(std::move(status));
   }
   return ReportAll("slabstream down", failures);

@@ -45,8 +45,9 @@ Result<BrickIndex> Begun(const IndexFile& file, const std::string& name, const S
 
 Status RunIndex(const IndexingOptions& options) {
   if (Status kept = KeepObjects(options.cache); !kept.ok()) return kept;
-  const Result<SourceText> source = ParseSourceText(options.source);
+  Result<SourceText> source = ParseSourceText(options.source);
   if (!source.ok()) return source.status();
+  source->options.describe = true;  // as the pictures do that read the index
   if (!IsReadInParts(source->path, source->options)) {
     if (Status status = CheckInputVolume(*source); !status.ok()) return status;
     return Status::InvalidArgument(

@@ -25,6 +25,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_display.h"
 #include "client/image_io/picture_header.h"
+#include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
 #include "common/planning/brick_visibility.h"
@@ -105,9 +106,7 @@ nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
 Result<VolumeFacts> FactsOf(const std::string& source) {
   ProgressBar bar(::isatty(STDERR_FILENO) == 1, 1);
   const auto tell = [&](const ReadShare& share) { bar.Show(0.01 * share.percent, Describe(share, source)); };
-  DataSource data(source, "");
-  data.describe = true;
-  Result<ReadableSource> read = ReadSource(data, std::uint64_t(kExactBytes), tell);
+  Result<ReadableSource> read = ReadSource(DataSource(source, ""), std::uint64_t(kExactBytes), tell);
   if (!read.ok()) return AsInput(read.status());
   if (auto* const opened = std::get_if<OpenedSource>(&*read)) {
     return VolumeFacts{FileInfoOf(opened->source->info()), opened->survey.summary, std::move(*opened)};
@@ -219,7 +218,8 @@ std::string PartsText(const SourceInfo& info) {
     text += fmt::format("  {:>2}  {}  {:.6g} {:.6g} {:.6g}{}  {:.1f} MiB  {}\n", i, SizeText(d.geometry.size), spacing.x, spacing.y,
                         spacing.z, UnitText(d.geometry), double(d.voxel_bytes()) / (1 << 20), SizeText(info.levels[i].block));
   }
-  if (info.window) text += fmt::format("window       {:g} ... {:g}, which the file asks for\n", info.window->min, info.window->max);
+  if (info.window)
+    text += fmt::format("window       {} ... {}, which the file asks for\n", ValueText(info.window->min), ValueText(info.window->max));
   return text;
 }
 
@@ -247,14 +247,14 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   const Vec3& spacing = d.geometry.spacing;
   std::string text = fmt::format("format       {}\n", info.format);
   text += fmt::format("size         {} voxels ({:.1f} MiB)\n", SizeText(d.geometry.size), double(d.voxel_bytes()) / (1 << 20));
-  text += fmt::format("samples      {}, {} in the file; value = {:g} * sample + {:g}\n", NameOf(d.type), info.file_type, d.mapping.scale,
-                      d.mapping.offset);
+  text += fmt::format("samples      {}, {} in the file; value = {} * sample + {}\n", NameOf(d.type), info.file_type,
+                      ValueText(d.mapping.scale), ValueText(d.mapping.offset));
   if (info.labels) text += "labels       yes: values are numbers of structures, not measurements\n";
   text += fmt::format("spacing      {:.6g} {:.6g} {:.6g}{}\n", spacing.x, spacing.y, spacing.z, UnitText(d.geometry));
   text += OrientationText(facts);
   if (facts.parts) text += PartsText(facts.parts->source->info());
   text += TimesText(info) + ChannelsText(info) + NotesText(info);
-  text += fmt::format("values       {:g} ... {:g}{}\n", summary.range.min, summary.range.max, OfWhichVoxels(facts));
+  text += fmt::format("values       {} ... {}{}\n", ValueText(summary.range.min), ValueText(summary.range.max), OfWhichVoxels(facts));
   if (summary.non_finite > 0) text += fmt::format("not finite   {} voxels (never visible)\n", summary.non_finite);
   text += fmt::format("occupancy    {:.4g} under transfer function '{}'\n", occupancy, transfer);
   text += IndexText(index, transfer);
@@ -292,8 +292,8 @@ std::string LayersText(const Layers& layers) {
   }
   if (layers.overlay != nullptr) {
     const VolumeSummary summary = Summarize(*layers.overlay);
-    text += fmt::format("overlay      values {:g} ... {:g}; {} voxels of this volume have none\n", summary.range.min, summary.range.max,
-                        summary.non_finite);
+    text += fmt::format("overlay      values {} ... {}; {} voxels of this volume have none\n", ValueText(summary.range.min),
+                        ValueText(summary.range.max), summary.non_finite);
   }
   return text;
 }

@@ -21,15 +21,17 @@ Status CheckInputVolume(const SourceText& source) {
 }
 
 Status CheckInputHeaders(const std::string& source) {
-  const Result<SourceText> parsed = ParseSourceText(source);
+  Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return Status(parsed.status().code(), "SOURCE " + parsed.status().message());
   if (Status status = CheckInputVolume(*parsed); !status.ok()) return status;
+  parsed->options.describe = true;
   return AsInput(CheckAnyVolumeHeaders(parsed->path, parsed->options).status());
 }
 
 bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes) {
-  const Result<SourceText> parsed = ParseSourceText(source);
+  Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return false;
+  parsed->options.describe = true;
   if (IsReadInParts(parsed->path, parsed->options)) return true;
   const Result<std::optional<SourceInfo>> stream = DescribeStream(parsed->path, parsed->options);
   return stream.ok() && *stream && std::uint64_t((*stream)->levels.front().description.voxel_bytes()) > most_bytes;
@@ -42,6 +44,7 @@ Result<LoadedVolume> ReadInputVolume(const std::string& source, const TellRead& 
   if (!parsed.ok()) return parsed.status();
   ReadProgress progress(tell);
   parsed->options.progress = &progress;
+  parsed->options.describe = true;
   return ReadInputVolume(*parsed);
 }
 

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "client/cli/service_connection.h"
+#include "client/report/value_text.h"
 #include "client/report/volume_text.h"
 #include "client/request/json_value.h"
 #include "client/request/values.h"
@@ -76,11 +77,12 @@ class Measurer {
   }
 
   Result<Json> Box(const ClipBox& box, const std::string& text) {
-    const Result<BoxStatistics> found = client_.StatisticsIn(dataset_, box);
+    const Result<StatisticsReply> found = client_.StatisticsIn(dataset_, box);
     if (!found.ok()) return found.status();
+    const BoxStatistics& all = found->statistics;
     Json statistics = {{"measure", "box"}, {"box", text}};
-    statistics.update(BoxStatisticsJson(*found));
-    statistics["volume"] = double(found->voxels + found->non_finite) * spacing_.x * spacing_.y * spacing_.z;
+    statistics.update(BoxStatisticsJson(all));
+    statistics["volume"] = double(all.voxels + all.non_finite) * spacing_.x * spacing_.y * spacing_.z;
     statistics["unit"] = fmt::format("{}^3", unit_);
     return statistics;
   }
@@ -92,6 +94,7 @@ class Measurer {
   const std::string_view unit_;
 };
 
+std::string LeastOrLargest(const Json& value) { return value.is_null() ? "none" : ValueText(value.get<double>()); }
 std::string NumberText(const Json& value) { return value.is_null() ? "none" : fmt::format("{:.6g}", value.get<double>()); }
 
 void Print(const Json& measures) {
@@ -109,7 +112,7 @@ void Print(const Json& measures) {
       }
     } else {
       std::cout << fmt::format("box {}: mean {}, deviation {}, least {}, largest {}, {} voxels, {:.6g} {}\n", m["box"].get<std::string>(),
-                               NumberText(m["mean"]), NumberText(m["deviation"]), NumberText(m["least"]), NumberText(m["largest"]),
+                               NumberText(m["mean"]), NumberText(m["deviation"]), LeastOrLargest(m["least"]), LeastOrLargest(m["largest"]),
                                m["voxels"].get<std::uint64_t>(), m["volume"].get<double>(), unit);
     }
   }
@@ -143,8 +146,15 @@ Result<Measures> Parse(const MeasureOptions& options) {
     if (!box.ok()) return box.status();
     measures.boxes.push_back(*box);
   }
-  if (measures.distances.empty() && measures.angles.empty() && measures.profiles.empty() && measures.boxes.empty()) {
-    return Status::InvalidArgument("--distance, --angle, --profile or --box must say what to measure");
+  const bool labels_alone = measures.distances.empty() && measures.angles.empty() && measures.profiles.empty() && measures.boxes.empty();
+  if (labels_alone && !options.labels) {
+    return Status::InvalidArgument("--distance, --angle, --profile, --box or --labels must say what to measure");
+  }
+  if (options.csv && !(labels_alone && options.labels)) {
+    return Status::InvalidArgument("--csv is the table of --labels, without any other measure; --json writes all of them");
+  }
+  if (options.labels && options.connection.local_workers > 0 && !options.layers.any()) {
+    return Status::InvalidArgument("--labels needs a FILE of labels with --local: only datasets of a service have labels of their own");
   }
   return measures;
 }
@@ -154,7 +164,7 @@ Result<Measures> Parse(const MeasureOptions& options) {
 Status RunMeasure(const MeasureOptions& options) {
   const Result<Measures> measures = Parse(options);
   if (!measures.ok()) return measures.status();
-  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source);
+  Result<ServiceConnection> connection = ServiceConnection::Open(options.connection, options.source, options.layers);
   if (!connection.ok()) return connection.status();
   const Result<SummaryReply> summary = connection->client().Summarize(connection->dataset());
   if (!summary.ok()) return summary.status();
@@ -172,10 +182,20 @@ Status RunMeasure(const MeasureOptions& options) {
     if (!box.ok()) return box.status();
     found.push_back(*std::move(box));
   }
+  StatisticsReply labels;
+  if (options.labels) {
+    Result<StatisticsReply> reply = connection->client().StatisticsIn(connection->dataset(), *ParseClipBox("--box", ":,:,:"), true);
+    if (!reply.ok()) return reply.status();
+    labels = *std::move(reply);
+    Json json = {{"measure", "labels"}};
+    json.update(LabelStatisticsJson(labels));
+    if (options.json) found.push_back(std::move(json));
+  }
   if (options.json) {
     std::cout << found.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   } else {
     Print(found);
+    if (options.labels) std::cout << (options.csv ? LabelStatisticsCsv(labels) : LabelStatisticsText(labels));
   }
   return Status::Ok();
 }

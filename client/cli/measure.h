@@ -1,4 +1,4 @@
-// `measure`: lengths and angles in a dataset's world, values along a line, and of the voxels in a box.
+// `measure`: lengths and angles in a dataset's world, values along a line, and of the voxels in a box or of each label.
 #pragma once
 
 #include <string>
@@ -6,6 +6,7 @@
 
 #include "client/cli/options.h"
 #include "common/base/status.h"
+#include "data/layers/layer_reader.h"
 
 namespace slabstream {
 
@@ -17,8 +18,11 @@ struct MeasureOptions {
   std::vector<std::string> angles;     // three points; the angle is at the second one
   std::vector<std::string> profiles;   // two points
   std::vector<std::string> boxes;      // as ParseClipBox takes them
+  bool labels = false;                 // the voxels of each label
+  LayerFiles layers;                   // the labels, with local_workers > 0
   int samples = 0;                     // of each profile, [2, kMaxSamplePoints]; 0: one for each voxel that the line passes
   bool json = false;
+  bool csv = false;  // of labels, and of nothing else
 };
 
 Status RunMeasure(const MeasureOptions& options);

@@ -10,6 +10,7 @@
 #include <span>
 
 #include "client/cli/input_volume.h"
+#include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/renderers/registry.h"
 #include "common/volume/summary.h"
@@ -49,7 +50,7 @@ std::string MeshText(const LoadedMesh& loaded, const ValueRange& range, std::opt
   for (const GridArray& array : info.arrays) {
     text += fmt::format("  {} {} {} {}\n", array.name, NameOf(array.at), array.components, array.TypeText());
   }
-  return text + fmt::format("values       {:g} ... {:g} in {}\n", range.min, range.max, info.arrays[info.array].name);
+  return text + fmt::format("values       {} ... {} in {}\n", ValueText(range.min), ValueText(range.max), info.arrays[info.array].name);
 }
 
 Json MeshJson(const LoadedMesh& loaded, const ValueRange& range) {

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <memory>
+#include <span>
+#include <utility>
 
 #include "client/cli/cores.h"
 #include "client/request/volume_argument.h"
@@ -39,18 +42,22 @@ void AddConnectionOptions(CLI::App& app, ConnectionOptions& connection) {
   AddService(app, connection.service);
 }
 
-// Whether this process renders SOURCE: --local says so, or the user names no service, none runs here, and SOURCE is a file. Then the number
-// of workers is known, too.
-bool RendersHere(const std::string& source, ConnectionOptions& connection) {
+// Whether this process renders each SOURCE: --local says so, or the user names no service, and all are paths of files or, where none runs,
+// files' names. Then the number of workers is known, too.
+bool RendersHere(std::span<const std::string> sources, ConnectionOptions& connection) {
   const int suitable = WorkersWithin(connection.local_memory, std::min(WorkersForOneUser(), kMaxLocalWorkers));
   if (connection.local_workers == ConnectionOptions::kSuitableWorkers) connection.local_workers = suitable;
   if (connection.local_workers > 0) return true;
   const Result<ServiceChoice> named = NamedService(connection.service);
-  if (!named.ok() || !named->text().empty() || !NamesVolumeFile(source) || FindState("")) return false;
+  if (!named.ok() || !named->text().empty() || !std::ranges::all_of(sources, NamesVolumeFile)) return false;
+  const bool may_be_datasets =
+      std::ranges::any_of(sources, [](const std::string& source) { return source.find('/') == std::string::npos; });
+  if (may_be_datasets && FindState("")) return false;
   connection.local_workers = suitable;
   connection.unasked = true;
   return true;
 }
+bool RendersHere(const std::string& source, ConnectionOptions& connection) { return RendersHere({&source, 1}, connection); }
 
 constexpr char kSourceHelp[] = "A dataset's name at the service, or a volume file, with --local or where no service runs";
 
@@ -108,22 +115,31 @@ std::string WithReadOptionsOfFile(const CLI::App& app, const std::string& source
   return with_options;
 }
 
+// The parts of VOLUME:TRANSFER, with the options for reading that were given to `app`; without TRANSFER, `usual` is the transfer function.
+SourceChoice Resolved(const CLI::App& app, const std::string& volume, TransferChoice usual, bool is_file) {
+  Result<VolumeArgument> argument = ParseVolumeArgument("SOURCE", volume, is_file);
+  if (!argument.ok()) throw CLI::ValidationError(argument.status().message());
+  if (argument->transfer && app.get_option("--transfer")->count() > 0) {
+    throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
+  }
+  SourceChoice choice{WithReadOptionsOfFile(app, argument->volume, is_file), std::move(usual)};
+  if (argument->transfer) {
+    choice.transfer.choice = *std::move(argument->transfer);
+  } else {
+    LetSurfacesStandAlone(app, choice.transfer);
+  }
+  return choice;
+}
+
 }  // namespace
 
 void ResolveSource(CLI::App& app, const CLI::Option* source, std::string& volume, TransferChoice& transfer, std::function<bool()> is_file) {
   app.parse_complete_callback([&app, source, &volume, &transfer, is_file = std::move(is_file)] {
     if (source->count() == 0) return;
-    Result<VolumeArgument> argument = ParseVolumeArgument("SOURCE", volume, is_file());
-    if (!argument.ok()) throw CLI::ValidationError(argument.status().message());
-    if (argument->transfer && app.get_option("--transfer")->count() > 0) {
-      throw CLI::ValidationError(fmt::format("SOURCE '{}' names a transfer function, and so does --transfer", volume));
-    }
-    volume = WithReadOptionsOfFile(app, argument->volume, is_file());
-    if (argument->transfer) {
-      transfer.choice = *std::move(argument->transfer);
-    } else {
-      LetSurfacesStandAlone(app, transfer);
-    }
+    const bool file = is_file();
+    SourceChoice choice = Resolved(app, volume, transfer, file);
+    volume = std::move(choice.source);
+    transfer = std::move(choice.transfer);
   });
 }
 
@@ -147,20 +163,30 @@ void AddSliceOptions(CLI::App& app, SliceOptions& options) {
                 [&options] { return RendersHere(options.source, options.connection); });
 }
 
-void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except) {
+void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except,
+                     std::vector<SourceChoice>* sources) {
   app.option_defaults()->group("Options");
-  CLI::Option* source =
-      app.add_option("SOURCE", options.source, fmt::format("{}; append :TRANSFER to choose its transfer function", kSourceHelp))
-          ->required();
+  const std::string help = fmt::format("{}; append :TRANSFER to choose its transfer function", kSourceHelp);
+  auto texts = std::make_shared<std::vector<std::string>>();  // of several sources
+  CLI::Option* source = sources == nullptr ? app.add_option("SOURCE", options.source, help)->required()
+                                           : app.add_option("SOURCE", *texts, help + "; several make a picture each")->required();
   AddReadOptions(app, except);
   AddConnectionOptions(app, options.connection);
   AddRenderPictureOptions(app, options.request, options.format, &options.layers);
-  ResolveSource(app, source, options.source, options.request.transfer,
-                [&options] { return RendersHere(options.source, options.connection); });
+  if (sources == nullptr) {
+    ResolveSource(app, source, options.source, options.request.transfer,
+                  [&options] { return RendersHere(options.source, options.connection); });
+  } else {
+    app.parse_complete_callback([&app, &options, texts, sources] {
+      const bool here = RendersHere(*texts, options.connection);
+      for (const std::string& text : *texts) sources->push_back(Resolved(app, text, options.request.transfer, here));
+    });
+  }
   app.option_defaults()->group(kOutputGroup);
   app.add_flag("!--no-record", options.record,
                "Leave the record out of pictures: SOURCE, options and version, as `slabstream info PICTURE` prints them");
-  app.add_option("--save-camera", options.camera_path, "Write the view to a file for --camera")->type_name("FILE");
+  app.add_option("--save-camera", options.camera_path, "Write the camera that was used to a file for --camera and --path")
+      ->type_name("FILE");
   app.add_option("--stats", options.stats_path, "Write plan, bytes and stage times as JSON")->type_name("FILE");
   app.add_option("--trace", options.trace_path, "Write the timeline of each worker, for Perfetto or chrome://tracing")->type_name("FILE");
   AddParsed(app, "--otlp", options.collector, ParseCollector,

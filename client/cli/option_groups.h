@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "client/cli/options.h"
 #include "client/request/picture_options.h"
@@ -34,7 +35,9 @@ void AddSource(CLI::App& app, std::string& source, ConnectionOptions& connection
 void AddSliceOptions(CLI::App& app, SliceOptions& options);
 
 // All options that `render` and `turntable` share: SOURCE, connection, view, look, policy, and the files written beside pictures.
-// `except`: options for reading that the command has in a form of its own.
-void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except = {});
+// `except`: options for reading that the command has in a form of its own. `sources`: gets one or more SOURCEs; null: there is one, in
+// `options`.
+void AddFrameOptions(CLI::App& app, FrameOptions& options, std::initializer_list<std::string_view> except = {},
+                     std::vector<SourceChoice>* sources = nullptr);
 
 }  // namespace slabstream

@@ -8,6 +8,7 @@
 
 #include "client/cli/slurm_values.h"
 #include "client/cli/turntable_values.h"
+#include "client/request/camera_file.h"
 #include "client/request/slice_request.h"
 #include "client/service/service_choice.h"
 #include "common/base/time.h"
@@ -51,9 +52,16 @@ struct FrameOptions {
   bool progress = false;
 };
 
+// A volume, and the transfer function that it is shown with.
+struct SourceChoice {
+  std::string source;
+  TransferChoice transfer;
+};
+
 struct RenderOptions {
-  FrameOptions frame;
-  std::string output;
+  FrameOptions frame;                 // of each picture; its source and transfer function are those of `sources`
+  std::vector<SourceChoice> sources;  // at least one
+  std::string output;                 // with several sources: PictureOrders
 };
 
 inline constexpr int kMaxInFlight = 64;
@@ -63,9 +71,11 @@ struct TurntableOptions {
   TurntableOutput output;
   std::optional<double> frames_per_second;  // of a movie, [kMinFramesPerSecond, kMaxFramesPerSecond]; none: MovieShape's own
   std::optional<TimeRange> times;           // of the volumes in SOURCE; none: it is one volume
-  std::optional<int> frames;                // [1, kMaxTurntableFrames], spread evenly over turns and times; none: one for each time
-  int turns = 1;                            // [0, kMaxTurns], which begin at the request's azimuth
-  int in_flight = 2;                        // [1, kMaxInFlight] frames requested and not yet complete
+  // [1, kMaxTurntableFrames], spread evenly over turns, path and times; none: one for each time, or as many as the path's seconds need.
+  std::optional<int> frames;
+  int turns = 1;                      // [0, kMaxTurns], which begin at the request's azimuth
+  std::optional<PathText> path = {};  // instead of turns
+  int in_flight = 2;                  // [1, kMaxInFlight] frames requested and not yet complete
 };
 
 struct SliceOptions {
@@ -135,16 +145,18 @@ struct UpOptions {
   std::uint64_t cache = 0;        // bytes on disk, as slabstream-worker takes it; 0: none
   int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none
   bool detach = false;
+  bool unlisted = false;  // ServiceState::unlisted
   std::string log_level;  // of the processes that it starts; empty: info
 };
 
 struct ViewOptions {
   ServiceChoice service;
-  std::string source;                  // a volume file, or a dataset's name at the service
-  LayerFiles layers;                   // of a file
-  std::uint64_t cache = 0;             // of the service that it starts, as UpOptions::cache
-  std::string listen = "127.0.0.1:0";  // as slabstream-gateway takes it
-  bool browser = true;                 // open it, if there is a display
+  std::string source;       // a volume file, or a dataset's name at the service
+  LayerFiles layers;        // of a file
+  std::uint64_t cache = 0;  // of the service that it starts, as UpOptions::cache
+  std::string listen;       // as slabstream-gateway takes it
+  std::string token_file;   // likewise; empty: a new token. A file that does not exist is made
+  bool browser = true;      // open it, if there is a display
 };
 
 struct DownOptions {
@@ -160,6 +172,7 @@ struct StatusOptions {
 struct KeysOptions {
   ServiceChoice service;
   KeysOrder order;
+  std::string output;  // of kIssue: the service file; empty: NAME.json
 };
 
 struct DataOptions {

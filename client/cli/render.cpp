@@ -1,6 +1,7 @@
 // `render` and `turntable`.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <iostream>
@@ -15,13 +16,15 @@
 #include "client/cli/movie.h"
 #include "client/cli/picture_files.h"
 #include "client/cli/picture_keys.h"
+#include "client/cli/picture_orders.h"
 #include "client/cli/service_connection.h"
 #include "client/cli/stats_json.h"
 #include "client/cli/trace_json.h"
 #include "client/cli/trace_spans.h"
 #include "client/cli/warn_of_picture.h"
+#include "client/movie/camera_moves.h"
 #include "client/movie/turntable.h"
-#include "client/request/request_options.h"
+#include "client/request/camera_file.h"
 #include "common/base/files.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
@@ -74,15 +77,33 @@ Status SettleTransfer(Client& client, std::vector<FrameJob>& jobs) {
   return Status::Ok();
 }
 
-// The pictures of `jobs`, and the files beside them (--stats, --trace). `open_pictures` is called just before the first frame: until then
-// Ctrl-C ends the process at once, so there must be nothing to clean up. `failures`: as in FrameLoopOptions.
+// The views of the jobs, whose datasets are known.
+Status PlaceCameras(Client& client, const CameraMove& move, std::vector<FrameJob>& jobs) {
+  std::vector<std::string> datasets;
+  for (const FrameJob& job : jobs) {
+    if (datasets.empty() || datasets.back() != job.request.dataset) datasets.push_back(job.request.dataset);  // times rise
+  }
+  const AskView ask = [&client](ViewQuery query) { return client.ChooseView(std::move(query)); };
+  Result<std::vector<ViewParameters>> views = ViewsOfMovie(jobs.front().request, move, int(jobs.size()), datasets, ask);
+  if (!views.ok()) return views.status();
+  for (std::size_t i = 0; i < jobs.size(); ++i) jobs[i].request.view = (*views)[i];
+  return Status::Ok();
+}
+
+// The pictures of `jobs`, and the files beside them (--stats, --trace, --save-camera). `move`: of a sequence; null: the views are those of
+// the jobs. `open_pictures` is called just before the first frame: until then Ctrl-C ends the process at once, so there must be nothing to
+// clean up. `failures`, `label`: as in FrameLoopOptions.
 using OpenSink = std::function<Result<std::unique_ptr<PictureSink>>(const PictureKey&)>;
-Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const OpenSink& open_pictures,
-                                                int in_flight, std::vector<Status>* failures) {
+Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std::vector<FrameJob> jobs, const CameraMove* move,
+                                                const OpenSink& open_pictures, int in_flight, std::vector<Status>* failures,
+                                                const std::string& label = "") {
   Result<ServiceConnection> connection = Connect(options, jobs);
   if (!connection.ok()) return connection.status();
   if (Status status = Validate(jobs.front().request); !status.ok()) return status;
   if (Status status = SettleTransfer(connection->client(), jobs); !status.ok()) return status;
+  if (move != nullptr) {
+    if (Status status = PlaceCameras(connection->client(), *move, jobs); !status.ok()) return status;
+  }
   const Result<PictureKey> key = KeyFor(connection->client(), options.format.annotations, jobs.front().request);
   if (!key.ok()) return key.status();
   const Result<std::unique_ptr<PictureSink>> pictures = open_pictures(*key);
@@ -94,12 +115,13 @@ Result<std::vector<FrameRecord>> RenderPictures(const FrameOptions& options, std
   loop.keep_reports = !options.stats_path.empty() || !options.trace_path.empty() || options.collector;
   loop.failures = failures;
   loop.progress = options.progress;
+  loop.label = label;
   Result<std::vector<FrameRecord>> frames = RenderFrames(connection->client(), jobs, loop);
   if (!frames.ok()) return frames;
   WarnOf(connection->client(), jobs.front().request, frames->front().empty);
   if (!options.camera_path.empty()) {
-    const std::string text = OptionsJson(options.request, "view.").dump(1) + "\n";
-    if (Status status = WriteTextFile(options.camera_path, text); !status.ok()) return status;
+    const ViewParameters view = frames->front().statistics.view.value_or(jobs.front().request.view);
+    if (Status status = WriteTextFile(options.camera_path, CameraText(view)); !status.ok()) return status;
   }
   if (!options.stats_path.empty()) {
     if (Status status = WriteTextFile(options.stats_path, StatsJson(options, *frames)); !status.ok()) return status;
@@ -120,8 +142,10 @@ void Send(const FrameOptions& options, const std::string& command, Time begin, c
   if (!status.ok()) PrintWarning("--otlp: " + status.message());
 }
 
-std::unique_ptr<PictureSink> FilesOf(const FrameOptions& options, const PictureKey& key) {
-  return std::make_unique<PictureFiles>(options.format, key, options.record, options.layers);
+// `output`: one of the files.
+Result<std::unique_ptr<PictureSink>> FilesOf(const FrameOptions& options, const PictureKey& key, const std::string& output) {
+  if (Status status = CheckCanWritePicture(output); !status.ok()) return status;
+  return std::unique_ptr<PictureSink>(std::make_unique<PictureFiles>(options.format, key, options.record, options.layers));
 }
 
 MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}) {
@@ -131,9 +155,14 @@ MovieOptions MovieOf(const TurntableOptions& options, const PictureKey& key = {}
   return movie;
 }
 
+// Where frame `index` goes.
+std::string FileOf(const TurntableOptions& options, int index) {
+  return options.output.movie.empty() ? options.output.pictures.Name(index) : options.output.movie;
+}
+
 // Where the frames of a turntable go.
 Result<std::unique_ptr<PictureSink>> OpenPictures(const TurntableOptions& options, const PictureKey& key) {
-  if (options.output.movie.empty()) return FilesOf(options.frame, key);
+  if (options.output.movie.empty()) return FilesOf(options.frame, key, FileOf(options, 0));
   Result<std::unique_ptr<Movie>> movie = Movie::Start(MovieOf(options, key));
   if (!movie.ok()) return movie.status();
   return std::unique_ptr<PictureSink>(*std::move(movie));
@@ -157,66 +186,92 @@ Result<TurntableOptions> WithTimesOfSource(TurntableOptions options) {
   return options;
 }
 
-// Where frame `index` goes.
-std::string FileOf(const TurntableOptions& options, int index) {
-  return options.output.movie.empty() ? options.output.pictures.Name(index) : options.output.movie;
-}
-
 // What is wrong with the options as a whole, before work begins.
 Status CheckTurntable(const TurntableOptions& options) {
   if (options.frame.request.view.eye && options.turns > 0) {
     return Status::InvalidArgument(
         "--eye fixes the viewpoint, but a turntable turns by --azimuth, about --look-at; --turns 0 fixes the view");
   }
-  if (!options.frames && !options.times) return Status::InvalidArgument("--frames is required");
+  if (!options.frames && !options.times && !(options.path && options.path->timed)) {
+    return Status::InvalidArgument(options.path ? "--frames is required: the cameras of --path have no times" : "--frames is required");
+  }
   const std::string first_output = FileOf(options, 0);
   if (!options.output.movie.empty()) {
     if (Status status = CheckCanEncode(MovieOf(options)); !status.ok()) return status;
   } else if (options.frames_per_second) {
     return Status::InvalidArgument(fmt::format("--fps {:g} is for movies ({}), but --output '{}' names pictures",
                                                *options.frames_per_second, MovieEndings(), first_output));
-  } else if (Status status = CheckCanWritePicture(first_output); !status.ok()) {
+  } else if (Status status = CheckPictureFile(first_output, options.frame.request.size); !status.ok()) {
     return status;
   }
   return CheckPaths(options.frame, first_output);
 }
 
-// Frame i shows the time and the angle that belong to the i-th part of the whole.
+// CheckTurntable has found that one of these is there.
+std::int64_t FrameCount(const TurntableOptions& options) {
+  if (options.frames) return *options.frames;
+  if (options.times) return options.times->count();
+  // A path's first and last camera are frames.
+  const double per_second = options.frames_per_second.value_or(MovieShape().frames_per_second);
+  return std::llround(options.path->seconds() * per_second) + 1;
+}
+
+// Frame i shows the time that belongs to the i-th part of the whole.
 Result<std::vector<FrameJob>> TurntableJobs(const TurntableOptions& options) {
   const TimeRange times = options.times.value_or(TimeRange{});
-  const int frames = options.frames.value_or(times.count());
-  if (frames > kMaxTurntableFrames) {
-    return Status::InvalidArgument(fmt::format("--time {}:{} has {} times, but at most {} --frames are possible", times.first, times.last,
-                                               frames, kMaxTurntableFrames));
+  if (FrameCount(options) > kMaxTurntableFrames) {
+    const std::string what =
+        options.times ? fmt::format("--time {}:{} has {} times", times.first, times.last, times.count())
+                      : fmt::format("--path takes {:g} seconds, which are {} frames", options.path->seconds(), FrameCount(options));
+    return Status::InvalidArgument(fmt::format("{}, but at most {} --frames are possible", what, kMaxTurntableFrames));
   }
-  FrameRequest request = options.frame.request;
+  const int frames = int(FrameCount(options));
   if (times.count() > 1 && options.frame.connection.local_workers > 0) {
     if (Status status = CheckInputHeaders(SourceAt(options, times.last)); !status.ok()) return status;
   }
   std::vector<FrameJob> jobs;
   for (int i = 0; i < frames; ++i) {
     const int time = times.first + int(std::int64_t{i} * times.count() / frames);
-    FrameJob& job = jobs.emplace_back(FrameJob{request, FileOf(options, i), SourceAt(options, time)});
-    job.request.view.azimuth_degrees = TurntableAzimuth(request.view.azimuth_degrees, options.turns, i, frames);
+    jobs.push_back({options.frame.request, FileOf(options, i), SourceAt(options, time)});
   }
   return jobs;
+}
+
+// `label` begins each line of progress.
+Status RenderOne(const PictureOrder& order, const std::string& label) {
+  const Time start = MonotonicNow();
+  const FrameOptions& frame = order.frame;
+  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(frame, key, order.output); };
+  const auto frames = RenderPictures(frame, {{frame.request, order.output, frame.source}}, nullptr, open_pictures, 1, nullptr, label);
+  if (!frames.ok()) return frames.status();
+  const ImageSize size = frame.request.size;
+  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms ({}, frame {:.0f} ms)\n", order.output, size.width, size.height,
+                           Milliseconds(MonotonicNow() - start), frames->front().statistics.renderer,
+                           Milliseconds(frames->front().latency));
+  Send(frame, "render", start, *frames, {});
+  return Status::Ok();
 }
 
 }  // namespace
 
 Status RunRender(const RenderOptions& options) {
-  const Time start = MonotonicNow();
-  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
-  if (Status status = CheckPaths(options.frame, options.output); !status.ok()) return status;
-  const auto open_pictures = [&](const PictureKey& key) { return FilesOf(options.frame, key); };
-  const auto frames =
-      RenderPictures(options.frame, {{options.frame.request, options.output, options.frame.source}}, open_pictures, 1, nullptr);
-  if (!frames.ok()) return frames.status();
-  const ImageSize size = options.frame.request.size;
-  std::cout << fmt::format("rendered {} {}x{} in {:.0f} ms (frame {:.0f} ms)\n", options.output, size.width, size.height,
-                           Milliseconds(MonotonicNow() - start), Milliseconds(frames->front().latency));
-  Send(options.frame, "render", start, *frames, {});
-  return Status::Ok();
+  const Result<std::vector<PictureOrder>> orders = PictureOrders(options);
+  if (!orders.ok()) return orders.status();
+  for (const PictureOrder& order : *orders) {
+    if (Status status = CheckPictureFile(order.output, order.frame.request.size); !status.ok()) return status;
+    if (Status status = CheckPaths(order.frame, order.output); !status.ok()) return status;
+  }
+  if (orders->size() == 1) return RenderOne(orders->front(), "");
+  std::vector<Status> failures;
+  for (const PictureOrder& order : *orders) {
+    const std::string& source = order.frame.source;
+    const Status status = RenderOne(order, source);
+    if (status.code() == StatusCode::kCancelled) return status;
+    if (status.ok()) continue;
+    const bool named = status.message().find(source) != std::string::npos;
+    failures.push_back(named ? status : Status(status.code(), fmt::format("SOURCE {}: {}", source, status.message())));
+  }
+  return ReportAll("slabstream render", failures);
 }
 
 Status RunTurntable(const TurntableOptions& given) {
@@ -229,7 +284,9 @@ Status RunTurntable(const TurntableOptions& given) {
   if (!jobs.ok()) return jobs.status();
   const auto open_pictures = [&](const PictureKey& key) { return OpenPictures(options, key); };
   std::vector<Status> failures;
-  const auto frames = RenderPictures(options.frame, *jobs, open_pictures, options.in_flight, &failures);
+  CameraMove move{.turns = options.turns};
+  if (options.path) move.cameras = options.path->cameras;
+  const auto frames = RenderPictures(options.frame, *jobs, &move, open_pictures, options.in_flight, &failures);
   const std::string who = "slabstream turntable";
   if (!frames.ok()) {
     failures.push_back(frames.status());

@@ -8,6 +8,7 @@
 #include "client/cli/cores.h"
 #include "client/cli/input_volume.h"
 #include "client/embedded/embedded_service.h"
+#include "client/request/volume_argument.h"
 #include "client/service/service_state.h"
 #include "common/base/printable.h"
 #include "common/cli/program.h"
@@ -59,7 +60,27 @@ Status LimitLocal(const ConnectionOptions& connection) {
   return Status::Ok();
 }
 
+constexpr char kHowToStart[] = "`slabstream up` starts a service, --local needs none";
+
 }  // namespace
+
+Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
+  const bool is_path = source.find('/') != std::string::npos, is_file = NamesVolumeFile(source);
+  if (is_path && is_file) {
+    return Status::InvalidArgument(
+        fmt::format("SOURCE '{}' is a file, but a service shows datasets by their names (`slabstream data list`); --local works on files",
+                    Printable(source)));
+  }
+  if (is_path) return Status::NotFound(fmt::format("SOURCE {}: no such file", Printable(source)));
+  if (source.size() > kMaxNameBytes) {
+    return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
+  }
+  if (!NoServiceHere(choice)) return Status::Ok();
+  const bool has_ending = source.rfind('.') != std::string::npos;
+  return Status(has_ending ? StatusCode::kNotFound : StatusCode::kUnavailable,
+                fmt::format("SOURCE {}: no such file, and no service runs here that could have a dataset of this name ({})",
+                            Printable(source), kHowToStart));
+}
 
 ServiceConnection::ServiceConnection() = default;
 ServiceConnection::ServiceConnection(ServiceConnection&&) noexcept = default;
@@ -79,8 +100,7 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
                       layers.labels.empty() ? "overlay" : "labels"));
     }
     for (const std::string& source : sources) {
-      if (source.size() <= kMaxNameBytes) continue;
-      return Status::InvalidArgument(fmt::format("SOURCE has {} bytes, a dataset's name has at most {}", source.size(), kMaxNameBytes));
+      if (Status status = CheckDataset(connection.service, source); !status.ok()) return status;
     }
     Result<ServiceConnection> opened = OpenService(connection.service);
     if (opened.ok()) opened->datasets_.assign(sources.begin(), sources.end());
@@ -103,7 +123,8 @@ Result<ServiceConnection> ServiceConnection::Open(const ConnectionOptions& conne
     if (const auto headers = CheckLayerHeaders(layers); !headers.ok()) return AsInput(headers.status());
   }
   if (connection.unasked) {
-    PrintNote(fmt::format("no service is named and none runs here, so this process works on {} itself, as with --local",
+    PrintNote(fmt::format("{}, so this process works on {} itself, as with --local",
+                          FindState("") ? "a path is no dataset of a service" : "no service is named and none runs here",
                           Printable(sources.front())));
   }
   return OpenLocal(connection, std::move(files));
@@ -136,6 +157,7 @@ Result<ServiceConnection> ServiceConnection::OpenLocal(const ConnectionOptions& 
 }
 
 Result<ServiceConnection> ServiceConnection::OpenService(const ServiceChoice& choice) {
+  if (NoServiceHere(choice)) return Status::Unavailable(fmt::format("no service runs here ({})", kHowToStart));
   const Result<ServiceAddress> service = ResolveService(choice);
   if (!service.ok()) return service.status();
   return OpenService(*service);
@@ -146,8 +168,7 @@ Result<ServiceConnection> ServiceConnection::OpenService(const ServiceAddress& s
   connection.context_ = std::make_unique<Context>();
   Result<Client> client = Client::Connect(*connection.context_, service);
   if (!client.ok()) {
-    const std::string hint =
-        client.status().code() == StatusCode::kUnavailable ? " (`slabstream up` starts a service, --local needs none)" : "";
+    const std::string hint = client.status().code() == StatusCode::kUnavailable ? fmt::format(" ({})", kHowToStart) : "";
     return Status(client.status().code(), client.status().message() + hint);
   }
   connection.client_ = std::make_unique<Client>(*std::move(client));

@@ -16,10 +16,14 @@ namespace slabstream {
 
 class EmbeddedService;
 
+// Whether SOURCE may be a dataset of the service, before the service is asked. NotFound: it is the path of a file that does not exist, or
+// no service runs here. InvalidArgument: it is a file's path, or too long for a name. Unavailable: no service runs here.
+Status CheckDataset(const ServiceChoice& choice, const std::string& source);
+
 class ServiceConnection {
  public:
   // For volumes `sources`, at least one. At the service they are names of its catalogue. With local workers they are volume files: Open
-  // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers.
+  // checks that they exist, and the first frame of each reads it. Unavailable within 5 s if nobody answers. Errors of CheckDataset.
   // `layers`: files that belong to each of them, with local workers only; else InvalidArgument.
   static Result<ServiceConnection> Open(const ConnectionOptions& connection, std::span<const std::string> sources,
                                         const LayerFiles& layers = {});

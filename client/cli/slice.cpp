@@ -16,7 +16,7 @@
 namespace slabstream {
 
 Status RunSlice(const SliceOptions& options) {
-  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
+  if (Status status = CheckPictureFile(options.output, options.slice.size()); !status.ok()) return status;
   if (Status status = CheckCanWrite("--output", options.output); !status.ok()) return status;
   if (Status status = CheckCanDraw(options.slice.format.annotations); !status.ok()) return status;
   SliceRequest slice = options.slice;
@@ -30,6 +30,7 @@ Status RunSlice(const SliceOptions& options) {
   if (!frames.ok()) return frames.status();
   const Result<PictureKey> key = KeyFor(connection->client(), slice.format.annotations, frames->front());
   if (!key.ok()) return key.status();
+  if (Status status = CheckCanWritePicture(options.output); !status.ok()) return status;
   PictureNotes notes{.key = *key};
   std::vector<PictureImage> images;
   for (const FrameRequest& frame : *frames) {

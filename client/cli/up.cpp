@@ -11,7 +11,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -69,7 +68,8 @@ class LocalService {
       : options_(options), memory_(memory) {
     state_.log_directory = std::move(log_directory);
     state_.keys_folder = std::move(keys_folder);
-    state_.started_unix = std::time(nullptr);
+    state_.started_unix = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+    state_.unlisted = options.unlisted;
   }
 
   // Until every worker is registered. Cancelled: a signal came.
@@ -120,6 +120,7 @@ class LocalService {
   }
 
   const ServiceState& state() const { return state_; }
+  const std::string& worker_endpoint() const { return worker_endpoint_; }
 
  private:
   struct Watched {
@@ -269,16 +270,18 @@ Result<std::string> KeysFolder(const UpOptions& options, const std::string& stat
   return fmt::format("{}/keys-{}", state_directory, FileNameOf(fmt::format("{}-{}", listen->host, listen->port)));
 }
 
-Status PrintReady(const UpOptions& options, const ServiceState& state) {
+Status PrintReady(const UpOptions& options, const ServiceState& state, const std::string& worker_endpoint) {
   const bool default_endpoint = state.endpoint == kDefaultEndpoint || !state.keys_folder.empty();
   const std::string endpoint = default_endpoint ? "" : fmt::format(" --endpoint {}", state.endpoint);
   std::cout << fmt::format("slabstream is up at {} (coordinator pid {}, {} workers); logs are in {}\n", state.endpoint, state.coordinator,
                            state.workers.size(), state.log_directory);
   std::cout << fmt::format("  slabstream render NAME -o picture.png{0}\n  slabstream status{0}\n", endpoint);
-  if (!state.keys_folder.empty()) {
+  if (state.keys_folder.empty()) {
+    std::cout << fmt::format("  slabstream-worker --coordinator {} adds a worker\n", worker_endpoint);
+  } else {
     std::cout << fmt::format(
         "Service files for other hosts are in {}: client.json, worker.json, admin.json. Everybody who has one has its role.\n"
-        "  slabstream render NAME -o picture.png --service client.json\n  slabstream-worker --service worker.json\n",
+        "  slabstream render NAME -o picture.png --service client.json\n  slabstream-worker --service worker.json adds a worker\n",
         state.keys_folder);
   }
   if (options.detach) {
@@ -342,7 +345,7 @@ Status Serve(const UpOptions& options, const MemoryShares& memory, std::optional
     if (new_keys) std::filesystem::remove_all(*keys_folder, error);
     return status;
   }
-  Status told = PrintReady(options, service.state());
+  Status told = PrintReady(options, service.state(), service.worker_endpoint());
   if (told.ok() && ready) told = LeaveTerminal(log_directory + "/up.log", *ready);
   if (!told.ok()) {
     service.Stop(true);

@@ -15,13 +15,20 @@
 #include "client/cli/service_connection.h"
 #include "client/service/process.h"
 #include "client/service/service_state.h"
+#include "common/base/did_you_mean.h"
+#include "common/base/files.h"
 #include "common/base/program_beside.h"
 #include "common/base/stop_signals.h"
 #include "common/base/url.h"
 #include "common/cli/program.h"
 #include "common/frame/dataset_name.h"
+#include "common/http/address.h"
+#include "common/transport/this_machine.h"
+#include "coordinator/catalogue.h"
 #include "data/layers/layer_reader.h"
+#include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/open/source_name.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -32,16 +39,6 @@ using std::chrono::seconds;
 constexpr const char* kGatewayProgram = "slabstream-gateway";
 constexpr Duration kHelperStartTimeout = seconds(60);
 constexpr Duration kHelperPatience = seconds(15);  // for a service to end its processes
-
-// A name of a catalogue for a source: letters, digits, '-', '_' and '.', without its ending.
-std::string DatasetName(const std::string& source) {
-  const Result<SourceText> parsed = ParseSourceText(source);
-  const std::filesystem::path path = std::filesystem::absolute(parsed.ok() ? parsed->path : source);
-  std::string name = path.filename().string();
-  if (name.empty()) name = path.parent_path().filename().string();
-  name = FileNameOf(name.substr(0, name.find('.', 1)));
-  return name.empty() || name == "_" ? "volume" : name;
-}
 
 bool IsVolumeFile(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
@@ -58,7 +55,7 @@ std::string AbsoluteSource(const std::string& source) {
 
 // NAME=PATH as --data takes it, with absolute paths.
 std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
-  std::string entry = fmt::format("{}={}", DatasetName(source), AbsoluteSource(source));
+  std::string entry = fmt::format("{}={}", NameOfSource(source), AbsoluteSource(source));
   if (!layers.labels.empty()) {
     layers.labels = AbsoluteSource(layers.labels);
     if (!layers.label_colors.empty()) layers.label_colors = AbsoluteSource(layers.label_colors);
@@ -70,7 +67,7 @@ std::string CatalogueEntry(const std::string& source, LayerFiles layers) {
 
 // What the viewer shows first: of several times of a file the first one.
 std::string ShownDataset(const std::string& source) {
-  const std::string name = DatasetName(source);
+  const std::string name = NameOfSource(source);
   const Result<SourceText> parsed = ParseSourceText(source);
   const bool several = parsed.ok() && parsed->options.time && parsed->options.time->count() > 1;
   return several ? NameAtTime(name, parsed->options.time->first) : name;
@@ -139,6 +136,35 @@ Status WatchHelpers(Helper& gateway, std::optional<Helper>& service) {
   }
 }
 
+// What `up` would refuse, before it is started.
+Status CheckEntry(const std::string& source, const std::string& entry) {
+  if (Status status = CheckInputVolume(source); !status.ok()) return status;
+  FoundData found = FindData({entry}, "SOURCE ");
+  CheckFiles(found);
+  return found.errors.empty() ? Status::Ok() : AsInput(found.errors.front());
+}
+
+// Says which of several times or channels is shown. Other commands' logs do; the service's is in a file.
+void TellOfPart(const std::string& source) {
+  Result<SourceText> parsed = ParseSourceText(source);
+  if (!parsed.ok()) return;
+  parsed->options.describe = true;
+  const Result<std::vector<std::string>> texts = TextsOfPart(parsed->path, parsed->options);
+  if (!texts.ok()) return;  // the page says what is wrong
+  for (const std::string& text : *texts) PrintNote(text);
+}
+
+// The token in the file, which is made if it does not exist.
+Result<std::string> KeptToken(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    const Result<std::string> token = MakeToken();
+    if (!token.ok()) return token;
+    if (Status written = WritePrivateTextFile(path, *token + "\n"); !written.ok()) return written;
+  }
+  return ReadToken("--token-file", path);
+}
+
 // The dataset that the service has for the file. With keys it takes an admin's.
 Status AddToService(const ServiceChoice& choice, const std::string& entry) {
   Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
@@ -147,7 +173,8 @@ Status AddToService(const ServiceChoice& choice, const std::string& entry) {
 }
 
 // NotFound: the service has no dataset of this name; Unavailable: there is no service.
-Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
+Status FindDataset(const ServiceChoice& choice, const std::string& source) {
+  if (Status status = CheckDataset(choice, source); !status.ok()) return status;
   Result<ServiceConnection> connection = ServiceConnection::OpenService(choice);
   if (!connection.ok()) {
     return Status(connection.status().code(), fmt::format("SOURCE '{}' is no file, and {}", source, connection.status().message()));
@@ -155,7 +182,8 @@ Status CheckDataset(const ServiceChoice& choice, const std::string& source) {
   const Result<StatusReply> status = connection->client().QueryStatus();
   if (!status.ok()) return status.status();
   if (std::ranges::find(status->datasets, source, &DatasetStatus::name) != status->datasets.end()) return Status::Ok();
-  return Status::NotFound(fmt::format("SOURCE '{}' is neither a file nor a dataset of the service", source));
+  return Status::NotFound(
+      fmt::format("SOURCE '{}' is neither a file nor a dataset of the service{}", source, DidYouMean(source, status->datasets)));
 }
 
 }  // namespace
@@ -170,15 +198,17 @@ Status RunView(const ViewOptions& options) {
   const Result<std::string> self = OwnPath(), program = ProgramBeside(kGatewayProgram);
   if (!self.ok()) return self.status();
   if (!program.ok()) return program.status();
+  const Result<std::string> token = options.token_file.empty() ? Result<std::string>("") : KeptToken(options.token_file);
+  if (!token.ok()) return token.status();
   BlockStopSignals();
   std::optional<Helper> service;
   ServiceChoice choice = *named;
   if (file && choice.text().empty()) {
-    if (Status status = CheckInputVolume(options.source); !status.ok()) return status;
-    std::vector<std::string> command = {*self,       "up",
-                                        "--listen",  "tcp://127.0.0.1:*",
-                                        "--workers", std::to_string(WorkersForOneUser()),
-                                        "--data",    CatalogueEntry(options.source, options.layers)};
+    const std::string entry = CatalogueEntry(options.source, options.layers);
+    if (Status status = CheckEntry(options.source, entry); !status.ok()) return status;
+    std::vector<std::string> command = {
+        *self,    "up", "--unlisted", "--listen", fmt::format("tcp://{}:*", OwnHost()), "--workers", std::to_string(WorkersForOneUser()),
+        "--data", entry};
     AddCacheArgument(command, options.cache);
     Result<Helper> up = Helper::Start(std::move(command));
     if (!up.ok()) return up.status();
@@ -188,21 +218,23 @@ Status RunView(const ViewOptions& options) {
     choice.endpoint = *std::move(endpoint);
   } else if (file) {
     if (Status status = AddToService(choice, CatalogueEntry(options.source, options.layers)); !status.ok()) return status;
-  } else if (Status status = CheckDataset(choice, options.source); !status.ok()) {
+  } else if (Status status = FindDataset(choice, options.source); !status.ok()) {
     return status;
   }
   std::vector<std::string> command = {*program, "--listen", options.listen};
   if (!choice.endpoint.empty()) command.insert(command.end(), {"--endpoint", choice.endpoint});
   if (!choice.file.empty()) command.insert(command.end(), {"--service", choice.file});
+  if (!options.token_file.empty()) command.insert(command.end(), {"--token-file", options.token_file});
   Result<Helper> gateway = Helper::Start(std::move(command));
   if (!gateway.ok()) return gateway.status();
   const Result<std::string> line = gateway->child().ReadLine(kHelperStartTimeout);
   if (!line.ok()) return Status(line.status().code(), "the gateway did not start; see its error above");
   const std::string dataset = file ? ShownDataset(options.source) : options.source;
-  const std::string url =
-      fmt::format("{}&dataset={}{}{}", line->substr(line->find(' ') + 1), dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
-                  options.layers.overlay.empty() ? "" : "&overlay=1");
+  const std::string address = line->substr(line->find(' ') + 1), with_token = token->empty() ? address : address + "#token=" + *token;
+  const std::string url = fmt::format("{}&dataset={}{}{}", with_token, dataset, options.layers.labels.empty() ? "" : "&label-mode=tint",
+                                      options.layers.overlay.empty() ? "" : "&overlay=1");
   std::cout << fmt::format("{} is at {}\n", dataset, url);
+  if (file) TellOfPart(options.source);
   if (options.browser) {
     const Status opened = OpenBrowser(url);
     if (!opened.ok()) std::cout << fmt::format("No browser was opened, because {}: open this address in one.\n", opened.message());

@@ -22,9 +22,16 @@ constexpr double kAscender = 0.93, kCapital = 0.73, kDescender = 0.24;  // of le
 
 // How large everything is, in pixels.
 struct Scale {
-  explicit Scale(ImageSize size) {
+  Scale(const PictureFormat& format, ImageSize size) {
     const int shorter = std::min(size.width, size.height);
-    letters = std::max(std::min(std::max(int(std::lround(0.032 * shorter)), 11), shorter / 9), 1);
+    const std::optional<double> points = format.annotations.font_size;
+    if (points) {
+      constexpr double kPointsAnInch = 72;
+      const double wanted = *points * format.dots_per_inch.value_or(kUsualDotsPerInch) / kPointsAnInch;
+      letters = int(std::lround(std::clamp(wanted, 1.0, std::max(0.25 * shorter, 1.0))));
+    } else {
+      letters = std::max(std::min(std::max(int(std::lround(0.032 * shorter)), 11), shorter / 9), 1);
+    }
     halo = std::max(0.12 * letters, 1.5);
     margin = int(std::ceil(0.35 * letters + halo));
     line = std::max(0.11 * letters, 1.0);
@@ -35,22 +42,67 @@ struct Scale {
   double line = 1;  // width
 };
 
-struct Color {
-  float red, green, blue;
-};
-constexpr Color kWhite = {1, 1, 1};
-constexpr std::array<Color, 3> kAxisColors = {{{1, 0.35F, 0.3F}, {0.45F, 0.9F, 0.35F}, {0.45F, 0.65F, 1}}};  // x, y, z
+using AxisColors = std::array<MarkColor, 3>;  // x, y, z
+constexpr AxisColors kBrightAxes = {{{1, 0.35F, 0.3F}, {0.45F, 0.9F, 0.35F}, {0.45F, 0.65F, 1}}};
+constexpr AxisColors kDarkAxes = {{{0.75F, 0.1F, 0.1F}, {0, 0.45F, 0}, {0.1F, 0.25F, 0.85F}}};
 
-Ink Arrow(InkPoint from, InkPoint to, const Scale& scale) {
+// What marks are drawn with.
+struct Palette {
+  MarkColor letters = {1, 1, 1}, halo = {0, 0, 0};
+  AxisColors axes = kBrightAxes;
+};
+
+// Relative luminance, in [0, 1] (Web Content Accessibility Guidelines 2.1).
+double Luminance(const StraightColor& color) {
+  const auto linear = [](float code) { return code <= 0.04045F ? double(code) / 12.92 : std::pow((double(code) + 0.055) / 1.055, 2.4); };
+  return 0.2126 * linear(color.r) + 0.7152 * linear(color.g) + 0.0722 * linear(color.b);
+}
+
+Palette PaletteOn(const StraightColor& background) {
+  if (background.a < 1) return {};
+  // The contrasts with white and with black of these guidelines are equal here.
+  constexpr double kMiddle = 0.179;
+  const MarkColor ground = {background.r, background.g, background.b};
+  if (Luminance(background) < kMiddle) return {{1, 1, 1}, ground, kBrightAxes};
+  return {{0, 0, 0}, ground, kDarkAxes};
+}
+
+using Shape = decltype(Mark::shapes)::value_type;
+using Shapes = std::vector<Shape>;
+
+Shapes Arrow(InkPoint from, InkPoint to, const Scale& scale) {
   const double dx = to.x - from.x, dy = to.y - from.y, length = std::hypot(dx, dy);
   const double width = 1.6 * scale.line;
-  if (length < width) return StrokeInk(from, from, 2.4 * width);  // towards the viewer, or away
+  if (length < width) return {Stroke{from, from, 2.4 * width}};  // towards the viewer, or away
   const double head = std::min(0.65 * scale.letters, length), half = 0.5 * head;
   const InkPoint along = {dx / length, dy / length};
   const InkPoint neck = {to.x - head * along.x, to.y - head * along.y};
-  const std::array<InkPoint, 3> corners = {
-      to, {neck.x - half * along.y, neck.y + half * along.x}, {neck.x + half * along.y, neck.y - half * along.x}};
-  return Union(StrokeInk(from, neck, width), PolygonInk(corners));
+  return {Stroke{from, neck, width},
+          Polygon{{to, {neck.x - half * along.y, neck.y + half * along.x}, {neck.x + half * along.y, neck.y - half * along.x}}}};
+}
+
+InkPoint MovedRight(InkPoint point, int x) { return {point.x + x, point.y}; }
+Shape MovedRight(Shape shape, int x) {
+  const auto move = [x](auto& moved) {
+    if constexpr (requires { moved.corners; }) {
+      for (InkPoint& corner : moved.corners) corner = MovedRight(corner, x);
+    } else {
+      moved.begin = MovedRight(moved.begin, x);
+      if constexpr (requires { moved.end; }) moved.end = MovedRight(moved.end, x);
+    }
+  };
+  std::visit(move, shape);
+  return shape;
+}
+
+Result<Ink> InkOf(const Rectangle& shape) { return RectangleInk(shape.begin, shape.end); }
+Result<Ink> InkOf(const Stroke& shape) { return StrokeInk(shape.begin, shape.end, shape.width); }
+Result<Ink> InkOf(const Polygon& shape) { return PolygonInk(shape.corners); }
+Result<Ink> InkOf(const ColorRows& shape) { return RectangleInk(shape.begin, shape.end); }
+Result<Ink> InkOf(const TextLine& shape) {
+  Result<Ink> ink = TextInk(shape.text, shape.size);
+  if (!ink.ok()) return ink;
+  return Shifted(*std::move(ink), int(std::lround(shape.begin.x)), int(std::lround(shape.begin.y)));
 }
 
 // Where the label of each axis stands, seen from where the arrows begin: before the tip. That of an axis along the line of sight stands
@@ -71,14 +123,14 @@ std::array<InkPoint, 3> LabelPlaces(const std::array<ShownAxis, 3>& axes, double
   return places;
 }
 
-Color ColorOf(const Rgb& color) { return {color.r, color.g, color.b}; }
+MarkColor ColorOf(const Rgb& color) { return {color.r, color.g, color.b}; }
 
 // Draws the annotations of one picture, or of one of several side by side, each by one function.
 class Artist {
  public:
   // `left`: of this picture, in pixels of the whole.
-  Artist(ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale)
-      : size_(size), left_(left), geometry_(geometry), scale_(scale) {}
+  Artist(ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale, const Palette& palette)
+      : size_(size), left_(left), geometry_(geometry), scale_(scale), palette_(palette) {}
 
   // What others have drawn at the top and on the right, in pixels from the edges.
   void KeepClear(double top, double right) {
@@ -103,7 +155,7 @@ class Artist {
                                                {-geometry_.right, {0, y}},  // PutText keeps texts inside the picture
                                                {geometry_.right, {size_.width - right_, y}}};
     for (const auto& [direction, place] : sides) {
-      if (Status status = PutText(PatientSides(direction), place, kWhite, right_); !status.ok()) return status;
+      if (Status status = PutText(PatientSides(direction), place, palette_.letters, right_); !status.ok()) return status;
     }
     return Status::Ok();
   }
@@ -114,7 +166,7 @@ class Artist {
     const std::array<ShownAxis, 3> axes = ShownAxes(geometry_);
     const std::array<InkPoint, 3> places = LabelPlaces(axes, arrow, gap);
     for (std::size_t i = 0; i < 3; ++i) {
-      const Color color = kAxisColors[std::size_t(Number(axes[i].axis))];
+      const MarkColor color = palette_.axes[std::size_t(Number(axes[i].axis))];
       const InkPoint tip = {origin.x + arrow * axes[i].x, origin.y + arrow * axes[i].y};
       Put(Arrow(origin, tip, scale_), color);
       const InkPoint place = {origin.x + places[i].x, origin.y + places[i].y + 0.5 * kCapital * scale_.letters};
@@ -128,15 +180,16 @@ class Artist {
     if (!bar) return Status::Ok();
     const double end = size_.width - scale_.margin, begin = end - bar->pixels, thick = 2 * scale_.line, tick = 0.5 * scale_.letters;
     const double bottom = size_.height - scale_.margin, top = bottom - tick;
-    Ink ink = RectangleInk({begin, bottom - thick}, {end, bottom});
-    for (const double x : {begin, end - thick}) ink = Union(ink, RectangleInk({x, top}, {x + thick, bottom}));
-    Put(ink, kWhite);
+    Shapes shapes = {Rectangle{{begin, bottom - thick}, {end, bottom}}};
+    for (const double x : {begin, end - thick}) shapes.emplace_back(Rectangle{{x, top}, {x + thick, bottom}});
+    Put(std::move(shapes), palette_.letters);
     return PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
   }
 
   // Between the top and what may stand at the bottom: values upwards, with ticks to the left of the bar and the caption above it.
   Status DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
-    const double width = 0.8 * scale_.letters, right = size_.width - scale_.margin, left = right - width, tick = 0.3 * scale_.letters;
+    const double width = std::round(0.8 * scale_.letters), right = size_.width - scale_.margin, left = right - width,
+                 tick = 0.3 * scale_.letters;
     double top = top_ + 0.5 * scale_.letters;
     if (!caption.empty()) {
       top = top_ + kAscender * scale_.letters;
@@ -147,15 +200,16 @@ class Artist {
     const int rows = int(bottom - top);
     if (rows < 1) return Status::Ok();
     const TransferFunction colors{.colors = bar.colors, .opacities = {}};
-    PutHalo(RectangleInk({left, std::floor(top)}, {right, std::floor(top) + rows}));
+    const double first = std::floor(top);
+    ColorRows shown{{left, first}, {right, first + rows}, {}};
     for (int row = 0; row < rows; ++row) {
-      const double y = std::floor(top) + row, value = std::lerp(bar.high, bar.low, (row + 0.5) / rows);
-      PutPlain(RectangleInk({left, y}, {right, y + 1}), ColorOf(colors.Color(value)));
+      shown.colors.push_back(ColorOf(colors.Color(std::lerp(bar.high, bar.low, (row + 0.5) / rows))));
     }
+    Shapes lines = {Frame(shown.begin, shown.end)};
     int widest = 0;
     for (const double value : TicksOf(bar.low, bar.high)) {
-      const double y = std::floor(top) + rows * (bar.high - value) / (bar.high - bar.low);
-      Put(RectangleInk({left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}), kWhite);
+      const double y = first + rows * (bar.high - value) / (bar.high - bar.low);
+      lines.emplace_back(Rectangle{{left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}});
       const std::string text = fmt::format("{:.6g}", value);
       const Result<int> text_width = TextWidth(text, scale_.letters);
       if (!text_width.ok()) return text_width.status();
@@ -163,55 +217,68 @@ class Artist {
       const double x = left - 1.5 * tick - 0.5 * *text_width;
       if (Status status = PutText(text, {x, y + 0.5 * kCapital * scale_.letters}); !status.ok()) return status;
     }
+    Put(std::move(lines), palette_.letters);
+    PutPlain(std::move(shown), {});
     right_ = scale_.margin + width + 2 * tick + widest;
     return Status::Ok();
   }
 
   // One line each, as many as there is room for.
   Status DrawLegend(const std::vector<PictureKey::Entry>& entries) {
-    const double line = 1.35 * scale_.letters, swatch = 0.8 * scale_.letters, left = scale_.margin;
+    const double line = 1.35 * scale_.letters, swatch = std::round(0.8 * scale_.letters), left = scale_.margin;
     const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
     const std::size_t lines = std::max(std::size_t(std::max(room / line, 0.0)), std::size_t{1});
     const std::size_t shown = entries.size() <= lines ? entries.size() : lines - 1;
     double y = top_ + 0.2 * scale_.letters;
     const auto put = [&](const std::string& text, double x) { return PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
     for (std::size_t i = 0; i < shown; ++i, y += line) {
-      Put(RectangleInk({left, y + 0.1 * scale_.letters}, {left + swatch, y + 0.1 * scale_.letters + swatch}), ColorOf(entries[i].color));
+      const InkPoint begin = {left, std::round(y + 0.1 * scale_.letters)}, end = {begin.x + swatch, begin.y + swatch};
+      Put({Frame(begin, end)}, palette_.letters);
+      PutPlain(Rectangle{begin, end}, ColorOf(entries[i].color));
       if (Status status = put(entries[i].name, left + 1.4 * swatch); !status.ok()) return status;
     }
     return shown < entries.size() ? put(fmt::format("and {} more", entries.size() - shown), left) : Status::Ok();
   }
 
-  std::vector<ColoredInk> TakeLayers() { return std::move(layers_); }
+  std::vector<Mark> TakeMarks() { return std::move(marks_); }
 
  private:
-  // The ink on its halo.
-  void Put(const Ink& ink, Color color) {
-    PutHalo(ink);
-    PutPlain(ink, color);
+  // The shapes on their halo.
+  void Put(Shapes shapes, MarkColor color) {
+    for (Shape& shape : shapes) shape = MovedRight(std::move(shape), left_);
+    marks_.push_back({.shapes = std::move(shapes), .color = color, .halo = scale_.halo, .halo_color = palette_.halo});
   }
-  void PutHalo(const Ink& ink) { layers_.push_back({Shifted(Grown(ink, scale_.halo), left_, 0), 0, 0, 0, kHaloOpacity}); }
-  void PutPlain(const Ink& ink, Color color) { layers_.push_back({Shifted(ink, left_, 0), color.red, color.green, color.blue, 1}); }
+  void PutPlain(Shape shape, MarkColor color) {
+    marks_.push_back({.shapes = {MovedRight(std::move(shape), left_)}, .color = color, .halo_color = {}});
+  }
+  // A thin line round something, without which it would not show where it has the colour of the background.
+  Rectangle Frame(InkPoint begin, InkPoint end) const {
+    const double line = std::round(std::max(0.5 * scale_.line, 1.0));
+    return {{begin.x - line, begin.y - line}, {end.x + line, end.y + line}};
+  }
 
   // The text, with its baseline centred at `place`, but not beyond the picture's sides, and `right` pixels from the right one. One that is
   // too wide shrinks.
-  Status PutText(const std::string& text, InkPoint place, Color color = kWhite, double right = 0) {
-    const Result<std::pair<Ink, int>> fitted = Fitted(text);
-    if (!fitted.ok()) return fitted.status();
-    const auto& [ink, width] = *fitted;
-    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - width, least);
-    Put(Shifted(ink, std::clamp(int(std::lround(place.x - 0.5 * width)), least, most), int(std::lround(place.y))), color);
+  Status PutText(const std::string& text, InkPoint place, MarkColor color, double right = 0) {
+    Result<TextLine> line = Fitted(text);
+    if (!line.ok()) return line.status();
+    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - line->width, least);
+    line->begin = {double(std::clamp(int(std::lround(place.x - 0.5 * line->width)), least, most)), std::round(place.y)};
+    Put({*std::move(line)}, color);
     return Status::Ok();
   }
+  Status PutText(const std::string& text, InkPoint place) { return PutText(text, place, palette_.letters); }
   // Its baseline begins at `place`.
   Status PutTextFrom(const std::string& text, InkPoint place) {
-    const Result<std::pair<Ink, int>> fitted = Fitted(text);
-    if (fitted.ok()) Put(Shifted(fitted->first, int(std::lround(place.x)), int(std::lround(place.y))), kWhite);
-    return fitted.status();
+    Result<TextLine> line = Fitted(text);
+    if (!line.ok()) return line.status();
+    line->begin = {std::round(place.x), std::round(place.y)};
+    Put({*std::move(line)}, palette_.letters);
+    return Status::Ok();
   }
 
-  // The text's ink and width.
-  Result<std::pair<Ink, int>> Fitted(const std::string& text) const {
+  // The text with its size and width.
+  Result<TextLine> Fitted(const std::string& text) const {
     const int room = std::max(size_.width - 2 * scale_.margin, 1);
     int letters = scale_.letters;
     Result<int> width = TextWidth(text, letters);
@@ -220,18 +287,17 @@ class Artist {
       width = TextWidth(text, letters);
     }
     if (!width.ok()) return width.status();
-    Result<Ink> ink = TextInk(text, letters);
-    if (!ink.ok()) return ink.status();
-    return std::pair(*std::move(ink), *width);
+    return TextLine{.text = text, .size = letters, .begin = {}, .width = *width};
   }
 
   ImageSize size_;
   int left_;
   PictureGeometry geometry_;
   Scale scale_;
+  Palette palette_;
   double top_ = scale_.margin;  // of the room that is left
   double right_ = 0;            // what is taken of it
-  std::vector<ColoredInk> layers_;
+  std::vector<Mark> marks_;
 };
 
 }  // namespace
@@ -255,34 +321,54 @@ Status CheckTitle(std::string_view name, std::string_view title) {
 
 Status CheckCanDraw(const Annotations& annotations) { return annotations.any() ? AnnotationFont().status() : Status::Ok(); }
 
-Result<AnnotationLayers> AnnotationLayers::Draw(const Annotations& annotations, ImageSize size, std::span<const PictureGeometry> panes,
-                                                const PictureKey& key) {
+Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
+                                  const PictureKey& key) {
   CHECK(!panes.empty());
+  const Annotations& annotations = format.annotations;
   const ImageSize pane = {size.width / int(panes.size()), size.height};
-  const Scale scale(pane);
-  AnnotationLayers layers;
-  const auto keep = [&layers](std::vector<ColoredInk> more) { std::ranges::move(more, std::back_inserter(layers.layers_)); };
+  const Scale scale(format, pane);
+  const Palette palette = PaletteOn(format.background);
+  std::vector<Mark> marks;
+  const auto keep = [&marks](std::vector<Mark> more) { std::ranges::move(more, std::back_inserter(marks)); };
 
-  Artist whole(size, 0, panes.front(), scale);
+  Artist whole(size, 0, panes.front(), scale, palette);
   Status status;
   if (!annotations.title.empty()) status = whole.DrawTitle(annotations.title);
   if (status.ok() && annotations.color_bar && key.bar) status = whole.DrawColorBar(*key.bar, *annotations.color_bar);
   if (status.ok() && annotations.legend && !key.entries.empty()) status = whole.DrawLegend(key.entries);
   if (!status.ok()) return status;
-  keep(whole.TakeLayers());
+  keep(whole.TakeMarks());
 
   for (std::size_t i = 0; i < panes.size(); ++i) {
     const PictureGeometry& geometry = panes[i];
-    Artist artist(pane, int(i) * pane.width, geometry, scale);
+    Artist artist(pane, int(i) * pane.width, geometry, scale, palette);
     artist.KeepClear(whole.top(), i + 1 == panes.size() ? whole.right() : 0);
     const bool sides = annotations.orientation_marker && geometry.world == World::kPatient;
     if (sides) status = artist.DrawSides();
     if (status.ok() && annotations.orientation_marker && !(sides && annotations.sides_only)) status = artist.DrawAxes();
     if (status.ok() && annotations.scale_bar) status = artist.DrawScaleBar();
     if (!status.ok()) return status;
-    keep(artist.TakeLayers());
+    keep(artist.TakeMarks());
   }
-  return layers;
+  return marks;
+}
+
+Result<AnnotationLayers> AnnotationLayers::Draw(const std::vector<Mark>& marks) {
+  AnnotationLayers drawn;
+  for (const Mark& mark : marks) {
+    std::optional<Ink> ink;
+    std::vector<MarkColor> colors = {mark.color};
+    for (const Shape& shape : mark.shapes) {
+      Result<Ink> more = std::visit([](const auto& s) { return InkOf(s); }, shape);
+      if (!more.ok()) return more.status();
+      ink = ink ? Union(*ink, *more) : *std::move(more);
+      if (const auto* rows = std::get_if<ColorRows>(&shape)) colors = rows->colors;
+    }
+    if (!ink) continue;
+    if (mark.halo > 0) drawn.layers_.push_back({Grown(*ink, mark.halo), {mark.halo_color}, kHaloOpacity});
+    drawn.layers_.push_back({*std::move(ink), std::move(colors), 1});
+  }
+  return drawn;
 }
 
 void AnnotationLayers::PutOver(int y, std::span<float> rgba) const {
@@ -291,12 +377,13 @@ void AnnotationLayers::PutOver(int y, std::span<float> rgba) const {
     const PixelBounds& b = layer.ink.bounds;
     if (y < b.y_begin || y >= b.y_end) continue;
     const float* row = &layer.ink.coverage[std::size_t(y - b.y_begin) * std::size_t(b.width())];
+    const MarkColor color = layer.colors[layer.colors.size() == 1 ? 0 : std::size_t(y - b.y_begin)];
     for (std::int32_t x = std::max(b.x_begin, 0); x < std::min(b.x_end, width); ++x) {
       const float alpha = layer.opacity * row[x - b.x_begin];
       if (alpha == 0) continue;
-      const float front[4] = {alpha * layer.red, alpha * layer.green, alpha * layer.blue, alpha};
+      const float front[4] = {color.red, color.green, color.blue, 1};
       float* out = &rgba[4 * std::size_t(x)];
-      for (int c = 0; c < 4; ++c) out[c] = front[c] + (1 - alpha) * out[c];
+      for (int c = 0; c < 4; ++c) out[c] = alpha == 1 ? front[c] : out[c] + alpha * (front[c] - out[c]);  // exact on the same colour, too
     }
   }
 }

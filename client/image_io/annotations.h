@@ -8,18 +8,21 @@
 //
 // Where several pictures stand side by side (slices), each has sides, axes and a scale bar of its own.
 //
-// Letters are about 1/31 of the picture's shorter side high, but not below 11 pixels unless the picture is tiny. All have a dark halo, so
-// that they can be read on any background.
+// Letters are as high as Annotations::font_size says, or else about 1/31 of the picture's shorter side, but not below 11 pixels unless the
+// picture is tiny. They are black or white, whichever is easier to read on the background. A halo of the background's own colour surrounds
+// them, which shows where the picture lies behind them and nowhere else. On a background that lets something through, which may have any
+// colour, they are white with a dark halo.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "client/image_io/ink.h"
+#include "client/image_io/picture_format.h"
 #include "client/image_io/picture_key.h"
+#include "client/picture_encoder/mark.h"
 #include "common/base/status.h"
 #include "common/view/picture_geometry.h"
 
@@ -27,36 +30,27 @@ namespace slabstream {
 
 inline constexpr int kMaxTitleCharacters = 120;
 
-struct Annotations {
-  bool scale_bar = false;
-  bool orientation_marker = false;  // the axes of the world; of patients also the letters of the sides
-  bool sides_only = false;          // of patients the letters without the axes, as is usual in slices
-  std::string title;                // empty: none
-  // What the picture's key says (PictureKey); a key that has nothing of it leaves them out.
-  std::optional<std::string> color_bar;  // its caption, such as a unit; "": none
-  bool legend = false;
-
-  bool any() const { return scale_bar || orientation_marker || !title.empty() || needs_key(); }
-  bool needs_key() const { return color_bar || legend; }
-  friend bool operator==(const Annotations&, const Annotations&) = default;
-};
-
 // One line of UTF-8 without control characters, at most kMaxTitleCharacters. InvalidArgument: what it is instead, after `name`.
 Status CheckTitle(std::string_view name, std::string_view title);
 // For a message before the work begins. NotFound: the font (AnnotationFont).
 Status CheckCanDraw(const Annotations& annotations);
 
+// What is drawn onto a picture of this format, the last one on top. Title and caption have passed CheckTitle. `panes`: of the pictures side
+// by side, of equal widths, at least one. Errors as TextWidth.
+Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
+                                  const PictureKey& key = {});
+
 struct ColoredInk {
   Ink ink;
-  float red = 0, green = 0, blue = 0, opacity = 1;  // straight
+  std::vector<MarkColor> colors;  // one, or one for each row of the ink
+  float opacity = 1;
 };
 
 // The annotations of one picture, drawn. Takes memory for the pixels that they touch.
 class AnnotationLayers {
  public:
-  // Title and caption have passed CheckTitle. `panes`: of the pictures side by side, of equal widths, at least one. Errors as TextInk.
-  static Result<AnnotationLayers> Draw(const Annotations& annotations, ImageSize size, std::span<const PictureGeometry> panes,
-                                       const PictureKey& key = {});
+  // Errors as TextInk.
+  static Result<AnnotationLayers> Draw(const std::vector<Mark>& marks);
 
   // Puts row y of the annotations over that of the picture: premultiplied RGBA.
   void PutOver(int y, std::span<float> rgba) const;

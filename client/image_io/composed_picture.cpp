@@ -9,14 +9,22 @@
 
 namespace slabstream {
 
-bool HoldsStraight8(const PictureFormat& format) { return format.png_bits == 8 && format.background.a == 0 && !format.annotations.any(); }
-
 Result<ComposedPicture> ComposedPicture::Make(const PictureImage& image, ImageSize size, const PictureFormat& format,
                                               std::span<const PictureGeometry> panes, const PictureKey& key) {
-  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds())));
-  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(format.annotations, size, panes, key);
+  const Result<std::vector<Mark>> marks = MarksOf(format, size, panes, key);
+  if (!marks.ok()) return marks.status();
+  Result<AnnotationLayers> annotations = AnnotationLayers::Draw(*marks);
   if (!annotations.ok()) return annotations.status();
   return ComposedPicture(image, size, format.background, *std::move(annotations));
+}
+
+ComposedPicture ComposedPicture::WithoutAnnotations(const PictureImage& image, ImageSize size, const PictureFormat& format) {
+  return {image, size, format.background, {}};
+}
+
+ComposedPicture::ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
+    : image_(&image), size_(size), background_(background), annotations_(std::move(annotations)) {
+  CHECK((PixelBounds{0, 0, size.width, size.height}.Contains(image.bounds())));
 }
 
 void ComposedPicture::Row(int y, std::span<float> rgba, std::span<float> depth) const {

@@ -4,29 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "client/image_io/annotations.h"
+#include "client/image_io/picture_format.h"
 #include "common/base/status.h"
 #include "common/image/picture_image.h"
 #include "common/view/picture_geometry.h"
 
 namespace slabstream {
-
-struct StraightColor {
-  float r = 0, g = 0, b = 0, a = 0;  // each in [0, 1]
-  friend bool operator==(const StraightColor&, const StraightColor&) = default;
-};
-
-struct PictureFormat {
-  int png_bits = 8;          // 8 or 16; EXR is always float, frames of movies have 8
-  StraightColor background;  // put behind the picture; the default leaves it as it is
-  Annotations annotations;   // drawn onto it
-};
-
-// Whether PNGs of this format hold the codes of the picture itself, so that a picture in these codes (FrameRequest::straight8) is enough.
-bool HoldsStraight8(const PictureFormat& format);
 
 // Rows are made one by one, so that no second copy of the picture is needed. Any thread.
 class ComposedPicture {
@@ -40,6 +26,9 @@ class ComposedPicture {
     return Make(image, size, format, {&geometry, 1}, key);
   }
 
+  // The same without annotations, for files that keep them as marks (MarksOf). `image` must outlive this.
+  static ComposedPicture WithoutAnnotations(const PictureImage& image, ImageSize size, const PictureFormat& format);
+
   ImageSize size() const { return size_; }
   bool has_depth() const { return image_->has_depth(); }
 
@@ -51,8 +40,7 @@ class ComposedPicture {
   void StraightRow(int y, std::span<std::uint16_t> codes) const;
 
  private:
-  ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations)
-      : image_(&image), size_(size), background_(background), annotations_(std::move(annotations)) {}
+  ComposedPicture(const PictureImage& image, ImageSize size, const StraightColor& background, AnnotationLayers annotations);
 
   template <class Code>
   void CodeRow(int y, std::span<Code> codes) const;

@@ -4,15 +4,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
-#include <filesystem>
+#include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "client/image_io/composed_picture.h"
+#include "client/image_io/ink.h"
 #include "client/picture_encoder/picture_encoder.h"
 #include "common/base/check.h"
 #include "common/base/files.h"
@@ -21,17 +22,9 @@
 namespace slabstream {
 namespace {
 
-enum class FileType { kPng, kExr, kOther };
-
-FileType TypeOf(const std::string& path) {
-  std::string ending = std::filesystem::path(path).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-  return ending == ".png" ? FileType::kPng : ending == ".exr" ? FileType::kExr : FileType::kOther;
-}
-
 // Calls write(y, row) for each row, in the file's own sample layout. Stops at the first failure.
 template <class Code>
-bool WritePngRows(const ComposedPicture& picture, const PictureEncoder::WriteRow& write) {
+bool WriteStraightRows(const ComposedPicture& picture, const PictureEncoder::WriteRow& write) {
   const auto width = std::size_t(picture.size().width);
   std::vector<Code> codes(4 * width);
   for (int y = 0; y < picture.size().height; ++y) {
@@ -60,51 +53,88 @@ std::span<const PictureGeometry> PanesOf(const PictureNotes& notes) {
   return notes.panes.empty() ? std::span(&notes.geometry, 1) : std::span(notes.panes);
 }
 
-// PNG: in pixels a metre; OpenImageIO cuts what it calculates off to whole ones, so they are rounded here. EXR: in pixels an inch. nullopt:
-// pixels do not all have the same size, or none that is known.
-std::optional<double> PixelDensity(const PictureGeometry& geometry, bool png) {
+// In pixels a metre. nullopt: nobody asked for one, and pixels do not all have the same size, or none that is known.
+std::optional<double> PixelDensity(const PictureGeometry& geometry, const PictureFormat& format, PictureFileType type) {
+  if (format.dots_per_inch) return *format.dots_per_inch / kMetresAnInch;
   if (geometry.unit != LengthUnit::kMillimetre || geometry.projection == Projection::kPerspective) return std::nullopt;
-  constexpr double kMillimetresAMetre = 1000, kMillimetresAnInch = 25.4;
+  if (type == PictureFileType::kPdf || type == PictureFileType::kSvg) return std::nullopt;  // pages are no patients
+  constexpr double kMillimetresAMetre = 1000;
   constexpr double kMost = 1 << 24;  // whole numbers up to this have floats of their own
-  const double density = png ? std::round(kMillimetresAMetre / geometry.pixel_size) : kMillimetresAnInch / geometry.pixel_size;
-  if (!(density >= (png ? 1 : 1 / kMost) && density <= kMost)) return std::nullopt;
-  return density;
+  const double density = kMillimetresAMetre / geometry.pixel_size;
+  if (type == PictureFileType::kPng) return std::round(density) >= 1 && density <= kMost ? std::optional(density) : std::nullopt;
+  const double per_inch = density * kMetresAnInch;
+  return per_inch >= 1 / kMost && per_inch <= kMost ? std::optional(density) : std::nullopt;
 }
 
-// Loads the module at the first call. It lies beside the program or where programs are installed (CMAKE_BUILD_RPATH).
-Result<const PictureEncoder*> FindEncoder() {
-  static const Result<const PictureEncoder*> encoder = []() -> Result<const PictureEncoder*> {
+// What the module exports. The first call loads it. It lies beside the program or where programs are installed (CMAKE_BUILD_RPATH).
+Result<void*> ModuleEntry() {
+  static const Result<void*> loaded = []() -> Result<void*> {
     void* const module = dlopen("libslabstream-pictures.so", RTLD_NOW | RTLD_LOCAL);
     void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
     if (entry == nullptr) {
-      return Status::Unavailable(fmt::format(
-          "pictures cannot be written: {} (libslabstream-pictures.so belongs beside the program and needs libopenimageio2.4)", dlerror()));
+      return Status::Unavailable(
+          fmt::format("only .png, .jpg and .webp can be written: {} (libslabstream-pictures.so belongs beside the "
+                      "program and needs libopenimageio2.4 and libcairo2)",
+                      dlerror()));
     }
-    return reinterpret_cast<PictureEncoderEntry>(entry)();
+    return entry;
   }();
-  return encoder;
+  return loaded;
+}
+
+Result<const PictureEncoder*> FindEncoder(PictureFileType type) {
+  if (const PictureEncoder* own = OwnPictureEncoder(type)) return own;
+  const Result<void*> entry = ModuleEntry();
+  if (!entry.ok()) return entry.status();
+  return reinterpret_cast<PictureEncoderEntry>(*entry)(type);
+}
+
+// A picture that is ready to be encoded.
+struct Prepared {
+  ComposedPicture picture;
+  EncodedFormat encoded;
+  std::vector<Mark> marks;  // those of `encoded`
+};
+
+// Errors of PictureFile but those of CheckPictureSize.
+Result<Prepared> Prepare(PictureFileType type, const PictureImage& image, ImageSize size, PictureFormat format, const PictureNotes& notes) {
+  CHECK(format.png_bits == 8 || format.png_bits == 16);
+  if (type == PictureFileType::kJpeg) format = WithoutTransparency(format);
+  EncodedFormat encoded{.type = type,
+                        .width = size.width,
+                        .height = size.height,
+                        .bits = type == PictureFileType::kPng || type == PictureFileType::kTiff ? format.png_bits : 8,
+                        .with_depth = type == PictureFileType::kExr && image.has_depth(),
+                        .quality = format.quality,
+                        .density = PixelDensity(notes.geometry, format, type),
+                        .software = fmt::format("slabstream {}", Version()),
+                        .record_name = kRecordName,
+                        .record = notes.record};
+  if (type == PictureFileType::kPdf || type == PictureFileType::kSvg) {
+    Result<std::vector<Mark>> marks = MarksOf(format, size, PanesOf(notes), notes.key);
+    if (!marks.ok()) return marks.status();
+    if (!marks->empty()) {
+      Result<std::string> font = AnnotationFont();
+      if (!font.ok()) return font.status();
+      encoded.font = *std::move(font);
+    }
+    Prepared prepared{ComposedPicture::WithoutAnnotations(image, size, format), std::move(encoded), *std::move(marks)};
+    prepared.encoded.marks = prepared.marks;
+    return prepared;
+  }
+  Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
+  if (!picture.ok()) return picture.status();
+  return Prepared{*std::move(picture), std::move(encoded), {}};
 }
 
 // nullopt: done; else the encoder's reason.
-std::optional<std::string> Encode(const ComposedPicture& picture, const PictureFormat& format, const PictureNotes& notes, bool png,
-                                  const PictureEncoder::WriteBytes& write) {
-  CHECK(format.png_bits == 8 || format.png_bits == 16);
-  const Result<const PictureEncoder*> encoder = FindEncoder();
-  if (!encoder.ok()) return encoder.status().message();
-  const EncodedFormat encoded{.png = png,
-                              .width = picture.size().width,
-                              .height = picture.size().height,
-                              .bits = format.png_bits,
-                              .with_depth = !png && picture.has_depth(),
-                              .density = PixelDensity(notes.geometry, png),
-                              .software = fmt::format("slabstream {}", Version()),
-                              .record_name = kRecordName,
-                              .record = notes.record};
+std::optional<std::string> Encode(const Prepared& prepared, const PictureEncoder& encoder, const PictureEncoder::WriteBytes& write) {
   const auto rows = [&](const PictureEncoder::WriteRow& write_row) {
-    if (!png) return WriteExrRows(picture, write_row);
-    return format.png_bits == 8 ? WritePngRows<std::uint8_t>(picture, write_row) : WritePngRows<std::uint16_t>(picture, write_row);
+    if (prepared.encoded.type == PictureFileType::kExr) return WriteExrRows(prepared.picture, write_row);
+    return prepared.encoded.bits == 8 ? WriteStraightRows<std::uint8_t>(prepared.picture, write_row)
+                                      : WriteStraightRows<std::uint16_t>(prepared.picture, write_row);
   };
-  return (*encoder)->Encode(encoded, rows, write);
+  return encoder.Encode(prepared.encoded, rows, write);
 }
 
 std::string FirstLine(const std::string& reason) {
@@ -115,24 +145,22 @@ std::string FirstLine(const std::string& reason) {
 }  // namespace
 
 bool FileHoldsStraight8(const std::string& path, const PictureFormat& format) {
-  return TypeOf(path) == FileType::kPng && HoldsStraight8(format);
-}
-
-Status CheckPicturePath(const std::string& path) {
-  if (TypeOf(path) != FileType::kOther) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("output '{}' must end in .png or .exr", path));
+  return PictureFileTypeOf(path) == PictureFileType::kPng && HoldsStraight8(format);
 }
 
 Status CheckCanWritePicture(const std::string& path) {
   const Status status = CheckPicturePath(path);
-  return status.ok() ? FindEncoder().status() : status;
+  return status.ok() ? FindEncoder(*PictureFileTypeOf(path)).status() : status;
 }
 
 Status WritePicture(const PictureImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes) {
-  if (Status status = CheckPicturePath(path); !status.ok()) return status;
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
-  if (!picture.ok()) return picture.status();
+  if (Status status = CheckPictureFile(path, size); !status.ok()) return status;
+  const PictureFileType type = *PictureFileTypeOf(path);
+  const Result<const PictureEncoder*> encoder = FindEncoder(type);
+  if (!encoder.ok()) return encoder.status();
+  const Result<Prepared> prepared = Prepare(type, image, size, format, notes);
+  if (!prepared.ok()) return prepared.status();
   Result<OutputFile> file = OutputFile::Create(path);
   if (!file.ok()) return file.status();
   // OutputFile reports failures, because encoders do so unreliably.
@@ -140,23 +168,27 @@ Status WritePicture(const PictureImage& image, ImageSize size, const std::string
     file->WriteAt(offset, bytes);
     return file->ok();
   };
-  const std::optional<std::string> failure = Encode(*picture, format, notes, TypeOf(path) == FileType::kPng, write);
+  const std::optional<std::string> failure = Encode(*prepared, **encoder, write);
   if (!failure) return file->Finish();
   if (Status status = file->Close(); !status.ok()) return status;  // reports a full disk rather than the encoder's message about it
   return Status::Unavailable(fmt::format("cannot write '{}': {}", path, FirstLine(*failure)));
 }
 
-Result<std::vector<std::byte>> PngFile(const PictureImage& image, ImageSize size, const PictureFormat& format, const PictureNotes& notes) {
-  const Result<ComposedPicture> picture = ComposedPicture::Make(image, size, format, PanesOf(notes), notes.key);
-  if (!picture.ok()) return picture.status();
+Result<std::vector<std::byte>> PictureFile(PictureFileType type, const PictureImage& image, ImageSize size, const PictureFormat& format,
+                                           const PictureNotes& notes) {
+  if (Status status = CheckPictureSize(type, size); !status.ok()) return status;
+  const Result<const PictureEncoder*> encoder = FindEncoder(type);
+  if (!encoder.ok()) return encoder.status();
+  const Result<Prepared> prepared = Prepare(type, image, size, format, notes);
+  if (!prepared.ok()) return prepared.status();
   std::vector<std::byte> file;
   const auto write = [&](std::int64_t offset, std::span<const std::byte> bytes) {
     file.resize(std::max(file.size(), std::size_t(offset) + bytes.size()));
     std::ranges::copy(bytes, file.begin() + offset);
     return true;
   };
-  if (const auto failure = Encode(*picture, format, notes, true, write)) {
-    return Status::Internal(fmt::format("cannot encode a PNG: {}", FirstLine(*failure)));
+  if (const auto failure = Encode(*prepared, **encoder, write)) {
+    return Status::Internal(fmt::format("cannot encode the picture: {}", FirstLine(*failure)));
   }
   return file;
 }

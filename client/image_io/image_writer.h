@@ -1,10 +1,12 @@
-// Writes pictures to files, by the encoder of picture_encoder.h.
+// Writes pictures to files, by the encoders of picture_encoder.h.
 //
-// PNG: straight alpha, 8 or 16 bit, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer curve.
-// EXR: premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth.
-// The file states the size of its pixels (PNG: chunk pHYs; EXR: xDensity)
-// if that is one length all over the picture and its unit is known: for orthographic pictures of patients.
-// The file appears whole or not at all (common/base/files.h).
+// PNG, TIFF, WebP, PDF and SVG: straight alpha, row 0 at the top; code = round(max * clamp(straight value, 0, 1)), without a transfer
+// curve, of 8 bits or in PNG and TIFF also of 16. JPEG: the same of 8 bits, over black as far as the picture is transparent. EXR:
+// premultiplied linear float R, G, B, A, and Z (camera depth, +infinity where nothing is seen) for images that have depth. The file states
+// the pixels an inch that PictureFormat says; without them the size of its pixels in the world, if that is one length all over the picture
+// and its unit is known: for orthographic pictures of patients. (PNG: chunk pHYs; JPEG: JFIF and Exif; WebP: Exif; TIFF: XResolution; EXR:
+// xDensity.) The page of a PDF or SVG has the size that follows from the pixels an inch, or else 72 of them. The file appears whole or not
+// at all (common/base/files.h).
 #pragma once
 
 #include <cstddef>
@@ -13,6 +15,7 @@
 #include <vector>
 
 #include "client/image_io/composed_picture.h"
+#include "client/image_io/picture_file_type.h"
 #include "common/base/status.h"
 #include "common/image/picture_image.h"
 #include "common/view/picture_geometry.h"
@@ -31,21 +34,18 @@ inline constexpr char kRecordName[] = "slabstream";
 // Whether this file is a PNG that holds the codes of the picture itself: HoldsStraight8 of its format.
 bool FileHoldsStraight8(const std::string& path, const PictureFormat& format);
 
-// InvalidArgument, naming the path and the known endings, unless `path` ends in .png or .exr (any case).
-Status CheckPicturePath(const std::string& path);
-
-// The same, and Unavailable if libslabstream-pictures.so (picture_encoder.h) or a library that it needs is missing. To be called before the
-// picture is made.
+// For a message before the work begins: loads libslabstream-pictures.so if such a file needs it (picture_encoder.h), which takes a while.
+// Errors of CheckPicturePath; Unavailable: the module or a library that it needs is missing.
 Status CheckCanWritePicture(const std::string& path);
 
-// The bounds of `image` lie within `size`. Both formats are written row by row, so that writing
-// needs no second copy of the picture. InvalidArgument: the path's ending. Unavailable: cannot be written; the message names the path.
-// NotFound: the font of annotations.
+// The bounds of `image` lie within `size`. Most formats are written row by row, so that writing needs no second copy of the picture.
+// InvalidArgument: CheckPictureFile. Unavailable: cannot be written; the message names the path. NotFound: the font of annotations.
 Status WritePicture(const PictureImage& image, ImageSize size, const std::string& path, const PictureFormat& format,
                     const PictureNotes& notes = {});
 
-// The bytes of the .png file that WritePicture would write. NotFound: the font of annotations.
-Result<std::vector<std::byte>> PngFile(const PictureImage& image, ImageSize size, const PictureFormat& format,
-                                       const PictureNotes& notes = {});
+// The bytes of the file that WritePicture would write. InvalidArgument: CheckPictureSize. NotFound: the font of annotations. Unavailable:
+// as CheckCanWritePicture.
+Result<std::vector<std::byte>> PictureFile(PictureFileType type, const PictureImage& image, ImageSize size, const PictureFormat& format,
+                                           const PictureNotes& notes = {});
 
 }  // namespace slabstream

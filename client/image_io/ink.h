@@ -1,21 +1,17 @@
 // Ink: the shapes and letters that annotations are drawn with, as coverage of pixels. Anti-aliased: the coverage of a pixel is the share of
 // it that a shape covers, or close to that at slanted edges.
-//
-// Positions are in pixels of the picture, x to the right and y downwards; pixel (column, row) fills [column, column + 1) x [row, row + 1).
+// Positions are those of marks (client/picture_encoder/mark.h).
 #pragma once
 
 #include <span>
 #include <string>
 #include <vector>
 
+#include "client/picture_encoder/mark.h"
 #include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
 
 namespace slabstream {
-
-struct InkPoint {
-  double x = 0, y = 0;
-};
 
 struct Ink {
   PixelBounds bounds;           // may reach beyond the picture; outside of it there is no ink

@@ -190,7 +190,10 @@ Status ReadHeader(std::string_view bytes, PictureHeader& header) {
 
 }  // namespace
 
-bool IsPicturePath(const std::string& path) { return CheckPicturePath(path).ok(); }
+bool IsPicturePath(const std::string& path) {
+  const std::optional<PictureFileType> type = PictureFileTypeOf(path);
+  return type == PictureFileType::kPng || type == PictureFileType::kExr;
+}
 
 Result<PictureHeader> ReadPictureHeader(const std::string& path) {
   std::error_code error;

@@ -7,6 +7,7 @@ namespace slabstream {
 
 inline constexpr int kMaxTurntableFrames = 100000;
 inline constexpr int kMaxTurns = 1000;
+inline constexpr char kPathHelp[] = "Move through the cameras of a JSON list instead of turning: docs/movies.md";
 inline constexpr char kTurnsHelp[] = "Number of full turns; 0: the view is fixed";
 inline constexpr char kFramesPerSecondHelp[] = "Frames per second of a movie";
 

@@ -1,6 +1,8 @@
-// PictureEncoder: rows of pixels to the bytes of a PNG or EXR file. The only one uses OpenImageIO. It lies in a module of its own,
-// libslabstream-pictures.so, which is loaded when the first picture is encoded: OpenImageIO brings 200 other libraries, and a program that
-// loads them when it starts takes 0.2 s of processor time for it.
+// PictureEncoder: rows of pixels to the bytes of a picture's file.
+//
+// PNG, JPEG and WebP are written by libraries that programs load anyway. The others are written by a module of its own,
+// libslabstream-pictures.so: EXR and TIFF by OpenImageIO, PDF and SVG by cairo. It is loaded when it is needed: OpenImageIO brings 200
+// other libraries, and loading them takes 0.2 s of processor time.
 #pragma once
 
 #include <cstddef>
@@ -10,34 +12,51 @@
 #include <span>
 #include <string>
 
+#include "client/picture_encoder/mark.h"
+
 namespace slabstream {
 
+inline constexpr double kMetresAnInch = 0.0254;
+
+enum class PictureFileType { kPng, kJpeg, kWebp, kTiff, kExr, kPdf, kSvg };
+
 struct EncodedFormat {
-  bool png = true;  // else EXR
+  PictureFileType type = PictureFileType::kPng;
   int width = 0, height = 0;
-  int bits = 8;                               // of a PNG's samples: 8 or 16. EXR has floats
+  int bits = 8;                               // of the samples of PNG and TIFF: 8 or 16. EXR has floats, the others have 8 bits
   bool with_depth = false;                    // of an EXR: Z follows R, G, B and A
-  std::optional<double> density;              // pixels a metre (PNG) or an inch (EXR)
+  int quality = 90;                           // of JPEG and WebP, [1, 100]
+  std::optional<double> density;              // pixels a metre
   std::string software, record_name, record;  // texts for the file's header; an empty record: none of them
+  // Of PDF and SVG, over the pixels; in other formats the pixels hold them.
+  std::span<const Mark> marks = {};
+  std::string font;  // the file of the letters; only with marks
 };
 
 class PictureEncoder {
  public:
   // Takes bytes of the file, in any order. False: it cannot, and is not called again.
   using WriteBytes = std::function<bool(std::int64_t offset, std::span<const std::byte> bytes)>;
-  // Takes row y, of samples in the file's own layout. False: the encoder has failed.
+  // Takes row y. False: the encoder has failed. Samples of a pixel: R, G, B, A with straight alpha, of EncodedFormat::bits; JPEG: R, G, B
+  // and one that does not count, of 8 bits; EXR: premultiplied floats R, G, B, A and perhaps Z.
   using WriteRow = std::function<bool(int y, const void* row)>;
+  // Passes on all rows from 0 and returns false as soon as one fails, or if it gives up.
+  using Rows = std::function<bool(const WriteRow&)>;
 
-  // Calls `rows` once, which passes on all rows from 0 and returns false as soon as one fails. nullopt: done; else the reason.
-  virtual std::optional<std::string> Encode(const EncodedFormat& format, const std::function<bool(const WriteRow&)>& rows,
-                                            const WriteBytes& write) const = 0;
+  // Calls `rows` once. nullopt: done; else the reason. std::bad_alloc: there is no memory left.
+  virtual std::optional<std::string> Encode(const EncodedFormat& format, const Rows& rows, const WriteBytes& write) const = 0;
 
  protected:
   ~PictureEncoder() = default;
 };
 
-// What the module exports, as kPictureEncoderEntry.
-using PictureEncoderEntry = const PictureEncoder* (*)();
+// Of PNG, JPEG and WebP; of the other types null. Any thread.
+const PictureEncoder* OwnPictureEncoder(PictureFileType type);
+
+// What the module exports, as kPictureEncoderEntry, for the other types.
+using PictureEncoderEntry = const PictureEncoder* (*)(PictureFileType type);
 inline constexpr char kPictureEncoderEntry[] = "SlabstreamPictureEncoder";
+
+inline constexpr char kBytesNotTaken[] = "the bytes were not taken";  // a reason
 
 }  // namespace slabstream

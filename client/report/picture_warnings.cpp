@@ -73,6 +73,7 @@ std::string EmptyWarning(const FrameRequest& frame, const SummaryReply& summary)
   });
   const std::string run = fmt::format("the volume's values run from {:g} to {:g}", least, most);
   if (!surfaces && MaxOpacity(summary.transfer, double(least), double(most)) == 0) {
+    if (least == most) return fmt::format("the picture is empty: all values of the volume are {:g}", least);
     if (!summary.transfer.isosurfaces.empty()) return "the picture is empty: no surface of --isovalue lies in the volume; " + run;
     return fmt::format("the picture is empty: the transfer function {}, but {}", VisibleText(summary.transfer), run);
   }

@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/report/dataset_text.h"
+#include "common/base/printable.h"
+#include "common/transport/keys.h"
 #include "common/volume/memory_budget.h"
 
 namespace slabstream {
@@ -45,6 +47,31 @@ std::string StatusText(const StatusReply& reply) {
     text += '\n';
   }
   return text;
+}
+
+std::string HeardText(const AdmittedKey& key) {
+  return key.silent_ms ? fmt::format("heard {:.1f} s ago", double(*key.silent_ms) / 1e3) : "not heard since the service began";
+}
+
+std::string KeysText(const std::vector<AdmittedKey>& keys) {
+  std::string text = fmt::format("keys         {}\n", keys.size());
+  for (const AdmittedKey& key : keys) {
+    text +=
+        fmt::format("  {} {}, {}\n", key.name.empty() ? IdOfKey(key.public_key) : Printable(key.name), NameOf(key.role), HeardText(key));
+  }
+  return text;
+}
+
+Json KeysJson(const std::vector<AdmittedKey>& keys) {
+  Json json = Json::array();
+  for (const AdmittedKey& key : keys) {
+    json.push_back({{"id", IdOfKey(key.public_key)},
+                    {"role", NameOf(key.role)},
+                    {"made", key.made},
+                    {"name", key.name},
+                    {"silent_ms", key.silent_ms ? Json(*key.silent_ms) : Json(nullptr)}});
+  }
+  return json;
 }
 
 Json StatusJson(const StatusReply& reply) {

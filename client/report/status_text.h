@@ -3,6 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "common/wire/client_messages.h"
 
@@ -10,5 +11,10 @@ namespace slabstream {
 
 std::string StatusText(const StatusReply& reply);  // several lines
 nlohmann::ordered_json StatusJson(const StatusReply& reply);
+
+// The keys of the service, for its admins: who has one, and when it was heard last.
+std::string HeardText(const AdmittedKey& key);                          // "heard 3.2 s ago"
+std::string KeysText(const std::vector<AdmittedKey>& keys);             // several lines
+nlohmann::ordered_json KeysJson(const std::vector<AdmittedKey>& keys);  // [{"id", "role", "made", "name", "silent_ms"}, ...]
 
 }  // namespace slabstream

@@ -8,7 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/report/value_text.h"
 #include "common/base/printable.h"
+#include "common/view/picture_geometry.h"
 #include "common/volume/exact_value.h"
 
 namespace slabstream {
@@ -34,10 +36,27 @@ Json ValueJson(const VolumeSample& sample) {
   return OrNull(sample.value);
 }
 
-std::string ValueText(const VolumeSample& sample) {
+std::string TextOfValue(const VolumeSample& sample) {
   if (!sample.value) return "value not finite";
   if (const std::optional<Int128> whole = WholeValue(sample)) return fmt::format("value {}", *whole);
-  return fmt::format("value {:g}", *sample.value);
+  return "value " + ValueText(*sample.value);
+}
+
+Json LabelJson(const Label& label) {
+  const auto channel = [](float share) { return int(std::lround(share * 255)); };
+  const auto& [red, green, blue] = label.color;
+  return {{"value", label.value},
+          {"name", label.name},
+          {"color", fmt::format("#{:02x}{:02x}{:02x}", channel(red), channel(green), channel(blue))}};
+}
+
+std::uint64_t AllVoxels(const BoxStatistics& box) { return box.voxels + box.non_finite; }
+
+std::string Quoted(const std::string& field) {
+  if (field.find_first_of(",\"\r\n") == std::string::npos) return field;
+  std::string quoted = "\"";
+  for (const char c : field) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + '"';
 }
 
 }  // namespace
@@ -62,12 +81,8 @@ Json JointHistogramJson(const std::string& dataset, const JointHistogramReply& r
 }
 
 Json LabelsJson(const std::string& dataset, const SummaryReply& summary) {
-  const auto channel = [](float share) { return int(std::lround(share * 255)); };
   Json labels = Json::array();
-  for (const auto& [value, color, name] : summary.labels) {
-    const std::string shown = fmt::format("#{:02x}{:02x}{:02x}", channel(color[0]), channel(color[1]), channel(color[2]));
-    labels.push_back({{"value", value}, {"name", name}, {"color", shown}});
-  }
+  for (const Label& label : summary.labels) labels.push_back(LabelJson(label));
   return {{"dataset", dataset}, {"labels", std::move(labels)}};
 }
 
@@ -95,6 +110,55 @@ Json BoxStatisticsJson(const BoxStatistics& box) {
           {"least", known(box.least)}, {"largest", known(box.largest)}};
 }
 
+VoxelMeasure MeasureOf(const VolumeGeometry& geometry) {
+  const Vec3& spacing = geometry.spacing;
+  const double cubed = spacing.x * spacing.y * spacing.z;
+  const LengthUnit unit = UnitOf(geometry);
+  switch (unit) {
+    case LengthUnit::kMillimetre: return {"ml", cubed / 1000};
+    case LengthUnit::kCentimetre: return {"ml", cubed};
+    case LengthUnit::kMetre: return {"ml", cubed * 1e6};
+    default: return {fmt::format("{}^3", PluralOf(unit)), cubed};
+  }
+}
+
+Json LabelStatisticsJson(const StatisticsReply& reply) {
+  const VoxelMeasure measure = MeasureOf(reply.description.geometry);
+  Json labels = Json::array();
+  for (const auto& [label, box] : reply.labels) {
+    Json of_label = LabelJson(label);
+    of_label["volume"] = double(AllVoxels(box)) * measure.volume;
+    of_label.update(BoxStatisticsJson(box));
+    labels.push_back(std::move(of_label));
+  }
+  return {{"unit", measure.unit}, {"labels", std::move(labels)}};
+}
+
+std::string LabelStatisticsCsv(const StatisticsReply& reply) {
+  const VoxelMeasure measure = MeasureOf(reply.description.geometry);
+  std::string text = fmt::format("value,name,volume ({}),voxels,non_finite,mean,deviation,least,largest\r\n", measure.unit);
+  for (const auto& [label, box] : reply.labels) {
+    text +=
+        fmt::format("{},{},{},{},{}", label.value, Quoted(label.name), double(AllVoxels(box)) * measure.volume, box.voxels, box.non_finite);
+    text += box.voxels == 0 ? ",,,," : fmt::format(",{},{},{},{}", box.mean, box.deviation, ValueText(box.least), ValueText(box.largest));
+    text += "\r\n";
+  }
+  return text;
+}
+
+std::string LabelStatisticsText(const StatisticsReply& reply) {
+  const VoxelMeasure measure = MeasureOf(reply.description.geometry);
+  constexpr const char* kRow = "{:>8}  {:>12}  {:>10}  {:>12}  {:>12}  {:>12}  {:>12}  {}\n";
+  std::string text = fmt::format(fmt::runtime(kRow), "label", measure.unit, "voxels", "mean", "deviation", "least", "largest", "name");
+  for (const auto& [label, box] : reply.labels) {
+    const auto known = [&](std::string number) { return box.voxels > 0 ? std::move(number) : std::string("none"); };
+    text += fmt::format(fmt::runtime(kRow), label.value, fmt::format("{:.6g}", double(AllVoxels(box)) * measure.volume), AllVoxels(box),
+                        known(fmt::format("{:.6g}", box.mean)), known(fmt::format("{:.6g}", box.deviation)), known(ValueText(box.least)),
+                        known(ValueText(box.largest)), Printable(label.name));
+  }
+  return text;
+}
+
 Json PickJson(const PickReply& picked) {
   Json json = {{"hit", picked.sample.has_value()}};
   if (!picked.sample) return json;
@@ -104,13 +168,13 @@ Json PickJson(const PickReply& picked) {
 }
 
 std::string SampleText(const VolumeSample& sample) {
-  std::string text = fmt::format("{:g} {:g} {:g}", sample.at.x, sample.at.y, sample.at.z);
+  std::string text = fmt::format("{} {} {}", ValueText(sample.at.x), ValueText(sample.at.y), ValueText(sample.at.z));
   if (!sample.inside) return text + "  outside the volume";
   text += fmt::format("  voxel {} {} {}", sample.voxel.x, sample.voxel.y, sample.voxel.z);
-  text += "  " + ValueText(sample);
+  text += "  " + TextOfValue(sample);
   if (sample.label)
     text += fmt::format("  label {}{}{}", sample.label->value, sample.label->name.empty() ? "" : " ", Printable(sample.label->name));
-  if (sample.overlay) text += fmt::format("  overlay {:g}", *sample.overlay);
+  if (sample.overlay) text += "  overlay " + ValueText(*sample.overlay);
   return text;
 }
 

@@ -30,6 +30,19 @@ nlohmann::ordered_json ProfileJson(const std::vector<VolumeSample>& samples);
 // {"voxels", "non_finite", "mean", "deviation", "least", "largest"}. Null: there are no voxels.
 nlohmann::ordered_json BoxStatisticsJson(const BoxStatistics& box);
 
+// What voxels of a dataset take of the world: millilitres, if the length of its unit is known in mm, cm or m; else its unit cubed.
+struct VoxelMeasure {
+  std::string unit;   // "ml", "\u00b5m^3"
+  double volume = 1;  // of a voxel
+};
+VoxelMeasure MeasureOf(const VolumeGeometry& geometry);
+
+// {"unit", "labels": [{"value", "name", "color", "volume", and the fields of BoxStatisticsJson}, ...]}
+nlohmann::ordered_json LabelStatisticsJson(const StatisticsReply& reply);
+// The same as lines of a table: comma-separated as RFC 4180 has it, with a line of names; or in columns.
+std::string LabelStatisticsCsv(const StatisticsReply& reply);
+std::string LabelStatisticsText(const StatisticsReply& reply);
+
 // One line.
 std::string SampleText(const VolumeSample& sample);
 

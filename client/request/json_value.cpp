@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <set>
+#include <vector>
 
 #include "common/base/printable.h"
 
@@ -38,8 +40,19 @@ double Decimal(float number) { return std::strtod(fmt::format("{}", number).c_st
 Result<Json> ParseJson(std::string_view text) {
   if (const int depth = DepthOf(text); depth > kMaxJsonDepth)
     return Status::InvalidArgument(fmt::format("values nest {} deep, at most {} are allowed", depth, kMaxJsonDepth));
+  // Of several fields with one name, a parser would keep the last one without a word.
+  std::string twice;
+  std::vector<std::set<std::string>> open;  // names of the objects that have begun and not ended
+  const auto note = [&](int, Json::parse_event_t event, const Json& value) {
+    if (event == Json::parse_event_t::object_start) open.emplace_back();
+    if (event == Json::parse_event_t::object_end) open.pop_back();
+    if (event == Json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second && twice.empty()) twice = value;
+    return true;
+  };
   try {
-    return Json::parse(text);
+    Json json = Json::parse(text, note);
+    if (twice.empty()) return json;
+    return Printable(Status::InvalidArgument(fmt::format("field '{}' is given twice", twice.substr(0, 64))));
   } catch (const Json::exception& error) {
     const std::string what = error.what();
     return Printable(Status::InvalidArgument("not JSON: " + what.substr(what.find("] ") + 2)));

@@ -89,10 +89,8 @@ Json Describe(CLI::Option& option) {
     if (!field->unit.empty()) json["unit"] = field->unit;
     if (!field->ability.empty()) json["ability"] = field->ability;
     if (field->same_picture) json["same_picture"] = true;
-    if (field->path == "renderer") {
-      json["renderers"] = DescribeRenderers();
-      json["automatic"] = {{"volumes", DefaultRenderer(false).name()}, {"grids", DefaultRenderer(true).name()}};
-    }
+    if (field->negatable) json["negatable"] = true;
+    if (field->path == "renderer") json["renderers"] = DescribeRenderers();
     if (option.get_type_name() == "TRANSFER") DescribePresets(json);
   }
   if (NameOf(option) == "window") json["windows"] = DescribeWindows();
@@ -105,7 +103,8 @@ Json Describe(CLI::Option& option) {
 Json DescribeOptions(CLI::App& command) {
   Json options = Json::array();
   for (CLI::Option* option : command.get_options()) {
-    if (!option->get_group().empty() && option != command.get_help_ptr()) options.push_back(Describe(*option));
+    const bool help = option == command.get_help_ptr() || option == command.get_help_all_ptr();
+    if (!option->get_group().empty() && !help) options.push_back(Describe(*option));
   }
   return options;
 }

@@ -7,6 +7,7 @@
 
 #include "client/request/option_description.h"
 #include "client/request/picture_options.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/printable.h"
 #include "common/wire/validate_request.h"
 
@@ -42,14 +43,27 @@ struct SliceOptionsApp {
   SliceRequest request;
 };
 
+std::string NoOption(const CLI::App& app, const std::string& name) {
+  std::vector<std::string_view> names;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_lnames().empty()) names.push_back(option->get_lnames().front());
+  }
+  return fmt::format("there is no option '{}'{}", Printable(name.substr(0, 64)), DidYouMean(name, names));
+}
+
 // The arguments that say the same. Names are looked up here, so that no text can be taken for another option.
 Status AddArgument(CLI::App& app, const PictureField& field, std::vector<std::string>& arguments) {
   const std::string name = "--" + field.name;
   const bool proper = !field.name.empty() && field.name.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789-") == std::string::npos;
   const CLI::Option* const option = proper ? app.get_option_no_throw(name) : nullptr;
-  if (option == nullptr) return Status::InvalidArgument(fmt::format("there is no option '{}'", Printable(field.name.substr(0, 64))));
+  if (option == nullptr) return Status::InvalidArgument(NoOption(app, field.name));
   if (MayStandAlone(*option) && (field.text == "true" || field.text == "false" || field.text.empty())) {
-    if (field.text != "false") arguments.push_back(name);
+    const std::string off = "--no-" + field.name;
+    if (field.text != "false") {
+      arguments.push_back(name);
+    } else if (option->check_name(off)) {
+      arguments.push_back(off);
+    }
     return Status::Ok();
   }
   if (IsFlag(*option)) {

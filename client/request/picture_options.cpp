@@ -9,13 +9,15 @@
 #include <string_view>
 #include <vector>
 
+#include "client/request/camera_file.h"
 #include "client/request/layer_options.h"
 #include "client/request/value_window.h"
 #include "client/request/values.h"
-#include "common/base/files.h"
 #include "common/cli/add_option.h"
 #include "common/renderers/registry.h"
+#include "common/view/default_view.h"
 #include "common/view/named_view.h"
+#include "common/view/world_limits.h"
 #include "common/wire/validate_request.h"
 
 namespace slabstream {
@@ -33,15 +35,6 @@ void AddRequestOptions(CLI::App& app, FrameRequest& request, ColorMaps maps, con
     for (const std::string& other : option.excludes) app.get_option("--" + option.name)->excludes(app.get_option("--" + other));
     for (const std::string& other : option.needs) app.get_option("--" + option.name)->needs(app.get_option("--" + other));
   }
-}
-
-Result<ViewParameters> ParseCameraFile(const std::string& option, const std::string& path) {
-  constexpr std::size_t kMostBytes = std::size_t{1} << 16;
-  const Result<std::string> text = ReadTextFile(path, kMostBytes);
-  if (!text.ok()) return Status(text.status().code(), fmt::format("{} {}", option, text.status().message()));
-  Result<ViewParameters> view = ParseCamera(*text);
-  if (!view.ok()) return Status::InvalidArgument(fmt::format("{} {}: {}", option, path, view.status().message()));
-  return view;
 }
 
 // Options that stand for several fields.
@@ -65,10 +58,8 @@ void AddWholeViews(CLI::App& app, ViewParameters& view, bool files) {
   for (const char* option : {"--azimuth", "--elevation", "--of-patient", "--eye"}) named->excludes(app.get_option(option));
   if (!files) return;
   CLI::Option* const camera = AddParsed(app, "--camera", view, ParseCameraFile, "Take the view from a file that --save-camera wrote");
-  camera->type_name("FILE")->excludes(named);
-  for (const RequestOption& option : RequestOptions()) {
-    if (option.path.starts_with("view.")) camera->excludes(app.get_option("--" + option.name));
-  }
+  camera->type_name("FILE");
+  ExcludeViewOptions(app, camera);
 }
 
 void AddPictureFormat(CLI::App& app, PictureFormat& format) {
@@ -78,7 +69,17 @@ void AddPictureFormat(CLI::App& app, PictureFormat& format) {
       "Colour behind the picture: R,G,B or R,G,B,A from 0 to 1, #rrggbb, #rrggbbaa, or a name such as white (default: transparent, which "
       "is black in a movie)")
       ->type_name("COLOUR");
-  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG: 8 or 16")->default_str("8");
+  AddChoice<int, 2>(app, "--depth", format.png_bits, {"8", "16"}, {8, 16}, "Bits of each channel of a PNG or TIFF: 8 or 16")
+      ->default_str("8");
+  AddInteger(app, "--quality", format.quality, 1, 100, "Quality of a JPEG or WebP");
+  const auto dots = [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 1, kMaxDotsPerInch); };
+  CLI::Option* const dpi =
+      AddParsed(app, "--dpi", format.dots_per_inch, dots,
+                "Pixels an inch, as the file states them: the size of a figure in print, and of the page of a PDF or SVG")
+          ->type_name("N")
+          ->default_str(
+              fmt::format("{} for pages and --font-size; other files of patients state the size of pixels there", kUsualDotsPerInch));
+  NoteRange(dpi, {1, kMaxDotsPerInch});
 }
 
 void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
@@ -101,6 +102,13 @@ void AddAnnotationOptions(CLI::App& app, Annotations& annotations) {
       "The colours of the transfer function with their data values; CAPTION stands above them, such as a unit")
       ->type_name("[=CAPTION]");
   app.add_flag("--legend", annotations.legend, "Names and colours of the labels that are shown, and of isosurfaces");
+  const NumberRange sizes{kMinFontSize, kMaxFontSize};
+  const auto points = [sizes](const std::string& option, const std::string& text) { return ParseNumber(option, text, sizes); };
+  CLI::Option* const font =
+      AddParsed(app, "--font-size", annotations.font_size, points, "Size of the letters in points, of which 72 make an inch")
+          ->type_name("NUMBER")
+          ->default_str("1/31 of the picture's shorter side, at least 11 pixels");
+  NoteRange(font, sizes);
 }
 
 }  // namespace
@@ -112,14 +120,23 @@ CLI::Option* AddRequestOption(CLI::App& app, const RequestOption& option, FrameR
     return true;
   };
   app.option_defaults()->group(option.group);
-  if (option.flag())
+  if (option.flag()) {
+    const std::string names = option.negatable ? fmt::format("{},!--no-{}", name, option.name) : name;
     return app.add_flag_function(
-        name, [set](std::int64_t) { set({"true"}); }, option.help);
+        names, [set](std::int64_t count) { set({count > 0 ? "true" : "false"}); }, option.help);
+  }
   CLI::Option* const added = app.add_option(name, CLI::callback_t(set), option.help)->type_name(option.value)->default_str(option.standard);
   if (option.range) NoteRange(added, *option.range);
   if (!option.choices.empty()) NoteChoices(added, {option.choices.begin(), option.choices.end()});
   if (option.repeatable) added->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   return added;
+}
+
+void ExcludeViewOptions(CLI::App& app, CLI::Option* option) {
+  option->excludes(app.get_option("--view"));
+  for (const RequestOption& field : RequestOptions()) {
+    if (field.path.starts_with("view.")) option->excludes(app.get_option("--" + field.name));
+  }
 }
 
 void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer) {
@@ -128,6 +145,7 @@ void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer) {
 
 void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files) {
   const ColorMaps maps = files != nullptr ? ColorMaps::kFilesToo : ColorMaps::kTexts;
+  request.view = kUnstatedView;
   AddRequestOptions(app, request, maps, [](const RequestOption& option) { return option.name != "dataset" && option.name != "previews"; });
   AddWholeViews(app, request.view, files != nullptr);
   if (files != nullptr) AddLayerFiles(app, *files, &request);
@@ -157,7 +175,7 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
       "Number of the slice, counted from 0, instead of a point")
       ->type_name("K")
       ->excludes(at);
-  AddNumber(app, "--thickness", slice.thickness, {0, kMaxWorldCoordinate},
+  AddNumber(app, "--thickness", slice.thickness, {0, kMaxCoordinate},
             "Show the largest values of a slab of this thickness, in the unit of the world (mm of a patient); 0: the values in the plane");
 
   app.option_defaults()->group("Look");
@@ -183,17 +201,6 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
   app.get_option("--size")->group("Plane");
   AddPictureFormat(app, slice.format);
   AddAnnotationOptions(app, slice.format.annotations);
-}
-
-Result<ViewParameters> ParseCamera(const std::string& text) {
-  const Result<Json> json = ParseJson(text);
-  if (!json.ok()) return json.status();
-  FrameRequest request;
-  std::optional<std::string> mistake;
-  JsonValue(*json, "", mistake).Fields(OptionFields(request, {"view."}));
-  if (mistake) return Status::InvalidArgument(*mistake);
-  if (Status status = Validate(request.view); !status.ok()) return status;
-  return request.view;
 }
 
 }  // namespace slabstream

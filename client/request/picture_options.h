@@ -18,7 +18,7 @@ namespace slabstream {
 // Options under this heading are not shown in help texts: old spellings that still work, and options that cannot be used yet.
 inline constexpr char kHidden[] = "";
 
-// View, clipping, look, layers, annotations and policy.
+// View, clipping, look, layers, annotations and policy. The view is the default one, as far as no option says something else.
 void AddRenderPictureOptions(CLI::App& app, FrameRequest& request, PictureFormat& format, LayerFiles* files);
 
 // Plane, look and layers.
@@ -27,10 +27,10 @@ void AddSlicePictureOptions(CLI::App& app, SliceRequest& slice, LayerFiles* file
 // An option for one field of the table.
 CLI::Option* AddRequestOption(CLI::App& app, const RequestOption& option, FrameRequest& request, ColorMaps maps = ColorMaps::kFilesToo);
 
+// For what replaces the whole view.
+void ExcludeViewOptions(CLI::App& app, CLI::Option* option);
+
 // After the parse: isosurfaces without --transfer are all that is shown.
 void LetSurfacesStandAlone(const CLI::App& app, TransferChoice& transfer);
-
-// A view as a file that --save-camera wrote: a JSON object of options ("azimuth": 30). InvalidArgument, one line.
-Result<ViewParameters> ParseCamera(const std::string& text);
 
 }  // namespace slabstream

@@ -27,6 +27,9 @@ Json FormatJson(const PictureFormat& format) {
   if (format.annotations.orientation_marker) json["orientation_marker"] = true;
   if (format.annotations.color_bar) json["color_bar"] = *format.annotations.color_bar;
   if (format.annotations.legend) json["legend"] = true;
+  if (format.annotations.font_size) json["font_size"] = *format.annotations.font_size;
+  if (format.quality != PictureFormat().quality) json["quality"] = format.quality;
+  if (format.dots_per_inch) json["dpi"] = *format.dots_per_inch;
   return json;
 }
 
@@ -44,6 +47,12 @@ void ReadFormat(const JsonValue& value, PictureFormat& format) {
   };
   value.Fields({{"depth", [&](const JsonValue& v) { format.png_bits = v.Integer(8, 16); }},
                 {"background", color},
+                {"quality", [&](const JsonValue& v) { format.quality = v.Integer(1, 100); }},
+                {"dpi", [&](const JsonValue& v) { format.dots_per_inch = v.Integer(1, kMaxDotsPerInch); }},
+                {"font_size",
+                 [&](const JsonValue& v) {
+                   format.annotations.font_size = v.Number({kMinFontSize, kMaxFontSize});
+                 }},
                 {"title", [&](const JsonValue& v) { format.annotations.title = line(v); }},
                 {"color_bar", [&](const JsonValue& v) { format.annotations.color_bar = line(v); }},
                 {"legend", [&](const JsonValue& v) { format.annotations.legend = v.Boolean(); }},
@@ -89,7 +98,7 @@ void AddRequest(OptionList& out, const FrameRequest& request) {
     }
     for (const std::string& text : texts) {
       if (option.flag()) {
-        out.Add("--" + option.name);
+        out.Add((text == "true" ? "--" : "--no-") + option.name);
       } else {
         out.Add("--" + option.name, text);
       }
@@ -100,8 +109,8 @@ void AddRequest(OptionList& out, const FrameRequest& request) {
 // The structured bindings name every field: if there is one more, they do not compile.
 void AddFormat(OptionList& out, const PictureFormat& format) {
   const PictureFormat usual;
-  const auto& [png_bits, background, annotations] = format;
-  const auto& [scale_bar, orientation_marker, sides_only, title, color_bar, legend] = annotations;  // sides_only: of slices
+  const auto& [png_bits, quality, background, annotations, dots_per_inch] = format;
+  const auto& [scale_bar, orientation_marker, sides_only, title, color_bar, legend, font_size] = annotations;  // sides_only: of slices
   if (background != usual.background) {
     out.Add("--background", fmt::format("{},{},{},{}", background.r, background.g, background.b, background.a));
   }
@@ -111,6 +120,9 @@ void AddFormat(OptionList& out, const PictureFormat& format) {
   out.Flag("--orientation-marker", orientation_marker);
   if (color_bar) out.Add(color_bar->empty() ? "--color-bar" : "--color-bar=" + *color_bar);
   out.Flag("--legend", legend);
+  if (font_size) out.Add("--font-size", fmt::format("{}", *font_size));
+  out.Number("--quality", quality, usual.quality);
+  if (dots_per_inch) out.Add("--dpi", fmt::format("{}", *dots_per_inch));
 }
 
 void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
@@ -138,6 +150,7 @@ Json GeometryJson(const PictureGeometry& geometry) {
 
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
   if (!statistics.renderer.empty()) request.renderer = statistics.renderer;
+  if (statistics.view) request.view = *statistics.view;
   return request;
 }
 

@@ -3,7 +3,8 @@
 //   {"program": "slabstream 0.2.0", "source": "brain.nii.gz",             SOURCE as it was typed
 //    "layers": {"labels", "overlay"},                                     likewise, if there are any
 //    "request": {...},                                                    RequestToJson (common/wire/request_json.h)
-//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend"},
+//    "picture": {"depth", "background", "title", "scale_bar", "orientation_marker", "color_bar", "legend", "font_size",
+//                "quality", "dpi"},
 //    "geometry": {"world", "unit", "projection", "right", "up", "forward", "target", "target_depth", "pixel_size"},
 //    "levels": [2]}                                                       that the picture was drawn from, if not from level 0 alone
 //
@@ -36,7 +37,8 @@ struct PictureRecord {
 // The record's "geometry".
 Json GeometryJson(const PictureGeometry& geometry);
 
-// The request of a picture with the renderer that has made it, so that its record names that one. Of a preview: the request as it is.
+// The request of a picture with the renderer and the view that it was made by, so that its record names these. Of a preview: the request as
+// it is.
 FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics);
 
 // ASCII, one line.

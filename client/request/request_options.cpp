@@ -15,6 +15,7 @@
 #include "common/planning/assignment.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
+#include "common/view/default_view.h"
 #include "common/wire/field_walk.h"
 
 namespace slabstream {
@@ -54,8 +55,8 @@ Choices ChoicesOf(const std::string& list) {
   if (list == "balances") add_all(Balances());
   if (list == "presets") add_all(TransferPresets());
   if (list == "renderers") {
-    choices.Add(kAutomatic,
-                fmt::format("{} for volumes, {} for unstructured grids", DefaultRenderer(false).name(), DefaultRenderer(true).name()));
+    choices.Add(kAutomatic, fmt::format("{} for volumes, {} for unstructured grids, or the first of these that can do what is asked",
+                                        DefaultRenderer(false).name(), DefaultRenderer(true).name()));
     for (const RendererKind* kind : Renderers()) choices.Add(kind->name(), kind->purpose());
   }
   if (list == "combining schemes") {
@@ -84,16 +85,18 @@ RequestOption Describe(const Field& field, const T&, std::string path, const std
   if (!about.list().empty()) {
     Choices choices = ChoicesOf(about.list());
     option.choices = std::move(choices.names);
-    option.help += choices.explained;
+    const bool told_elsewhere = option.path == "overlay.preset";  // as --transfer
+    if (!told_elsewhere) option.help += choices.explained;
   }
   if (!option.ability.empty()) option.help += fmt::format("; for --renderer {}", NamesOfAble(option.ability));
   const auto named = [&](const char* value) { return option.value.empty() ? value : option.value; };
   if constexpr (requires(T value) { value.number(); }) {
     option.choices = WordsOf(*field.enum_type());
-  } else if constexpr (std::is_same_v<T, bool>) {
+  } else if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::optional<bool>>) {
     option.standard.clear();  // a flag: it is there or not
+    option.negatable = !std::is_same_v<T, bool>;
     return option;
-  } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::optional<float>>) {
+  } else if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::optional<float>> || std::is_same_v<T, std::optional<double>>) {
     option.range = NumberRange{about.least(), about.most(), about.above_least()};
     option.value = named(std::is_integral_v<T> ? "N" : "NUMBER");
   }
@@ -210,6 +213,8 @@ struct OptionReader {
   }
   void Read(const std::string& text, float& value) { Take(value, ParseNumber(shown, text, *option.range)); }
   void Read(const std::string& text, std::optional<float>& value) { Read(text, value.emplace()); }
+  void Read(const std::string& text, std::optional<double>& value) { Read(text, value.emplace()); }
+  void Read(const std::string& text, std::optional<bool>& value) { Read(text, value.emplace()); }
   void Read(const std::string& text, int& value) {
     if (IsLeft(text)) return void(value = 0);
     Take(value, ParseInteger(shown, text, int(option.range->min), int(option.range->max)));
@@ -269,6 +274,7 @@ struct OptionReader {
 std::string Text(double value) { return fmt::format("{}", value); }
 std::string Text(float value) { return fmt::format("{}", value); }
 std::string Text(int value) { return fmt::format("{}", value); }
+std::string Text(bool value) { return value ? "true" : "false"; }
 std::string Text(const std::string& value) { return value; }
 template <class T>
 std::string Text(const T& value) requires requires {
@@ -356,6 +362,7 @@ std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest
   }
   static const FrameRequest kStandard = [] {
     FrameRequest standard;
+    standard.view = kUnstatedView;
     standard.labels.emplace();
     standard.overlay.emplace();
     return standard;
@@ -414,7 +421,7 @@ Json OptionsJson(const FrameRequest& request, std::string_view place) {
     const std::vector<std::string> texts = TextsOf(option, request);
     if (texts.empty()) continue;
     if (option.flag()) {
-      json[option.name] = true;
+      json[option.name] = texts.front() == "true";
     } else if (option.range) {
       json[option.name] = Json::parse(texts.front());
     } else {

@@ -30,6 +30,7 @@ struct RequestOption {
   std::optional<NumberRange> range;
   bool repeatable = false;
   bool same_picture = false;                 // it never changes the finished picture
+  bool negatable = false;                    // a flag that may be on without being given: --no-NAME turns it off
   std::vector<std::string> excludes, needs;  // names of others
 
   bool flag() const { return value.empty(); }

@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "client/request/named_colors.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/cli/parse.h"
+#include "common/view/world_limits.h"
 
 namespace slabstream {
 namespace {
@@ -31,7 +33,12 @@ std::optional<StraightColor> FromHexadecimal(std::string_view digits) {
 
 Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text) {
   const std::vector<std::string_view> sides = Split(text, 'x');
-  if (sides.size() > 2) return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  const auto no_digits = [](std::string_view side) {
+    return side.empty() || side.find_first_not_of("+-0123456789") != std::string_view::npos;
+  };
+  if (sides.size() > 2 || std::ranges::any_of(sides, no_digits)) {
+    return Status::InvalidArgument(fmt::format("{} '{}' is neither WIDTHxHEIGHT nor one number", option, text));
+  }
   const Result<int> width = ParseInteger(option, sides.front(), 1, kMaxImageSide);
   if (!width.ok()) return width.status();
   const Result<int> height = ParseInteger(option, sides.back(), 1, kMaxImageSide);
@@ -47,7 +54,7 @@ Result<Vec3> ParsePoint(std::string_view option, std::string_view text) {
   if (parts.size() != 3) return Status::InvalidArgument(fmt::format("{} '{}' is not X,Y,Z", option, text));
   Vec3 point;
   for (int i = 0; i < 3; ++i) {
-    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+    const Result<double> value = ParseNumber(option, parts[std::size_t(i)], {-kMaxCoordinate, kMaxCoordinate});
     if (!value.ok()) return value.status();
     point[i] = *value;
   }
@@ -99,9 +106,9 @@ Result<ClipBox> ParseClipBox(std::string_view option, std::string_view text) {
     }
     for (const bool high : {false, true}) {
       double& bound = high ? box.high[axis] : box.low[axis];
-      bound = high ? kMaxWorldCoordinate : -kMaxWorldCoordinate;
+      bound = high ? kMaxCoordinate : -kMaxCoordinate;
       if (ends[high ? 1 : 0].empty()) continue;
-      const Result<double> value = ParseNumber(option, ends[high ? 1 : 0], {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+      const Result<double> value = ParseNumber(option, ends[high ? 1 : 0], {-kMaxCoordinate, kMaxCoordinate});
       if (!value.ok()) return value.status();
       bound = *value;
     }
@@ -119,7 +126,7 @@ Result<ClipPlane> ParseClipPlane(std::string_view option, std::string_view text)
   }
   const Result<Vec3> normal = ParseDirection(option, text.substr(0, last));
   if (!normal.ok()) return normal.status();
-  const Result<double> offset = ParseNumber(option, text.substr(last + 1), {-kMaxWorldCoordinate, kMaxWorldCoordinate});
+  const Result<double> offset = ParseNumber(option, text.substr(last + 1), {-kMaxCoordinate, kMaxCoordinate});
   if (!offset.ok()) return offset.status();
   return ClipPlane{*normal, *offset};
 }
@@ -133,7 +140,8 @@ Result<StraightColor> ParseColor(std::string_view option, std::string_view text)
   }
   const std::vector<std::string_view> parts = Split(text, ',');
   if (parts.size() != 3 && parts.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour", option, text));
+    return Status::InvalidArgument(
+        fmt::format("{} '{}' is neither R,G,B[,A] nor #rrggbb nor the name of a colour{}", option, text, DidYouMean(text, kNamedColors)));
   }
   float channels[4] = {0, 0, 0, 1};
   for (std::size_t i = 0; i < parts.size(); ++i) {
@@ -265,9 +273,7 @@ std::string TextOf(const ScalarRange& range) {
 }
 std::string TextOf(const ClipBox& box) {
   const auto bound = [](double value, double none) { return value == none ? "" : fmt::format("{}", value); };
-  const auto bounds = [&](Axis axis) {
-    return bound(box.low[axis], -kMaxWorldCoordinate) + ":" + bound(box.high[axis], kMaxWorldCoordinate);
-  };
+  const auto bounds = [&](Axis axis) { return bound(box.low[axis], -kMaxCoordinate) + ":" + bound(box.high[axis], kMaxCoordinate); };
   return Joined(kAxes, bounds) + (box.unit == ClipUnit::kVoxels ? "v" : box.unit == ClipUnit::kPercent ? "%" : "");
 }
 std::string TextOf(const ClipPlane& plane) { return fmt::format("{},{}", TextOf(plane.normal), plane.offset); }

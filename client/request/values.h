@@ -17,7 +17,7 @@ namespace slabstream {
 // "640x480" or "512" (a square), each side in [1, kMaxImageSide], at most kMaxImagePixels in all.
 Result<ImageSize> ParseImageSize(std::string_view option, std::string_view text);
 
-// "X,Y,Z", each in [-kMaxWorldCoordinate, kMaxWorldCoordinate].
+// "X,Y,Z", each in [-kMaxCoordinate, kMaxCoordinate].
 Result<Vec3> ParsePoint(std::string_view option, std::string_view text);
 // The same, and not all zero.
 Result<Vec3> ParseDirection(std::string_view option, std::string_view text);

@@ -4,11 +4,11 @@
 
 #include <filesystem>
 #include <string_view>
-#include <vector>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/files.h"
+#include "common/base/find_named.h"
 #include "common/base/url.h"
-#include "common/cli/parse.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
@@ -32,6 +32,12 @@ Result<TransferText> ReadColorMap(const std::string& option, const std::string& 
   return TransferText(*std::move(transfer));
 }
 
+// `more`: what else it might have been.
+Status NoTransfer(const std::string& option, const std::string& text, std::string_view more) {
+  return Status::InvalidArgument(fmt::format("{} '{}' is not one of {}, nor JSON of a colour map{}{}", option, text,
+                                             NamesOf(TransferPresets()), more, DidYouMean(text, TransferPresets())));
+}
+
 bool NamesFile(const std::string& transfer) {
   if (IsJson(transfer)) return false;
   return std::filesystem::path(transfer).extension() == ".json" || transfer.find('/') != std::string::npos;
@@ -41,10 +47,7 @@ bool NamesFile(const std::string& transfer) {
 
 Result<std::variant<std::string, TransferFunction>> ParseTransferText(const std::string& option, const std::string& text) {
   if (IsJson(text)) return ReadColorMap(option, text, "the colour map");
-  std::vector<std::string_view> names;
-  for (const TransferPreset& preset : TransferPresets()) names.push_back(preset.name);
-  const Result<std::size_t> index = ParseChoice(option, text, names);
-  if (!index.ok()) return Status::InvalidArgument(index.status().message() + ", nor JSON of a colour map");
+  if (FindNamed(TransferPresets(), text) == nullptr) return NoTransfer(option, text, "");
   return TransferText(text);
 }
 
@@ -54,9 +57,8 @@ Result<std::variant<std::string, TransferFunction>> ParseTransfer(const std::str
     if (!json.ok()) return Status(json.status().code(), fmt::format("{} {}", option, json.status().message()));
     return ReadColorMap(option, *json, text);
   }
-  Result<TransferText> transfer = ParseTransferText(option, text);
-  if (!transfer.ok() && !IsJson(text)) return Status::InvalidArgument(transfer.status().message() + ", nor a .json file");
-  return transfer;
+  if (!IsJson(text) && FindNamed(TransferPresets(), text) == nullptr) return NoTransfer(option, text, ", nor a .json file");
+  return ParseTransferText(option, text);
 }
 
 bool NamesVolumeFile(const std::string& text) { return Exists(text) || Exists(text.substr(0, text.rfind(':'))); }

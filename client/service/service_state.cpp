@@ -20,6 +20,7 @@
 #include "common/base/time.h"
 #include "common/service/service_file.h"
 #include "common/transport/endpoint.h"
+#include "common/transport/this_machine.h"
 
 namespace slabstream {
 namespace {
@@ -36,8 +37,8 @@ std::optional<ServiceState> Load(const std::string& path) {
   if (!text.ok()) return std::nullopt;
   const nlohmann::json json = nlohmann::json::parse(*text, nullptr, false);
   try {
-    return ServiceState{json.at("endpoint"), json.at("started_unix"),  json.at("coordinator"),
-                        json.at("workers"),  json.at("log_directory"), json.value("keys_folder", "")};
+    return ServiceState{json.at("endpoint"),      json.at("started_unix"),       json.at("coordinator"),       json.at("workers"),
+                        json.at("log_directory"), json.value("keys_folder", ""), json.value("unlisted", false)};
   } catch (const nlohmann::json::exception&) {
     return std::nullopt;
   }
@@ -77,7 +78,8 @@ Status SaveState(const ServiceState& state) {
   const Result<std::string> directory = StateDirectory();
   if (!directory.ok()) return directory.status();
   const nlohmann::json json = {{"endpoint", state.endpoint}, {"started_unix", state.started_unix},   {"coordinator", state.coordinator},
-                               {"workers", state.workers},   {"log_directory", state.log_directory}, {"keys_folder", state.keys_folder}};
+                               {"workers", state.workers},   {"log_directory", state.log_directory}, {"keys_folder", state.keys_folder},
+                               {"unlisted", state.unlisted}};
   return WriteTextFile(FileFor(*directory, state.endpoint), json.dump(2) + "\n");
 }
 
@@ -114,11 +116,12 @@ std::vector<ServiceState> AllStates() {
 
 namespace {
 
-// The newest one at `endpoint`, or anywhere if that is empty.
+// The newest one at `endpoint`, or the newest listed one anywhere if that is empty.
 std::optional<ServiceState> Newest(const std::string& endpoint, bool runs) {
   std::optional<ServiceState> newest;
   for (ServiceState& state : AllStates()) {
-    if (IsRunning(state.coordinator, kCoordinatorProgram) != runs || (!endpoint.empty() && state.endpoint != endpoint)) continue;
+    const bool meant = endpoint.empty() ? !state.unlisted : state.endpoint == endpoint;
+    if (!meant || IsRunning(state.coordinator, kCoordinatorProgram) != runs) continue;
     if (!newest || state.started_unix > newest->started_unix) newest = std::move(state);
   }
   return newest;
@@ -179,6 +182,13 @@ Result<ServiceChoice> NamedService(const ServiceChoice& choice) {
   const Result<Endpoint> parsed = ParseEndpoint(endpoint, false);
   if (!parsed.ok()) return Status::InvalidArgument("$SLABSTREAM_ENDPOINT " + parsed.status().message());
   return ServiceChoice{.endpoint = endpoint, .file = {}};
+}
+
+bool NoServiceHere(const ServiceChoice& choice) {
+  const Result<ServiceChoice> named = NamedService(choice);
+  if (!named.ok() || !named->text().empty() || FindState("")) return false;
+  const Result<Endpoint> usual = ParseEndpoint(kDefaultEndpoint, false);
+  return usual.ok() && NobodyListens(*usual);
 }
 
 Result<ServiceAddress> ResolveService(const ServiceChoice& choice) {

@@ -21,12 +21,13 @@ namespace slabstream {
 inline constexpr const char* kDefaultEndpoint = "tcp://127.0.0.1:7420";
 
 struct ServiceState {
-  std::string endpoint;           // for clients, with the port that was chosen
-  std::int64_t started_unix = 0;  // seconds
+  std::string endpoint;     // for clients, with the port that was chosen
+  double started_unix = 0;  // seconds; two services may start within one
   pid_t coordinator = 0;
   std::vector<pid_t> workers;
   std::string log_directory;  // a subdirectory of StateDirectory()
   std::string keys_folder;    // empty: it has no keys
+  bool unlisted = false;      // of one `view`: only who names its endpoint means it
   friend bool operator==(const ServiceState&, const ServiceState&) = default;
 };
 
@@ -37,7 +38,7 @@ Status SaveState(const ServiceState& state);
 void ForgetState(const ServiceState& state);  // keeps its logs, and what another service has saved for its endpoint since
 void RemoveState(const ServiceState& state);  // and its logs
 
-// The state of the service at `endpoint`, or of the last one started if `endpoint` is empty. nullopt: none whose coordinator runs.
+// The state of the service at `endpoint`, or of the last listed one started if `endpoint` is empty. nullopt: none whose coordinator runs.
 std::optional<ServiceState> FindState(const std::string& endpoint);
 // The same of a service whose coordinator has ended without its doing, so that its workers may still run.
 std::optional<ServiceState> FindRemains(const std::string& endpoint);
@@ -53,6 +54,9 @@ std::string FileNameOf(std::string text);
 // The service that the user names: `choice`; else $SLABSTREAM_SERVICE, a service file; else $SLABSTREAM_ENDPOINT; else neither file nor
 // endpoint. InvalidArgument: that variable holds no endpoint.
 Result<ServiceChoice> NamedService(const ServiceChoice& choice);
+// Whether the usual service is meant and there is none: nobody names one, `up` has started none here, and nobody listens at
+// kDefaultEndpoint.
+bool NoServiceHere(const ServiceChoice& choice);
 // Its address (an endpoint beside a service file is another way to the same service, such as the near end of a tunnel); if none is named,
 // that of the last service started; else kDefaultEndpoint. A service that `up` started here with keys is reached as its admin. Errors: of
 // NamedService and ReadServiceFile; InvalidArgument: the file is a worker's.

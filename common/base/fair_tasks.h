@@ -1,6 +1,7 @@
-// FairTasks: tasks of several owners, on threads of their own (BackgroundTasks). Tasks may take long. The tasks of one owner run one at a
-// time, in the order in which they were posted. The next task belongs to the owner that has used least time (FairTurns). So neither many
-// tasks of one owner nor a long one delay the tasks of another owner, as long as fewer than `most_threads` owners have long tasks.
+// FairTasks: tasks of several owners, on threads of their own (BackgroundTasks). Tasks may take long. The tasks of one owner begin in the
+// order in which they were posted, and at most `most_of_an_owner` of them run at a time. The next task belongs to the owner that has used
+// least time (FairTurns). So neither many tasks of one owner nor a long one delay the tasks of another owner, as long as long tasks of
+// others leave a thread.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +26,8 @@ class FairTasks {
  public:
   using Owner = std::uint64_t;
 
-  explicit FairTasks(std::size_t most_threads) : threads_(most_threads) {}
+  explicit FairTasks(std::size_t most_threads, std::size_t most_of_an_owner = 1)
+      : shared_(std::make_shared<Shared>(most_of_an_owner)), threads_(most_threads) {}
   // Drops the tasks that have not begun. Running ones go on, so they must own what they use.
   ~FairTasks() {
     const std::lock_guard lock(shared_->mutex);
@@ -58,19 +60,21 @@ class FairTasks {
 
  private:
   struct Shared {
-    std::mutex mutex;                                           // guards everything
+    explicit Shared(std::size_t most) : most_of_an_owner(most) {}
+    const std::size_t most_of_an_owner;
+    std::mutex mutex;                                           // guards what follows
     std::map<Owner, std::list<std::function<void()>>> waiting;  // none of them empty
-    std::set<Owner> running;
+    std::multiset<Owner> running;                               // once for each task
     FairTurns<Owner> turns;
   };
 
-  // Runs tasks until all that wait belong to owners with a running task. The threads of those owners will come to them.
+  // Runs tasks until all that wait belong to owners that have enough running. The threads of those owners will come to them.
   static void RunTasks(Shared& shared) {
     std::unique_lock lock(shared.mutex);
     while (true) {
       auto next = shared.waiting.end();
       for (auto it = shared.waiting.begin(); it != shared.waiting.end(); ++it) {
-        if (shared.running.contains(it->first)) continue;
+        if (shared.running.count(it->first) >= shared.most_of_an_owner) continue;
         if (next == shared.waiting.end() || shared.turns.TurnOf(it->first) < shared.turns.TurnOf(next->first)) next = it;
       }
       if (next == shared.waiting.end()) return;
@@ -91,12 +95,12 @@ class FairTasks {
       const Time end = MonotonicNow();
       lock.lock();
       shared.turns.Charge(owner, end - begin);
-      shared.running.erase(owner);
+      shared.running.erase(shared.running.find(owner));
       shared.turns.ForgetIdle([&](Owner each) { return shared.waiting.contains(each) || shared.running.contains(each); });
     }
   }
 
-  const std::shared_ptr<Shared> shared_ = std::make_shared<Shared>();
+  const std::shared_ptr<Shared> shared_;
   BackgroundTasks threads_;
 };
 

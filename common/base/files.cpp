@@ -53,7 +53,11 @@ Result<OutputFile> OutputFile::Create(const std::string& path, unsigned mode) {
   if (target.empty()) target = path;
   std::string temporary = direct ? "" : TemporaryNameFor(target);
   const char* name = direct ? path.c_str() : temporary.c_str();
-  const int descriptor = ::open(name, O_WRONLY | O_CLOEXEC | (direct ? 0 : O_CREAT | O_TRUNC), mode);
+  // A temporary file is never one that is there: that may be a link which another user of a shared folder has made. Else a process with the
+  // same number has left it.
+  const auto open = [&] { return ::open(name, O_WRONLY | O_CLOEXEC | (direct ? 0 : O_CREAT | O_EXCL), mode); };
+  int descriptor = open();
+  if (descriptor < 0 && errno == EEXIST && ::unlink(name) == 0) descriptor = open();
   if (descriptor < 0) return CannotWrite(path, std::strerror(errno));
   return OutputFile(path, std::move(target), std::move(temporary), descriptor);
 }

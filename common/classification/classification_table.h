@@ -1,11 +1,16 @@
 // ClassificationTable: the transfer function sampled once per frame setup, so that renderers classify a stored sample by one look-up.
 //
 // Bin of a stored sample s: BinOf(s), in [0, size). Each stored value has its own bin in 8-bit volumes, and in 16-bit volumes whose range
-// has at most kMaxBins values. Otherwise kMaxBins bin centres lie at equal distances over the value range, the first at its beginning and
-// the last at its end (so a background at the very beginning of an opacity ramp stays empty), and a sample belongs to the nearest centre.
-// Bins ascend with the stored value. Samples that are not finite have no bin: they are empty.
+// needs at most kMaxBins of them. Otherwise kMaxBins bin centres lie at equal distances, and a sample belongs to the nearest centre. Bins
+// ascend with the stored value. Samples that are not finite have no bin: they are empty.
+//
+// Bins cover what the function distinguishes, not all values that the volume has: from a bin below its first point, colour or isosurface to
+// a bin above its last one, as far as the volume's values reach. So one voxel far away from the others (a hot pixel, a fill value) takes no
+// bin from them. The first and the last bin stand for all values beyond. The bins round the function's first and last point have exactly
+// their value, so a background at the very beginning of an opacity ramp stays empty.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "common/classification/transfer_function.h"
@@ -19,17 +24,24 @@ struct ClassificationTable {
   double stored_origin = 0;
   std::vector<float> opacity;   // by bin: of opacity_distance voxel lengths, in [0, 1]
   std::vector<Rgb> color;       // by bin: straight
+  std::vector<double> value;    // by bin: the data value that it stands for
   double opacity_distance = 1;  // voxel lengths
   float max_opacity = 0;        // over all bins
+  double stored_extent = 1;     // > 0: between the stored samples that it tells apart, at least 2^-60 of that between all of them
 
   int size() const { return int(opacity.size()); }
-  // The data value in the middle of a bin.
-  double ValueOf(int bin, const ValueMapping& mapping) const { return mapping.FromStored(stored_origin + bin / bin_from_stored_scale); }
   int BinOf(double stored) const {
     const double bin = (stored - stored_origin) * bin_from_stored_scale + 0.5;
     return bin <= 0 ? 0 : bin >= size() - 1 ? size() - 1 : int(bin);
   }
 };
+
+// The data values between which a function changes: beyond them its curves are constant, and no isosurface stands. Of a function without
+// points first > last.
+struct NodeRange {
+  double first = std::numeric_limits<double>::infinity(), last = -first;
+};
+NodeRange NodesOf(const TransferFunction& transfer);
 
 // An isovalue among stored samples, in their precision. It is less by 2^-20 of itself: where all voxels have the value, rounding must not
 // move interpolated samples below it. It may be infinite: then no surface has it.

@@ -1,7 +1,7 @@
 // Colour maps that people know by name. Each is a small table of ours, made from a published formula or from colours that are published
 // for everybody's use, as `source` says.
 //
-// As presets of transfer functions they span all values of a volume and have the opacities of "auto". In slices, where nothing lies behind,
+// As presets of transfer functions they span the values that "auto" shows and have its opacities. In slices, where nothing lies behind,
 // they are opaque (ResolveLook).
 #pragma once
 

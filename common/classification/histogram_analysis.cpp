@@ -71,6 +71,34 @@ MaterialBins AbovePeak(const Histogram& histogram, int peak) {
   return {foot, last, 0};
 }
 
+// ---- outliers
+
+// The fewest consecutive bins that hold all voxels but at most `few`.
+MaterialBins BinsOfNearlyAll(const VolumeSummary& summary, double few) {
+  const auto count = [&](int bin) { return double(summary.histogram[std::size_t(bin)]); };
+  MaterialBins best = {0, kLast, 1};
+  double before = 0;  // voxels in the bins below `first`
+  for (int first = 0; first <= kLast && before <= few; before += count(first++)) {
+    double left_out = before;
+    int last = kLast;
+    while (last > first && left_out + count(last) <= few) left_out += count(last--);
+    if (last - first < best.last - best.first) best = {first, last, 1};
+  }
+  return best;
+}
+
+// Each brick's voxels are spread evenly over the part of its range within summary.range.
+void CountByBricks(const BrickRangeList& bricks, VolumeSummary& summary) {
+  constexpr double kCount = 1 << 20;  // of a brick, so that a share of it is a whole number
+  Histogram counts = {};
+  for (const ValueRange& brick : bricks) {
+    if (brick.min > brick.max || brick.max < summary.range.min || brick.min > summary.range.max) continue;
+    const int first = HistogramBin(summary.range, brick.min), last = HistogramBin(summary.range, brick.max);
+    for (int bin = first; bin <= last; ++bin) counts[std::size_t(bin)] += kCount / (last - first + 1);
+  }
+  std::ranges::transform(counts, summary.histogram.begin(), [](double count) { return std::uint64_t(count); });
+}
+
 Histogram Mirrored(Histogram histogram) {
   std::reverse(histogram.begin(), histogram.end());
   return histogram;
@@ -85,6 +113,31 @@ double BinValue(const ValueRange& range, int bin) {
 }
 
 double BinBorder(const ValueRange& range, int bin) { return std::lerp(double(range.min), double(range.max), bin / double(kHistogramBins)); }
+
+VolumeSummary WithoutOutliers(const VolumeSummary& summary) {
+  constexpr double kFew = 4, kFewShare = 1e-5, kMostShare = 0.01;  // voxels
+  constexpr int kTooFewBins = 8;
+  VolumeSummary usual;
+  usual.description = summary.description;
+  usual.range = summary.range;
+  usual.histogram = summary.histogram;
+  const double total = double(std::accumulate(summary.histogram.begin(), summary.histogram.end(), std::uint64_t{0}));
+  const MaterialBins bins = BinsOfNearlyAll(summary, std::min(std::max(kFew, kFewShare * total), kMostShare * total));
+  if (bins.last - bins.first >= kTooFewBins) return usual;
+  const double from = BinBorder(summary.range, bins.first), to = BinBorder(summary.range, bins.last + 1);
+  ValueRange within = {float(to), float(from)};
+  for (const ValueRange& brick : summary.bricks) {
+    if (brick.min > brick.max) continue;
+    for (const float end : {brick.min, brick.max}) {
+      if (end < from || end > to) continue;
+      within = {std::min(within.min, end), std::max(within.max, end)};
+    }
+  }
+  if (!(within.min < within.max)) return usual;
+  usual.range = within;
+  CountByBricks(summary.bricks, usual);
+  return usual;
+}
 
 Foreground FindForeground(const VolumeSummary& summary) {
   constexpr double kNoiseShare = 0.2;  // of the other side

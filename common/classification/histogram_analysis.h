@@ -12,6 +12,11 @@ double BinValue(const ValueRange& range, int bin);
 // Where a bin begins; bin kHistogramBins: where the last one ends.
 double BinBorder(const ValueRange& range, int bin);
 
+// Description, range and histogram without a few voxels that lie far beyond all others (a hot pixel, a mark of no data): they would leave
+// the others a few bins of the whole range. What the histogram lacks then comes from the ranges of the bricks: each brick's voxels count as
+// spread over its range. The same range and histogram if there are no such voxels, or no ranges of bricks.
+VolumeSummary WithoutOutliers(const VolumeSummary& summary);
+
 // Consecutive bins on one side of the background, [first, last]; first > last: none.
 struct MaterialBins {
   int first = 0, last = -1;

@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <vector>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/classification/color_maps.h"
 #include "common/classification/histogram_analysis.h"
@@ -57,11 +59,75 @@ double MedianOpacity(const VolumeSummary& summary, double share) {
   return std::clamp(1 - std::pow(0.02, 1 / stretch), 0.1, 0.5);
 }
 
+// Air of CT, in Hounsfield units.
+constexpr float kSurelyAir = -500, kNoHounsfield = -4096;
+
+// Whether values are best told by a colour map: those of simulations, which are no patient and no CT, and are no integers, or packed ones.
+bool IsSimulated(const VolumeSummary& summary) {
+  const VolumeDescription& description = summary.description;
+  const bool is_patient = description.geometry.orientation.world == World::kPatient;
+  const bool is_ct = summary.range.min <= kSurelyAir && summary.range.min >= kNoHounsfield;
+  return !is_patient && !is_ct && (description.type == ScalarType::kFloat32 || description.mapping.scale != 1);
+}
+
+// Voxels of the foreground by bin.
+std::array<double, kHistogramBins> CountsOf(const Foreground& foreground, const VolumeSummary& summary) {
+  std::array<double, kHistogramBins> counts = {};
+  for (const MaterialBins& bins : {foreground.below, foreground.above}) {
+    for (int bin = bins.first; bin <= bins.last; ++bin) counts[std::size_t(bin)] = double(summary.histogram[std::size_t(bin)]);
+  }
+  return counts;
+}
+
+// The data value below which the share q, in [0, 1], of the foreground lies. Values count as spread evenly over their bin.
+double ForegroundQuantile(const std::array<double, kHistogramBins>& counts, const ValueRange& range, double q) {
+  double left = q * std::accumulate(counts.begin(), counts.end(), 0.0);
+  double place = 0;  // in bins
+  for (int bin = 0; bin < kHistogramBins; ++bin) {
+    const double count = counts[std::size_t(bin)];
+    if (count == 0) continue;
+    place = bin + std::min(left / count, 1.0);
+    if (left <= count) break;
+    left -= count;
+  }
+  return std::lerp(double(range.min), double(range.max), place / kHistogramBins);
+}
+
+// As many colours for each share of the foreground: few voxels of most simulations have values near the ends of the range.
+std::vector<ColorPoint> ColorsByShare(const ColorMap& map, const Foreground& foreground, const VolumeSummary& summary) {
+  constexpr double kLeftOut = 0.01;  // share of the foreground, at either end
+  const auto counts = CountsOf(foreground, summary);
+  std::vector<ColorPoint> colors;
+  for (const auto& [at, color] : map.points) {
+    colors.push_back({ForegroundQuantile(counts, summary.range, std::lerp(kLeftOut, 1 - kLeftOut, at)), color});
+  }
+  return colors;
+}
+
+// Whether it has one value, as a mask does.
+bool IsOfOneValue(const Foreground& foreground, const VolumeSummary& summary) {
+  const auto counts = CountsOf(foreground, summary);
+  return std::ranges::count_if(counts, [](double count) { return count > 0; }) == 1;
+}
+
+// As near to the volume's least value as curves can tell apart.
+double JustAbove(const ValueRange& range) { return double(range.min) + std::max(1e-6 * std::abs(double(range.min)), 1e-30); }
+
+// All is background. Higher values would show: --scalar-range may stretch the function, and other times of a dataset have its function,
+// too.
+TransferFunction OfOneValue(const VolumeSummary& summary) {
+  constexpr double kOpacity = 0.1;
+  const double least = double(summary.range.min), above = JustAbove(summary.range);
+  return {{{least, kStops.front().above}, {above, kStops.back().above}}, {{least, 0}, {above, kOpacity}}};
+}
+
 // Shows what differs from the background. Opacities and colours are spread over the quantiles of those values: warm colours above the
-// background, cold ones below. A ray through an average stretch of material comes out nearly opaque. A volume of one value becomes a
-// translucent block.
+// background, cold ones below; or those of viridis, for values of simulations. A ray through an average stretch of material comes out
+// nearly opaque. A volume of one value has nothing to show.
 TransferFunction Automatic(const VolumeSummary& summary) {
-  const auto [above, below] = FindForeground(summary);
+  const Foreground foreground = FindForeground(summary);
+  const auto& [above, below] = foreground;
+  if (above.share == 0 && below.share == 0) return OfOneValue(summary);
   const double median = MedianOpacity(summary, above.share + below.share);
   TransferFunction transfer;
   const auto add = [&](double value, double opacity, const Rgb& color) {
@@ -78,9 +144,8 @@ TransferFunction Automatic(const VolumeSummary& summary) {
     add(BinBorder(summary.range, above.first), 0, kStops.front().above);
     for (const Stop& stop : kStops) add(Quantile(summary, above, stop.quantile), stop.opacity, stop.above);
   }
-  if (transfer.opacities.empty()) {
-    transfer.opacities = {{summary.range.min, 0.05}};
-    transfer.colors = {{summary.range.min, kStops[2].above}};
+  if (IsSimulated(summary) && !IsOfOneValue(foreground, summary)) {
+    transfer.colors = ColorsByShare(*FindNamed(NamedColorMaps(), "viridis"), foreground, summary);
   }
   return transfer;
 }
@@ -96,7 +161,7 @@ struct CtScale {
 // eight bits. For anything else (8-bit and industrial scans) shares of the range, chosen on 8-bit head scans.
 CtScale FindCtScale(const ValueRange& range) {
   constexpr CtScale kHounsfield = {-900, -350, 40, 180, 420, 1500};
-  if (range.min <= -500) return kHounsfield;
+  if (range.min <= kSurelyAir) return kHounsfield;
   if (range.min >= 0 && range.max >= 2000) {
     constexpr double kStored = 1024;
     return {kHounsfield.air + kStored,  kHounsfield.skin + kStored,       kHounsfield.soft_tissue + kStored,
@@ -257,11 +322,14 @@ TransferFunction Simulation(const VolumeSummary& summary) {
           {{begin, 0}, {at(0.40), 0.02}, {at(0.75), 0.08}, {at(0.93), 0.25}, {at(0.998), 0.7}}};
 }
 
+// The map spans the values that show, but for the rarest ones.
 TransferFunction Mapped(const ColorMap& map, const VolumeSummary& summary) {
+  constexpr double kLeftOut = 0.02;  // share of the foreground, at either end
+  const auto counts = CountsOf(FindForeground(summary), summary);
+  const double from = ForegroundQuantile(counts, summary.range, kLeftOut);
+  const double to = std::max(ForegroundQuantile(counts, summary.range, 1 - kLeftOut), JustAbove(summary.range));
   TransferFunction transfer;
-  for (const auto& [at, color] : map.points) {
-    transfer.colors.push_back({std::lerp(double(summary.range.min), double(summary.range.max), at), color});
-  }
+  for (const auto& [at, color] : map.points) transfer.colors.push_back({std::lerp(from, to, at), color});
   transfer.opacities = Automatic(summary).opacities;
   return transfer;
 }
@@ -299,13 +367,15 @@ const std::vector<TransferPreset>& TransferPresets() {
 
 ScalarRange InDataValues(const ScalarRange& range, const VolumeSummary& summary) {
   if (!range.percentiles) return range;
-  const MaterialBins material = MaterialOf(summary);
-  return {Quantile(summary, material, range.min / 100), Quantile(summary, material, range.max / 100)};
+  const VolumeSummary usual = WithoutOutliers(summary);
+  const MaterialBins material = MaterialOf(usual);
+  return {Quantile(usual, material, range.min / 100), Quantile(usual, material, range.max / 100)};
 }
 
 Result<TransferFunction> MakePreset(std::string_view name, const VolumeSummary& summary) {
-  if (const TransferPreset* preset = FindNamed(TransferPresets(), name)) return preset->make(summary);
-  return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}", name, NamesOf(TransferPresets())));
+  if (const TransferPreset* preset = FindNamed(TransferPresets(), name)) return preset->make(WithoutOutliers(summary));
+  return Status::NotFound(fmt::format("no transfer function is named '{}', there are {}{}", name, NamesOf(TransferPresets()),
+                                      DidYouMean(name, TransferPresets())));
 }
 
 }  // namespace slabstream

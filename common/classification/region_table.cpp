@@ -26,7 +26,7 @@ RegionTable MakeRegionTable(const TransferFunction& transfer, const Classificati
   const double stored_range = (table.size() - 1) / table.bin_from_stored_scale;
   RegionTable of{.origin = float(table.stored_origin),
                  .scale = stored_range > 0 ? float((RegionTable::kValues - 1) / stored_range) : 0,
-                 .slope_scale = float(std::min(double(kSteepest) * kSteepest * std::abs(mapping.scale) / steepest, 1e30)),
+                 .slope_scale = float(std::min(double(kSteepest) * kSteepest * std::abs(mapping.scale) / steepest, 1e37)),
                  .entries = {}};
   of.entries.resize(4 * std::size_t{RegionTable::kValues} * RegionTable::kSlopes);
   const RegionShapes shapes(transfer.regions);

@@ -127,7 +127,7 @@ struct TransferPreset {
   std::string_view name;     // what --transfer takes
   std::string_view purpose;  // one line for --help
   std::function<TransferFunction(const VolumeSummary&)> make;
-  const ColorMap* map = nullptr;  // it spreads these colours over all values, and all of them show in slices
+  const ColorMap* map = nullptr;  // it spreads these colours over the values that show; all show in slices
   bool has_regions = false;       // two-dimensional, for any volume
 };
 // The only list.

@@ -111,6 +111,16 @@ std::string Details(const CLI::App& app, const std::string& name) {
   return page;
 }
 
+std::string Examples(const CLI::App& app) {
+  const HelpPage* const page = HelpFormatter::PageOf(app);
+  if (page == nullptr || page->examples.empty()) return "";
+  std::string text = ".SH EXAMPLES\n";
+  for (const HelpExample& example : page->examples) {
+    text += fmt::format(".TP\n.B {}\n{}.\n", Escaped(example.command), Escaped(example.purpose));
+  }
+  return text;
+}
+
 std::string CommandList(const CLI::App& app, const std::string& name) {
   std::string list;
   for (const CLI::App* command : CommandsOf(app)) {
@@ -137,6 +147,7 @@ std::string ManPage(const CLI::App& app, const std::string& name) {
   page += fmt::format(".SH DESCRIPTION\n{}", Paragraphs(text.ends_with('.') ? text : text + "."));
   page += Options(app, ".SH");
   if (!CommandsOf(app).empty()) page += ".SH COMMANDS\n" + (program ? CommandList(app, name) : Details(app, name));
+  page += Examples(app);
   page +=
       ".SH \"EXIT STATUS\"\n0: done. 1: the service or the frame failed. 2: bad arguments or input. 130: stopped by Ctrl\\-C.\n"
       "One line on stderr gives the reason.\n";

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/parse_number.h"
 
 namespace slabstream {
@@ -78,7 +79,8 @@ Result<Duration> ParseDuration(std::string_view option, std::string_view text, D
 Result<std::size_t> ParseChoice(std::string_view option, std::string_view text, std::span<const std::string_view> choices) {
   const auto found = std::find(choices.begin(), choices.end(), text);
   if (found != choices.end()) return std::size_t(found - choices.begin());
-  return Status::InvalidArgument(fmt::format("{} '{}' is not one of {}", option, text, fmt::join(choices, ", ")));
+  return Status::InvalidArgument(
+      fmt::format("{} '{}' is not one of {}{}", option, text, fmt::join(choices, ", "), DidYouMean(text, choices)));
 }
 
 }  // namespace slabstream

@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,16 @@ void PrintWarning(const std::string& message);
 
 // The style of help texts, --help, --version, and --man for the build, which help texts do not mention.
 void SetUp(CLI::App& app, const std::string& version);
+
+// The program, or the command of it that was parsed: "slabstream render".
+std::string CommandName(const CLI::App& app);
+
+// NotFound: the program, or a command of it, has no command `word`. The message says which there are.
+Status NoCommand(const CLI::App& app, const std::string& word);
+
+// Parses the arguments, in the order in which they were typed. The exit status, if the program ends here: it has printed the help that was
+// asked for, or a line on stderr that says what is wrong. A command or an option that does not exist is told with the one that was meant.
+std::optional<int> Parse(CLI::App& app, std::vector<std::string> arguments);
 
 // Parses, and runs `run`. Returns the exit status.
 int ParseAndRun(CLI::App& app, int argc, const char* const* argv, const std::function<Status()>& run);

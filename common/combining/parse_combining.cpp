@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/base/parse_number.h"
 #include "common/combining/schemes.h"
@@ -59,7 +60,10 @@ Result<CombiningChoice> ParseCombining(std::string_view text) {
   std::optional<std::string_view> rest = text;
   const std::string_view name = CutFirst(rest, ':');
   const CombiningEntry* scheme = FindNamed(CombiningSchemes(), name);
-  if (scheme == nullptr) return Status::InvalidArgument(fmt::format("'{}' is not one of {}", name, NamesOf(CombiningSchemes())));
+  if (scheme == nullptr) {
+    return Status::InvalidArgument(
+        fmt::format("'{}' is not one of {}{}", name, NamesOf(CombiningSchemes()), DidYouMean(name, CombiningSchemes())));
+  }
   CombiningChoice choice = {scheme, {}};
   while (rest) {
     if (const Status status = ParseItem(CutFirst(rest, ','), *scheme, choice.arguments); !status.ok())

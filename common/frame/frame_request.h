@@ -83,9 +83,10 @@ inline std::optional<int> LevelNumber(std::string_view text) {
 inline bool IsLevel(std::string_view text) { return text == kAutomatic || LevelNumber(text); }
 
 struct FrameRequest {
-  std::string dataset;               // a name of the catalogue, 1 ... kMaxNameBytes
-  std::string renderer{kAutomatic};  // a name of Renderers() (common/renderers/registry.h), or kAutomatic: by the dataset (RenderersFor)
-  ParameterTexts parameters;         // of the renderer
+  std::string dataset;  // a name of the catalogue, 1 ... kMaxNameBytes
+  std::string renderer{
+      kAutomatic};            // a name of Renderers() (common/renderers/registry.h), or kAutomatic: one that can do it (RenderersFor)
+  ParameterTexts parameters;  // of the renderer
   ImageSize size;
   ViewParameters view;
   Clipping clipping;  // empty: the whole volume is drawn

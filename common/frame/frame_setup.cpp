@@ -3,7 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/frame/frame_unit.h"
+
 namespace slabstream {
+
+VolumeGeometry WorldGeometryOf(const FrameSetup& setup) { return InUnit(setup.description.geometry, 1 / setup.unit); }
+
+PictureGeometry PictureGeometryOf(const FrameSetup& setup) {
+  PictureGeometry geometry = GeometryOf(setup.camera, setup.description.geometry);
+  geometry.unit = UnitOf(WorldGeometryOf(setup));
+  geometry.target = setup.unit * geometry.target;
+  geometry.target_depth *= setup.unit;
+  geometry.pixel_size *= setup.unit;
+  return geometry;
+}
+
 PixelBounds FrameBounds(const FrameSetup& setup) {
   return setup.sheets.empty() ? PixelBounds{0, 0, setup.camera.width, setup.camera.height}
                               : PixelBounds{0, 0, setup.sheets.width, setup.sheets.height};

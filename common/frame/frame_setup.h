@@ -13,6 +13,7 @@
 #include "common/frame/opaque_front.h"
 #include "common/image/pixel_bounds.h"
 #include "common/image/pixel_format.h"
+#include "common/view/picture_geometry.h"
 #include "common/view/sheet_grid.h"
 #include "common/volume/grid_map.h"
 #include "common/volume/layers.h"
@@ -39,8 +40,10 @@ struct CoarserLevel {
   friend bool operator==(const CoarserLevel&, const CoarserLevel&) = default;
 };
 
+// Lengths are counted in `unit`: those of all geometries, of camera and clip region, and those in slopes of the transfer function.
 struct FrameSetup {
   DatasetId dataset = 0;
+  double unit = 1;  // in that of the volume's world; a power of two (common/frame/frame_unit.h)
   VolumeDescription description;
   LayerTypes layers;                        // that the dataset has
   ValueRange range;                         // data values that the classification table is made for
@@ -61,6 +64,10 @@ struct FrameSetup {
   OpaqueFront front = {};     // empty: nothing is known
   friend bool operator==(const FrameSetup&, const FrameSetup&) = default;
 };
+
+// The volume's geometry in its world.
+VolumeGeometry WorldGeometryOf(const FrameSetup& setup);
+PictureGeometry PictureGeometryOf(const FrameSetup& setup);
 
 // What workers hold of each voxel.
 inline SampleTypes TypesOf(const FrameSetup& setup) { return {setup.description.type, setup.layers}; }

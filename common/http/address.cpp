@@ -87,6 +87,20 @@ Result<std::string> ParseOrigin(std::string_view option, std::string_view text) 
   return Status::InvalidArgument(fmt::format("{} '{}' is not an origin such as https://viewer.example.org", option, text));
 }
 
+Result<std::string> ParseFrameSource(std::string_view option, std::string_view text) {
+  const std::string lower = Lower(text);
+  const auto belongs = [](unsigned char c) {
+    return std::isalnum(c) != 0 || std::string_view("+-.").find(char(c)) != std::string_view::npos;
+  };
+  const std::string_view scheme = std::string_view(lower).substr(0, lower.size() - std::min<std::size_t>(lower.size(), 1));
+  const bool is_scheme = lower.ends_with(':') && !scheme.empty() && std::isalpha(static_cast<unsigned char>(scheme.front())) != 0 &&
+                         std::ranges::all_of(scheme, belongs);
+  const auto ends_field = [](char c) { return c == ';' || c == ','; };
+  if (is_scheme || (ParseOrigin(option, text).ok() && std::ranges::none_of(lower, ends_field))) return lower;
+  return Status::InvalidArgument(
+      fmt::format("{} '{}' is neither an origin such as https://notebooks.example.org nor a scheme such as vscode-webview:", option, text));
+}
+
 Result<HttpUrl> ParseHttpUrl(std::string_view option, std::string_view text) {
   const std::string lower = Lower(text.substr(0, text.find("://") + 1));
   if (lower == "https:") {
@@ -165,7 +179,7 @@ Status CheckToken(std::string_view token) {
 
 Result<std::string> ReadToken(std::string_view option, const std::string& path) {
   constexpr std::size_t kMostBytes = 256;
-  Result<std::string> token = ReadTextFile(path, kMostBytes);
+  Result<std::string> token = ReadPrivateTextFile(path, kMostBytes);
   if (!token.ok()) return Status(token.status().code(), fmt::format("{} {}", option, token.status().message()));
   while (token->ends_with('\n')) token->pop_back();
   if (const Status checked = CheckToken(*token); !checked.ok()) {

@@ -24,6 +24,10 @@ Result<ListenAddress> ParseListenAddress(std::string_view option, std::string_vi
 // "https://viewer.example.org" or with a port; no path. The text in lower case. InvalidArgument.
 Result<std::string> ParseOrigin(std::string_view option, std::string_view text);
 
+// Whose pages may show this server's in a frame: an origin, as ParseOrigin takes it, or a scheme, "vscode-webview:". The text in lower
+// case, as the header Content-Security-Policy has it. InvalidArgument.
+Result<std::string> ParseFrameSource(std::string_view option, std::string_view text);
+
 // What a client asks, without TLS.
 struct HttpUrl {
   std::string host;  // a name or a numeric address; IPv6 without brackets
@@ -57,7 +61,7 @@ class OriginRules {
 Result<std::string> MakeToken();
 // What may stand in --token-file: 16 to 128 letters, digits, - and _. InvalidArgument.
 Status CheckToken(std::string_view token);
-// The token in a file, without the end of its line. InvalidArgument and the errors of ReadTextFile, which name the option.
+// The token in a file, without the end of its line. InvalidArgument and the errors of ReadPrivateTextFile, which name the option.
 Result<std::string> ReadToken(std::string_view option, const std::string& path);
 // In time that does not depend on where they differ.
 bool SameToken(std::string_view a, std::string_view b);

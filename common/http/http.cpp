@@ -355,6 +355,10 @@ class HttpConnection final : public Connection, public std::enable_shared_from_t
     if (error) return;
     Work();
     message_ = parser_->release();
+    // A proxy and this server might each believe another one of them.
+    for (const http::field once : {http::field::host, http::field::origin, http::field::authorization}) {
+      if (message_.count(once) > 1) return Refuse(400, "malformed", fmt::format("the request has {} twice", View(http::to_string(once))));
+    }
     HttpRequest request = RequestOf(message_);
     if (websocket::is_upgrade(message_)) return Upgrade(request);
     gone_ = request.gone;

@@ -6,10 +6,8 @@
 #include <string>
 #include <utility>
 
-#include "common/planning/brick_visibility.h"
+#include "common/frame/frame_unit.h"
 #include "common/planning/frame_occlusion.h"
-#include "common/planning/framing.h"
-#include "common/planning/layer_bricks.h"
 #include "common/planning/placement.h"
 #include "common/renderers/registry.h"
 #include "common/volume/light_volume.h"
@@ -42,29 +40,31 @@ Vec3 BesideViewer(const Camera& camera) { return 0.7 * camera.up - 0.6 * camera.
 Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
   const FrameRequest& request = resolved.frame;
   const VolumeSummary& summary = *resolved.summary;
+  const VolumeGeometry& geometry = summary.description.geometry;
+  if (Status status = CheckDrawable(geometry); !status.ok()) return status;
   FrameSetup setup;
   setup.dataset = resolved.volume.dataset();
-  setup.description = summary.description;
+  setup.unit = FrameUnitOf(geometry);
+  const auto in_unit = [unit = setup.unit](VolumeDescription description) {
+    description.geometry = InUnit(description.geometry, unit);
+    return description;
+  };
+  setup.description = in_unit(summary.description);
   setup.layers = summary.layers();
   setup.range = summary.range;
   setup.stored = summary.stored;
   for (const CoarserVolume& level : resolved.coarser) {
-    setup.coarser.push_back({level.dataset, level.summary->description, level.summary->stored});
+    setup.coarser.push_back({level.dataset, in_unit(level.summary->description), level.summary->stored});
   }
   SetRenderer(*resolved.volume.renderer(), setup);
   SetParameters(ParseParameters(*setup.renderer, request.parameters).value(), setup);
-  const VolumeGeometry& geometry = summary.description.geometry;
-  setup.transfer = resolved.volume.transfer();
-  setup.clip = resolved.volume.clip();
+  setup.transfer = InUnit(resolved.volume.transfer(), setup.unit);
+  const ClipRegion& clip = resolved.volume.clip();
+  setup.clip = InUnit(clip, setup.unit);
   setup.looks = resolved.volume.looks();
-  ViewParameters view = request.view;
-  if (view.fit) {
-    const BrickVisibility visibility(summary, setup.renderer->DrawnTable(setup.transfer, summary),
-                                     LayerBricks(summary, *setup.renderer, setup.looks));
-    view = FramedView(request, visibility.VisibleBricks(setup.clip), setup.clip, geometry);
-  }
-  if (Status status = CheckView(view, geometry); !status.ok()) return status;
-  if (Status status = setup.renderer->SetView(view, request.size, setup); !status.ok()) return status;
+  if (Status status = CheckView(request.view, geometry); !status.ok()) return status;
+  if (Status status = setup.renderer->SetView(InUnit(request.view, setup.unit), request.size, setup); !status.ok()) return status;
+  if (Status status = CheckDrawable(setup.camera); !status.ok()) return status;
   setup.shading = setup.transfer.material ? OnMaterial(request.shading, *setup.transfer.material) : request.shading;
   setup.transfer.material.reset();  // workers find it in the shading
   for (Vec3& light : setup.shading.lights) light = geometry.orientation.FromWorld(light);
@@ -73,6 +73,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& resolved) {
     const CoarserVolume from = resolved.light.value_or(CoarserVolume{setup.dataset, resolved.summary});
     Result<CoarserLevel> light = LightVolumeFrom(request.dataset, from.dataset, *from.summary);
     if (!light.ok()) return light.status();
+    light->description = in_unit(light->description);
     setup.light = *std::move(light);
   }
   setup.termination = request.termination;

@@ -10,22 +10,18 @@
 namespace slabstream {
 namespace {
 
-struct Ball {
-  Vec3 centre;        // data space
-  double radius = 0;  // physical, > 0
-};
-
 Vec3 MiddleOf(const Box& box) { return 0.5 * (ToVec3(box.begin + box.end) - Vec3{1, 1, 1}); }
 
 Ball BallRound(const std::vector<Box>& bricks, const VolumeGeometry& geometry) {
   Box hull;
   for (const Box& brick : bricks) hull = Hull(hull, brick);
-  Ball ball{.centre = MiddleOf(hull)};
+  const Vec3 middle = MiddleOf(hull);
+  double radius = 0;
   for (const Box& brick : bricks) {
-    const Vec3 farthest = Absolute(MiddleOf(brick) - ball.centre) + 0.5 * ToVec3(brick.size());
-    ball.radius = std::max(ball.radius, Length(farthest * geometry.spacing));
+    const Vec3 farthest = Absolute(MiddleOf(brick) - middle) + 0.5 * ToVec3(brick.size());
+    radius = std::max(radius, Length(farthest * geometry.spacing));
   }
-  return ball;
+  return {geometry.ToWorld(middle), radius};
 }
 
 // A box along the picture's right and up and the direction of view, in physical lengths.
@@ -94,17 +90,16 @@ std::optional<Ball> BallOfCut(const FrameRequest& request, const std::vector<Box
   const double shorter = std::min(camera.width, camera.height);
   const Vec3 half = cut.half_extent();
   const double radius = std::max(half.x * shorter / camera.width, half.y * shorter / camera.height);
-  return Ball{cut.centre(), std::max(radius, Least(geometry.spacing))};
+  return Ball{geometry.ToWorld(cut.centre()), std::max(radius, Least(geometry.spacing))};
 }
 
 }  // namespace
 
-ViewParameters FramedView(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
-                          const VolumeGeometry& geometry) {
-  if (bricks.empty()) return request.view;
+std::optional<Ball> FramedBall(const FrameRequest& request, const std::vector<Box>& bricks, const ClipRegion& clip,
+                               const VolumeGeometry& geometry) {
+  if (bricks.empty()) return std::nullopt;
   const std::optional<Ball> cut = BallOfCut(request, bricks, clip, geometry);
-  const Ball ball = cut ? *cut : BallRound(bricks, geometry);
-  return FitView(request.view, geometry, ball.centre, ball.radius);
+  return cut ? *cut : BallRound(bricks, geometry);
 }
 
 }  // namespace slabstream

@@ -14,6 +14,8 @@
 #include "common/planning/picture_extent.h"
 #include "common/planning/resolved_request.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/view/default_view.h"
+#include "common/view/world_limits.h"
 #include "common/volume/grid_map.h"
 #include "common/volume/light_volume.h"
 
@@ -38,7 +40,7 @@ int CoarsestFor(double width, const VolumeLevels& levels, int count) {
   return level;
 }
 
-// Of the pixels that show the nearest point; orthographic: of all pixels.
+// Of the pixels that show the nearest point, in the camera's unit; orthographic: of all pixels.
 double WidthAt(const Camera::ImageExtent& extent, const Camera& camera) {
   const bool perspective = camera.projection == Projection::kPerspective;
   return camera.PixelSizeAt(perspective ? std::max(extent.nearest, 1e-6 * camera.target_depth) : camera.target_depth);
@@ -57,13 +59,13 @@ LevelMap ZonesOf(const Index3& size) {
 // Calls function(width of the pixels that show its nearest point) for each zone of `map`, over `grid`; 0: it is not in the picture.
 template <class Function>
 void VisitZones(const LevelMap& map, const VolumeGeometry& grid, const FrameSetup& setup, Function&& function) {
-  const GridMap to_camera = MapBetween(grid, setup.description.geometry);
+  const GridMap to_camera = MapBetween(grid, WorldGeometryOf(setup));
   map.ForEachZone([&](const Index3& zone) {
     const Box box = map.BoxOf(zone, grid.size);
     const Camera::ImageExtent extent = ExtentOf(box, to_camera, setup.camera);
     const bool shown =
         InPicture(extent, setup.camera) && setup.clip.MayKeep(CoveringVoxels(box, to_camera, setup.description.geometry.size));
-    function(shown ? WidthAt(extent, setup.camera) : 0);
+    function(shown ? setup.unit * WidthAt(extent, setup.camera) : 0);
   });
 }
 
@@ -137,7 +139,7 @@ void MoveBox(ClipBox& box, const VolumeGeometry& finest, const VolumeGeometry& l
   const GridMap map = MapBetween(finest, level);
   for (const Axis axis : kAxes) {
     for (double* const bound : {&box.low[axis], &box.high[axis]}) {
-      if (std::abs(*bound) == kMaxWorldCoordinate) continue;
+      if (std::abs(*bound) == kMaxCoordinate) continue;
       const double voxels = box.unit == ClipUnit::kPercent ? *bound / 100 * finest.size[axis] : *bound;
       *bound = map.To(voxels - 0.5, axis) + 0.5;
     }
@@ -190,16 +192,16 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
     return Status::InvalidArgument(fmt::format("level is {}, but dataset \"{}\" has levels 0 to {}", *level, request.dataset, count - 1));
   }
   const VolumeGeometry& overview = levels.overview->description.geometry;
-  FrameRequest seen = AtLevel(request, finest, overview);
-  seen.shading = {};  // light changes no level, and here there is no level to make a light volume from
-  const Result<ResolvedRequest> resolved = ResolveRequest(std::move(seen), 1, levels.overview);
+  Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview), 1, levels.overview);
   if (!resolved.ok()) return resolved.status();
+  resolved->frame.shading = {};  // light changes no level, and here there is no level to make a light volume from
   const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return setup.status();
   const Camera& camera = setup->camera;
   const double detail = request.detail == 0 ? 1 : request.detail;
   const auto whole = [&] {
-    return LevelMap{.levels = {CoarsestFor(detail * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera), levels, count)}};
+    const double width = setup->unit * WidthAt(ExtentOf(overview.bounds(), {}, camera), camera);
+    return LevelMap{.levels = {CoarsestFor(detail * width, levels, count)}};
   };
   const bool mixes =
       camera.projection == Projection::kPerspective && setup->renderer->Can(Ability::kLevels) && setup->transfer.isosurfaces.empty();
@@ -210,10 +212,27 @@ Result<LevelMap> LevelsOf(const FrameRequest& request, const VolumeLevels& level
   return WithoutUnused(MapOf(detail, levels, CoarsestFor(detail * least, levels, count), *setup));
 }
 
+Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry& finest,
+                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed) {
+  ChosenView chosen = {.view = WithDefaults(request.view, finest.orientation.world), .framed = framed};
+  if (!std::exchange(chosen.view.fit, false).value()) return ChosenView{chosen.view, std::nullopt};
+  if (!framed) {
+    // Coarser levels have other indices.
+    const Result<ClipRegion> clip = MakeClipRegion(request.clipping, finest);
+    if (!clip.ok()) return clip.status();
+    const Result<ResolvedRequest> resolved = ResolveRequest(AtLevel(request, finest, overview->description.geometry), 1, overview);
+    if (!resolved.ok()) return resolved.status();
+    chosen.framed = resolved->framed;
+  }
+  if (chosen.framed) chosen.view = FitView(chosen.view, finest, *chosen.framed);
+  return chosen;
+}
+
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level) {
   if (finest == level) return request;
   ViewParameters& view = request.view;
-  if (!view.look_at && !view.fit) view.look_at = finest.ToWorld(finest.centre());
+  view = WithDefaults(view, level.orientation.world);
+  if (!view.look_at && !*view.fit) view.look_at = finest.ToWorld(finest.centre());
   if (view.projection == Projection::kPerspective) {
     if (!view.eye && view.distance == 0) {
       view.distance = BoundingRadius(finest) / std::sin(view.fov_degrees * (std::numbers::pi / 360));
@@ -221,7 +240,7 @@ FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const V
   } else {
     const Vec3 centre = level.orientation.FromWorld(level.ToWorld(level.centre()) - finest.orientation.origin) / finest.spacing;
     view.distance = MakeCamera(view, request.size, finest).Project(centre).depth;
-    if (!view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
+    if (!*view.fit) view.zoom *= BoundingRadius(level) / BoundingRadius(finest);
   }
   if (request.clipping.box) MoveBox(*request.clipping.box, finest, level);
   if (request.clipping.slab) MoveSlab(*request.clipping.slab, finest);

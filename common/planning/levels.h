@@ -43,6 +43,18 @@ LevelMap NoneLarger(LevelMap map, std::int64_t bytes, const VolumeLevels& levels
 // coarsest.
 int LightLevelOf(const VolumeLevels& levels);
 
+// By which view a picture is made.
+struct ChosenView {
+  ViewParameters view;         // complete, without `fit`, in terms of the finest level
+  std::optional<Ball> framed;  // what the picture frames, if its view fits and anything shows
+};
+
+// The view of `request` with what it leaves to the volume: angles (WithDefaults), and what it frames. That is `framed`, or what shows by
+// the overview, so that pictures from all levels frame the same. `finest`: the overview's geometry, if there is one level. Errors of
+// ResolveRequest.
+Result<ChosenView> ChooseView(const FrameRequest& request, const VolumeGeometry& finest,
+                              const std::shared_ptr<const VolumeSummary>& overview, const std::optional<Ball>& framed = {});
+
 // The request that shows of `level` what `request` shows of `finest`. `level` describes the same part of the world.
 FrameRequest AtLevel(FrameRequest request, const VolumeGeometry& finest, const VolumeGeometry& level);
 

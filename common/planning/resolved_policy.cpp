@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/check.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/combining/schemes.h"
 
@@ -15,7 +16,8 @@ template <class Entry>
 Status CheckName(std::string_view field, std::string_view name, const std::vector<Entry>& entries, bool may_be_open = false) {
   if ((may_be_open && name == kAutomatic) || FindNamed(entries, name) != nullptr) return Status::Ok();
   const std::string open = may_be_open ? fmt::format("{}, ", kAutomatic) : "";
-  return Status::InvalidArgument(fmt::format("{} is '{}', but must be one of: {}{}", field, name, open, NamesOf(entries)));
+  return Status::InvalidArgument(
+      fmt::format("{} is '{}', but must be one of: {}{}{}", field, name, open, NamesOf(entries), DidYouMean(name, entries)));
 }
 
 }  // namespace

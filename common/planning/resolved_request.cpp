@@ -3,11 +3,17 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
 #include "common/base/find_named.h"
+#include "common/planning/brick_visibility.h"
+#include "common/planning/framing.h"
+#include "common/planning/layer_bricks.h"
 #include "common/renderers/registry.h"
+#include "common/renderers/renderer_choice.h"
+#include "common/view/default_view.h"
 
 namespace slabstream {
 namespace {
@@ -104,26 +110,18 @@ void Brighten(double factor, TransferFunction& transfer) {
   for (TransferRegion& region : transfer.regions) region.color = Brightened(region.color, factor);
 }
 
-// `asked`: the renderer's name in the request.
-Status CheckShowsRegions(const RendererKind& renderer, std::string_view asked, const TransferFunction& transfer) {
-  if (transfer.regions.empty() || renderer.Can(Ability::kRegions)) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("renderer is '{}', but a two-dimensional transfer function needs one of: {}", asked,
-                                             NamesOfAble(NameOf(Ability::kRegions))));
-}
-
 }  // namespace
 
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary) {
   const VolumeGeometry& geometry = summary->description.geometry;
-  const RendererKind* const renderer =
-      request.renderer == kAutomatic ? &DefaultRenderer(!summary->cells.empty()) : FindRenderer(request.renderer);
-  const std::string asked = std::exchange(request.renderer, std::string(renderer->name()));
+  const Result<std::vector<const RendererKind*>> able = RenderersFor(request);
+  if (!able.ok()) return able.status();
+  const RendererKind& renderer = PreferredRenderer(*able, !summary->cells.empty());
+  request.renderer = renderer.name();
   if (Status status = CheckNames(request.policy); !status.ok()) return status;
-  if (const auto parameters = ParseParameters(*renderer, request.parameters); !parameters.ok()) return parameters.status();
-  if (Status status = CheckHasWhatIsDrawn(*renderer, request.dataset, *summary); !status.ok()) return status;
+  if (Status status = CheckHasWhatIsDrawn(renderer, request.dataset, *summary); !status.ok()) return status;
   Result<TransferFunction> transfer = ResolveTransfer(request.transfer, *summary);
   if (!transfer.ok()) return transfer.status();
-  if (Status status = CheckShowsRegions(*renderer, asked, *transfer); !status.ok()) return status;
   const auto* const name = std::get_if<std::string>(&request.transfer.choice);
   if (request.clipping.slab && name != nullptr && FindNamed(TransferPresets(), *name)->map != nullptr) {
     transfer->opacities = {{double(summary->range.min), 1}};
@@ -133,13 +131,22 @@ Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, 
   if (!clip.ok()) return clip.status();
   Result<LayerLooks> layers = ResolveLayers(request, *summary);
   if (!layers.ok()) return layers.status();
+  request.view = WithDefaults(request.view, geometry.orientation.world);
+  std::optional<Ball> framed;
+  if (*request.view.fit) {
+    const BrickVisibility visibility(*summary, renderer.DrawnTable(*transfer, *summary), LayerBricks(*summary, renderer, *layers));
+    framed = FramedBall(request, visibility.VisibleBricks(*clip), *clip, geometry);
+    if (framed) request.view = FitView(request.view, geometry, *framed);
+    request.view.fit = false;
+  }
   request.policy = SettledPolicy(request, geometry);
   std::optional<ResolvedPolicy> policy;
   if (!LeavesChoice(request.policy)) policy = ResolvePolicy(request.policy, geometry);
   return ResolvedRequest{.frame = std::move(request),
-                         .volume = {dataset, *std::move(transfer), renderer, *std::move(clip), *std::move(layers)},
+                         .volume = {dataset, *std::move(transfer), &renderer, *std::move(clip), *std::move(layers)},
                          .summary = std::move(summary),
-                         .policy = std::move(policy)};
+                         .policy = std::move(policy),
+                         .framed = framed};
 }
 
 Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const VolumeSummary& summary) {
@@ -151,7 +158,15 @@ Result<TransferFunction> ResolveTransfer(const TransferChoice& choice, const Vol
   transfer->isosurfaces = choice.isosurfaces;
   transfer->gradient_opacities = choice.gradient_opacities;
   if (choice.scalar_range) transfer = Stretched(*std::move(transfer), InDataValues(*choice.scalar_range, summary));
-  return WithCurvesOfRegions(*std::move(transfer));
+  transfer = WithCurvesOfRegions(*std::move(transfer));
+  // Values that are almost in one place may not be told apart by what was computed. Workers would not read the frame.
+  const auto finite = [](const auto& points) {
+    return std::ranges::all_of(points, [](const auto& point) { return std::isfinite(point.value); });
+  };
+  if (!finite(transfer->colors) || !finite(transfer->opacities))
+    return Status::InvalidArgument(
+        "the transfer function has points at values that are no numbers: its values are too close to each other");
+  return transfer;
 }
 
 }  // namespace slabstream

@@ -1,6 +1,6 @@
 // ResolvedRequest: a request in which all that it says about its dataset has been looked up: renderer, transfer function, clip region,
-// labels and policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they meet
-// no unknown name.
+// labels, view and policy. A request is resolved once, when its dataset is there. Planning, counting and answering take the result, so they
+// meet no unknown name.
 #pragma once
 
 #include <memory>
@@ -24,7 +24,7 @@ struct CoarserVolume {
 };
 
 struct ResolvedRequest {
-  FrameRequest frame;                            // with the name of its renderer and a settled policy (SettledPolicy)
+  FrameRequest frame;                            // with its renderer's name, its whole view and a settled policy (SettledPolicy)
   ClassifiedVolume volume;                       // how it shows the dataset, whatever its view
   std::shared_ptr<const VolumeSummary> summary;  // of the dataset; never null
   std::optional<ResolvedPolicy> policy;          // none: a choice is left (LeavesChoice)
@@ -33,11 +33,12 @@ struct ResolvedRequest {
   std::vector<CoarserVolume> coarser = {};
   // Of a dataset with several levels, if the request shows shadows or ambient occlusion: the level that its light volume is made from.
   std::optional<CoarserVolume> light = {};
+  std::optional<Ball> framed = {};  // what the picture frames, if the request's view fits and anything shows
 };
 
-// Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as CheckHasWhatIsDrawn; the
-// renderer that kAutomatic means has no such parameter; the volume has no slice with the slab's index, or no such layer, or there is no
-// such label; NotFound: no such preset.
+// Pure. The request must be valid (Validate). InvalidArgument: an unknown name in the policy (CheckNames), as RenderersFor and
+// CheckHasWhatIsDrawn; the volume has no slice with the slab's index, or no such layer, or there is no such label; NotFound: no such
+// preset.
 Result<ResolvedRequest> ResolveRequest(FrameRequest request, DatasetId dataset, std::shared_ptr<const VolumeSummary> summary);
 
 // The function that a request names or holds, for this volume. NotFound: no such preset.

@@ -33,16 +33,6 @@ Result<double> ParseParameter(const RendererParameter& parameter, const std::str
       fmt::format("{} is '{}', but must be a number in [{}, {}]", parameter.name, text, parameter.least, parameter.most));
 }
 
-Status NoSuchRenderer(std::string_view name, std::string_view others) {
-  return Status::InvalidArgument(fmt::format("renderer is '{}', but must be one of: {}{}", name, others, fmt::join(RendererNames(), ", ")));
-}
-
-// Null: the renderer does not have it.
-const RendererParameter* FindParameter(const RendererKind& kind, std::string_view name) {
-  const auto found = std::ranges::find(kind.parameters(), name, &RendererParameter::name);
-  return found == kind.parameters().end() ? nullptr : &*found;
-}
-
 }  // namespace
 
 std::span<const RendererKind* const> Renderers() {
@@ -86,34 +76,39 @@ const RendererKind& DefaultRenderer(bool has_cells) {
 
 Result<const RendererKind*> RequireRenderer(std::string_view name) {
   if (const RendererKind* kind = FindRenderer(name)) return kind;
-  return NoSuchRenderer(name, "");
+  return NoSuchRenderer(name);
 }
 
-Result<std::vector<const RendererKind*>> RenderersFor(std::string_view name) {
-  if (name == kAutomatic) return std::vector{&DefaultRenderer(false), &DefaultRenderer(true)};
-  if (const RendererKind* kind = FindRenderer(name)) return std::vector{kind};
-  return NoSuchRenderer(name, fmt::format("{}, ", kAutomatic));
+Status NoSuchRenderer(std::string_view name, std::string_view others) {
+  return Status::InvalidArgument(fmt::format("renderer is '{}', but must be one of: {}{}", name, others, fmt::join(RendererNames(), ", ")));
 }
 
-Status CheckParameters(std::string_view name, std::span<const RendererKind* const> renderers, const ParameterTexts& texts) {
-  for (const auto& [parameter, text] : texts) {
+const RendererParameter* FindParameter(const RendererKind& kind, std::string_view name) {
+  const auto found = std::ranges::find(kind.parameters(), name, &RendererParameter::name);
+  return found == kind.parameters().end() ? nullptr : &*found;
+}
+
+Status CheckParameters(const ParameterTexts& texts) {
+  for (const auto& [name, text] : texts) {
     const RendererParameter* found = nullptr;
-    for (const RendererKind* kind : renderers) found = found != nullptr ? found : FindParameter(*kind, parameter);
-    if (found == nullptr) {
-      return Status::InvalidArgument(fmt::format("{} is '{}', but the renderer '{}' has no such parameter", parameter, text, name));
-    }
+    for (const RendererKind* kind : Renderers()) found = found != nullptr ? found : FindParameter(*kind, name);
+    if (found == nullptr) return Status::InvalidArgument(fmt::format("{} is '{}', but no renderer has such a parameter", name, text));
     if (const Result<double> value = ParseParameter(*found, text); !value.ok()) return value.status();
   }
   return Status::Ok();
 }
 
 Result<std::vector<double>> ParseParameters(const RendererKind& kind, const ParameterTexts& texts) {
-  const RendererKind* const renderers[] = {&kind};
-  if (Status status = CheckParameters(kind.name(), renderers, texts); !status.ok()) return status;
+  for (const auto& [name, text] : texts) {
+    if (FindParameter(kind, name) != nullptr) continue;
+    return Status::InvalidArgument(fmt::format("{} is '{}', but the renderer '{}' has no such parameter", name, text, kind.name()));
+  }
   std::vector<double> values;
   for (const RendererParameter& parameter : kind.parameters()) {
     const auto text = texts.find(parameter.name);
-    values.push_back(text == texts.end() ? parameter.standard : ParseParameter(parameter, text->second).value());
+    const Result<double> value = text == texts.end() ? parameter.standard : ParseParameter(parameter, text->second);
+    if (!value.ok()) return value.status();
+    values.push_back(*value);
   }
   return values;
 }

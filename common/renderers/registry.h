@@ -13,10 +13,11 @@
 
 namespace slabstream {
 
-// In the order of the list.
+// In the order of the list, which is that of preference.
 std::span<const RendererKind* const> Renderers();
 
-// What kAutomatic means for a dataset: the first renderer that draws its cells, if it is an unstructured grid, or the first that does not.
+// The renderer of a request that asks for nothing special (renderer_choice.h): the first one that draws the cells of unstructured grids, or
+// the first one that draws voxels.
 const RendererKind& DefaultRenderer(bool has_cells = false);
 
 std::vector<std::string_view> RendererNames();
@@ -29,9 +30,11 @@ const RendererKind* FindRenderer(std::string_view name);
 // InvalidArgument, naming all renderers, if none has this name.
 Result<const RendererKind*> RequireRenderer(std::string_view name);
 
-// Those that may make the picture of a request for this name: the one of this name, or all that kAutomatic may mean. InvalidArgument: as
-// RequireRenderer.
-Result<std::vector<const RendererKind*>> RenderersFor(std::string_view name);
+// The error for an unknown name. `others`: what may stand in place of a renderer's name, each followed by ", ".
+Status NoSuchRenderer(std::string_view name, std::string_view others = "");
+
+// Null: the renderer does not have it.
+const RendererParameter* FindParameter(const RendererKind& kind, std::string_view name);
 
 // A value as requests write it.
 std::string TextOf(const RendererParameter& parameter, double value);
@@ -39,7 +42,7 @@ std::string TextOf(const RendererParameter& parameter, double value);
 // The value of each parameter of `kind`, from the request's texts or its default. InvalidArgument, naming the parameter, its text and its
 // limits: a parameter that the renderer does not have, or a text that is no valid value.
 Result<std::vector<double>> ParseParameters(const RendererKind& kind, const ParameterTexts& texts);
-// The same errors: a parameter that none of RenderersFor(name) has, or a text that is no valid value.
-Status CheckParameters(std::string_view name, std::span<const RendererKind* const> renderers, const ParameterTexts& texts);
+// The same errors, if no renderer has the parameter.
+Status CheckParameters(const ParameterTexts& texts);
 
 }  // namespace slabstream

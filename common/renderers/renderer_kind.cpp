@@ -10,6 +10,7 @@
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
 #include "common/kernels/resample.h"
+#include "common/view/supersampled_voxel.h"
 
 namespace slabstream {
 namespace {
@@ -54,7 +55,7 @@ std::vector<std::string_view> RendererKind::AbilityNames() const {
 
 Status RendererKind::SetView(const ViewParameters& view, ImageSize size, FrameSetup& setup) const {
   const VolumeGeometry& farthest = GeometryOf(setup, std::uint8_t(setup.coarser.size()));
-  setup.camera = MakeCamera(view, size, setup.description.geometry, Least(farthest.spacing));
+  setup.camera = MakeCamera(view, size, setup.description.geometry, SupersampledVoxel(farthest));
   return Status::Ok();
 }
 

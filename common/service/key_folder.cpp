@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/base/files.h"
+#include "common/base/printable.h"
 #include "common/wire/any_message.h"
 
 namespace slabstream {
@@ -24,6 +25,11 @@ constexpr std::size_t kMaxFileBytes = std::size_t{1} << 20;
 std::string Now() { return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr))); }
 
 }  // namespace
+
+bool IsHolderName(std::string_view name) {
+  return !name.empty() && name.size() <= kMaxHolderNameBytes && name.front() != '.' && name.front() != ' ' && name.back() != ' ' &&
+         name.find('/') == std::string_view::npos && Printable(std::string(name)) == name;
+}
 
 Result<KeyFolder> KeyFolder::Open(const std::string& path) {
   if (::mkdir(path.c_str(), 0700) != 0 && errno != EEXIST)
@@ -54,7 +60,7 @@ Status KeyFolder::Read() {
     server_.public_key = *public_key;
     for (const Json& entry : json.at("admitted")) {
       const std::optional<Role> role = FindRole(entry.at("role").get<std::string>());
-      AdmittedKey key{entry.at("public_key"), role.value_or(Role::kClient), entry.at("made")};
+      AdmittedKey key{entry.at("public_key"), role.value_or(Role::kClient), entry.at("made"), entry.value("name", std::string())};
       if (!role || !IsKey(key.public_key))
         return Status::InvalidArgument(fmt::format("'{}': an admitted key has no role or is none", path));
       admitted_.push_back(std::move(key));
@@ -67,8 +73,11 @@ Status KeyFolder::Read() {
 
 Status KeyFolder::Save() const {
   Json json = {{"server_secret_key", server_.secret_key}, {"admitted", Json::array()}};
-  for (const AdmittedKey& key : admitted_)
-    json["admitted"].push_back({{"public_key", key.public_key}, {"role", NameOf(key.role)}, {"made", key.made}});
+  for (const AdmittedKey& key : admitted_) {
+    Json entry = {{"public_key", key.public_key}, {"role", NameOf(key.role)}, {"made", key.made}};
+    if (!key.name.empty()) entry["name"] = key.name;
+    json["admitted"].push_back(std::move(entry));
+  }
   return WritePrivateTextFile(path_ + "/keys.json", json.dump(2) + "\n");
 }
 
@@ -122,14 +131,36 @@ Result<AdmittedKey> KeyFolder::Rotate(Role role) {
   return done;
 }
 
+Result<AdmittedKey> KeyFolder::Issue(const std::string& public_key, Role role, const std::string& name) {
+  if (role == Role::kWorker) return Status::InvalidArgument("a key with a name is of role client or admin; workers share worker.json");
+  if (!IsHolderName(name)) {
+    return Status::InvalidArgument(
+        fmt::format("name '{}' must be 1 to {} bytes of printable text that can name a file: no '/', no '.' at the beginning",
+                    Printable(name), kMaxHolderNameBytes));
+  }
+  if (const auto found = std::ranges::find(admitted_, name, &AdmittedKey::name); found != admitted_.end()) {
+    return Status::InvalidArgument(
+        fmt::format("'{}' has the key {} already: revoke that one, or choose another name", name, IdOfKey(found->public_key)));
+  }
+  if (!IsKey(public_key) || Find(public_key) != nullptr) return Status::InvalidArgument("the key is none, or is admitted already");
+  admitted_.push_back({public_key, role, Now(), name});
+  if (Status saved = Save(); !saved.ok()) {
+    admitted_.pop_back();
+    return saved;
+  }
+  return admitted_.back();
+}
+
 Result<std::string> KeyFolder::Revoke(const std::string& key) {
-  const auto is_it = [&](const AdmittedKey& admitted) { return admitted.public_key == key || IdOfKey(admitted.public_key) == key; };
+  const auto is_it = [&](const AdmittedKey& admitted) {
+    return admitted.public_key == key || IdOfKey(admitted.public_key) == key || (!key.empty() && admitted.name == key);
+  };
   const auto found = std::ranges::find_if(admitted_, is_it);
   if (found == admitted_.end())
     return Status::NotFound(fmt::format("no key '{}' is admitted; `slabstream keys list` prints the admitted keys", key));
   std::string public_key = found->public_key;
   if (std::ranges::count_if(admitted_, is_it) > 1)
-    return Status::InvalidArgument(fmt::format("'{}' is the id of several keys: name one of them in full", key));
+    return Status::InvalidArgument(fmt::format("'{}' is the id or the name of several keys: give one of the public keys in full", key));
   admitted_.erase(found);
   if (Status saved = Save(); !saved.ok()) return saved;
   return public_key;

@@ -5,6 +5,7 @@
 
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
@@ -14,6 +15,11 @@
 #include "common/transport/keys.h"
 
 namespace slabstream {
+
+inline constexpr std::size_t kMaxHolderNameBytes = 64;
+
+// 1 to kMaxHolderNameBytes bytes of printable text that can stand in a file's name: no '/', no '.' at the beginning, no space at an end.
+bool IsHolderName(std::string_view name);
 
 class KeyFolder {
  public:
@@ -35,7 +41,10 @@ class KeyFolder {
 
   // A new pair for the role's file. The keys of the role until now stay admitted until they are revoked.
   Result<AdmittedKey> Rotate(Role role);
-  // `key`: a public one, or its IdOfKey. The public key. NotFound: no such key; InvalidArgument: two keys have this id.
+  // Admits a key that its holder has made, so that its secret half stays there. `role`: client or admin. InvalidArgument: the role, a name
+  // that is no IsHolderName or is another key's, or what is no key, or is admitted already.
+  Result<AdmittedKey> Issue(const std::string& public_key, Role role, const std::string& name);
+  // `key`: a public one, its IdOfKey, or its holder's name. The public key. NotFound: no such key; InvalidArgument: it means two keys.
   Result<std::string> Revoke(const std::string& key);
 
  private:

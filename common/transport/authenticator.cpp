@@ -134,8 +134,8 @@ struct Authenticator::Impl {
 
   zmq::socket_t socket;
   Wakeup wakeup;
-  std::deque<Request> waiting;  // the thread's, as is complaints
-  LimitedLog complaints;
+  std::deque<Request> waiting;                                          // the thread's, as is complaints
+  LimitedLog complaints{LimitedLog::kAtOnce, std::chrono::minutes(1)};  // a peer with a lost key may try for months
   std::mutex mutex;
   std::map<std::string, Plane> planes;  // guarded by mutex
   std::jthread thread;                  // last member

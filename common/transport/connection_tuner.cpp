@@ -37,7 +37,7 @@ bool StaysOnThisHost(int descriptor) {
 
 ConnectionTuner::ConnectionTuner(zmq::socket_t& socket)
     : ConnectionMonitor(socket, ZMQ_EVENT_CONNECTED | ZMQ_EVENT_DISCONNECTED | ZMQ_EVENT_CLOSED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED |
-                                    ZMQ_EVENT_HANDSHAKE_FAILED_AUTH) {}
+                                    ZMQ_EVENT_HANDSHAKE_FAILED_AUTH | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL) {}
 
 // The connection may be gone and its descriptor reused: then the new connection is one of this host too, or stays unchanged.
 void ConnectionTuner::on_event_connected(const zmq_event_t& event, const char*) {

@@ -20,7 +20,7 @@ class ConnectionTuner : public ConnectionMonitor {
   // Before the socket connects. Throws zmq::error_t.
   explicit ConnectionTuner(zmq::socket_t& socket);
 
-  // Somebody listens who does not admit the socket's key.
+  // Somebody listens who does not admit the socket's key; or who has keys while the socket has none, or the other way round.
   bool refused() const { return refused_; }
   // Whether there is a connection, and the other end has admitted this one.
   bool connected() const { return connected_; }
@@ -38,6 +38,9 @@ class ConnectionTuner : public ConnectionMonitor {
   }
   void on_event_closed(const zmq_event_t&, const char*) override { broken_ = true; }  // it could not be made
   void on_event_handshake_failed_auth(const zmq_event_t&, const char*) override { refused_ = true; }
+  void on_event_handshake_failed_protocol(const zmq_event_t& event, const char*) override {
+    if (event.value == ZMQ_PROTOCOL_ERROR_ZMTP_MECHANISM_MISMATCH) refused_ = true;
+  }
 
   bool refused_ = false, connected_ = false, broken_ = false;
   std::string local_host_;

@@ -1,7 +1,7 @@
 // LatestSeals: the seals of one plane of sealed connections, at the end that listens: one a key, the latest. Private to this folder.
 //
-// A seal is kept after its connections, and even after its key has left the plane: a ticket is no secret, so whoever has recorded one
-// may connect with it, and must not be believed what was said before.
+// A ticket is no secret: whoever has recorded one may connect with it, and must not be believed what was said before. So what was heard of
+// a seal is remembered after its connections, and even after its key has left the plane. That takes some 300 bytes a key.
 #pragma once
 
 #include <cstdint>
@@ -28,12 +28,17 @@ class LatestSeals {
   bool Enter(const std::string& from, const Seal& seal);
 
   // What opens frames of the seal of `from`, for the socket's thread only; null: it has none.
-  std::shared_ptr<Unsealer> Of(const std::string& from) const;
+  std::shared_ptr<Unsealer> Of(const std::string& from);
+
+  // On the socket's thread: the connections of `from` that were heard of were ended. Frees what only connections need, until another one
+  // is heard of.
+  void Retire(const std::string& from);
 
  private:
   struct Entry {
-    SealName name;
-    std::shared_ptr<Unsealer> unsealer;
+    Seal seal;                           // without its ticket
+    Unsealer::Place heard;               // before it was retired
+    std::shared_ptr<Unsealer> unsealer;  // null: it is retired
   };
   const KeyPair own_;
   const std::uint64_t max_payload_bytes_;

@@ -25,18 +25,25 @@ void AfterHandOver([[maybe_unused]] const void* data) {
 #endif
 }
 
+struct Shared {
+  Bytes bytes;
+  HeldBytes held;
+};
+
 void LetGo(void* data, void* owner) {
   AfterHandOver(data);
-  delete static_cast<Bytes*>(owner);
+  const std::unique_ptr<Shared> shared(static_cast<Shared*>(owner));
+  if (shared->held != nullptr) *shared->held -= shared->bytes.size();
 }
 
 }  // namespace
 
-zmq::message_t Share(Bytes bytes) {
+zmq::message_t Share(Bytes bytes, HeldBytes held) {
   if (bytes.empty()) return {};
-  auto owner = std::make_unique<Bytes>(std::move(bytes));
-  const std::span<const std::byte> data = owner->span();
+  auto owner = std::make_unique<Shared>(Shared{std::move(bytes), std::move(held)});
+  const std::span<const std::byte> data = owner->bytes.span();
   zmq::message_t message(const_cast<std::byte*>(data.data()), data.size(), LetGo, owner.get());
+  if (owner->held != nullptr) *owner->held += data.size();
   BeforeHandOver(data.data());
   (void)owner.release();  // the message owns it now
   return message;

@@ -226,11 +226,12 @@ PooledVector<std::byte> Sealer::Next() {
   return sealed;
 }
 
-Unsealer::Unsealer(const Seal& seal, std::uint64_t max_payload_bytes)
-    : cipher_(std::make_unique<FrameCipher>(seal, false)), max_payload_bytes_(max_payload_bytes) {}
+Unsealer::Unsealer(const Seal& seal, std::uint64_t max_payload_bytes, Place last)
+    : cipher_(std::make_unique<FrameCipher>(seal, false)), max_payload_bytes_(max_payload_bytes), last_(last) {}
 Unsealer::~Unsealer() = default;
 
-std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open(std::span<const std::byte> frame) {
+std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open(std::span<const std::byte> frame,
+                                                                                 std::vector<std::byte>& scratch) {
   if (frame.size() < kSealedPlaceBytes + kSealedTagBytes || frame.size() > kSealedFrameBytes) return Forged{};
   const Place place = {LoadLittle<std::uint64_t>(Raw(frame.data())), LoadLittle<std::uint32_t>(Raw(frame.data()) + 8)};
   const bool first = place.frame == 0;
@@ -240,8 +241,8 @@ std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open
   // The frame that the message lacks is opened into its place. If it turns out to be forged, the right one is written over it.
   const bool fits =
       partial_ && place == partial_->next && sealed.size() == std::min(partial_->payload.size() - partial_->filled, kSealedPartBytes);
-  scratch_.resize(kSealedPartBytes);
-  std::byte* const to = fits ? partial_->payload.data() + partial_->filled : scratch_.data();
+  scratch.resize(kSealedPartBytes);
+  std::byte* const to = fits ? partial_->payload.data() + partial_->filled : scratch.data();
   cipher_->Begin(place.message, frame.data(), to);
   if (!sealed.empty()) cipher_->Pass(sealed);
   if (!cipher_->TagFits(sealed.data() + sealed.size())) return Forged{};
@@ -252,7 +253,7 @@ std::variant<Unsealer::Forged, Unsealer::More, Unsealer::Message> Unsealer::Open
     ++partial_->next.frame;
   } else {
     partial_.reset();
-    if (!first || !Begin(std::span<const std::byte>(scratch_).first(sealed.size()), place)) return More{};
+    if (!first || !Begin(std::span<const std::byte>(scratch).first(sealed.size()), place)) return More{};
   }
   if (partial_->filled < partial_->payload.size()) return More{};
   return Take();

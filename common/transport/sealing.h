@@ -89,24 +89,27 @@ class Sealer {
 // Opens what one Sealer has sealed. Frames may be missing, as when a connection breaks; a message that lacks any is dropped.
 class Unsealer {
  public:
-  // Messages with a larger payload are dropped.
-  Unsealer(const Seal& seal, std::uint64_t max_payload_bytes);
+  // A frame's place in its seal.
+  struct Place {
+    std::uint64_t message = 0;  // the first one is number 1
+    std::uint32_t frame = 0;
+    friend auto operator<=>(const Place&, const Place&) = default;
+  };
+
+  // Frames up to `last` were opened before. Messages with a larger payload are dropped.
+  Unsealer(const Seal& seal, std::uint64_t max_payload_bytes, Place last);
+  Unsealer(const Seal& seal, std::uint64_t max_payload_bytes) : Unsealer(seal, max_payload_bytes, Place()) {}
   ~Unsealer();
 
   struct Forged {};                    // altered, cut, sealed by somebody else, or seen before
   struct More {};                      // the frame counts; its message is not complete
   using Message = std::vector<Bytes>;  // header, and payload if there is one
-  std::variant<Forged, More, Message> Open(std::span<const std::byte> frame);
+  // `scratch` may be any vector; to use the same one for all seals of a thread spares each a frame's memory.
+  std::variant<Forged, More, Message> Open(std::span<const std::byte> frame, std::vector<std::byte>& scratch);
 
-  // Gives back the memory of a message that is not complete.
-  void DropPartial() { partial_.reset(); }
+  Place last() const { return last_; }  // of the frames that were opened
 
  private:
-  struct Place {
-    std::uint64_t message = 0;
-    std::uint32_t frame = 0;
-    friend auto operator<=>(const Place&, const Place&) = default;
-  };
   struct Partial {
     Bytes header;
     PooledVector<std::byte> payload;
@@ -118,9 +121,8 @@ class Unsealer {
 
   const std::unique_ptr<FrameCipher> cipher_;
   const std::uint64_t max_payload_bytes_;
-  Place last_;  // of what was opened; the first message is number 1
+  Place last_;
   std::optional<Partial> partial_;
-  std::vector<std::byte> scratch_;
 };
 
 }  // namespace slabstream

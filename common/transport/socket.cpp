@@ -34,14 +34,27 @@ struct Socket::Impl {
   const bool router;
   bool encrypted = false;  // all of its connections
   bool knows_connections = options.ends_connections;
-  ConnectionTable connections;             // of users
-  std::unique_ptr<ConnectionTuner> tuner;  // of the tcp connections made here
-  std::unique_ptr<ConnectionLimit> limit;  // of the connections accepted here
-  std::shared_ptr<LatestSeals> seals;      // if it listens for sealed connections
-  std::optional<Sealer> sealer;            // if it has a sealed connection
-  LimitedLog complaints;                   // about forged frames
-  std::vector<std::string> names;          // inproc endpoints bound here
-  std::vector<IpcListener> listeners;      // ipc files bound here
+  ConnectionTable connections;                        // of users
+  std::unique_ptr<ConnectionTuner> tuner;             // of the tcp connections made here
+  std::unique_ptr<ConnectionLimit> limit;             // of the connections accepted here
+  std::shared_ptr<LatestSeals> seals;                 // if it listens for sealed connections
+  std::vector<std::byte> unseal_scratch;              // of all of them
+  std::optional<Sealer> sealer;                       // if it has a sealed connection
+  LimitedLog complaints;                              // about forged frames
+  std::vector<std::string> names;                     // inproc endpoints bound here
+  std::vector<IpcListener> listeners;                 // ipc files bound here
+  std::unordered_map<std::string, HeldBytes> unsent;  // by identity; of a dealer, one
+  std::size_t next_sweep = 64;                        // entries of `unsent`
+
+  const HeldBytes& UnsentOf(const std::string& identity) {
+    if (unsent.size() >= next_sweep) {
+      std::erase_if(unsent, [](const auto& entry) { return *entry.second == 0; });  // only this thread makes it more
+      next_sweep = std::max(next_sweep, 2 * unsent.size());
+    }
+    HeldBytes& held = unsent[router ? identity : std::string()];
+    if (held == nullptr) held = std::make_shared<std::atomic<std::uint64_t>>(0);
+    return held;
+  }
 
   // Says of what is coming who has sent it. `part`: any of it.
   void Name(Incoming& incoming, zmq::message_t& part) {
@@ -69,7 +82,11 @@ constexpr std::int64_t kHandshakeBytes = 512;  // more than any part of a PLAIN 
 constexpr int kSealedBatch = 256;              // frames opened in one call: 64 MiB
 
 Status Failed(const std::string& endpoint, const zmq::error_t& error) {
-  if (error.num() == EADDRNOTAVAIL) return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address");
+  if (error.num() == EADDRNOTAVAIL) {
+    const bool loopback = endpoint.starts_with("tcp://127.");
+    return Status::InvalidArgument("endpoint \"" + endpoint + "\": this machine has no such address" +
+                                   (loopback ? "; one with IPv6 alone has [::1], as in tcp://[::1]:7420" : ""));
+  }
   return Status::Unavailable("endpoint \"" + endpoint + "\": " + (error.num() == EADDRINUSE ? "already in use" : error.what()));
 }
 
@@ -191,7 +208,7 @@ Status SendSealed(Socket::Impl& impl, std::span<const std::byte> header, const B
   while (error == 0) {
     PooledVector<std::byte> frame = impl.sealer->Next();
     if (frame.empty()) break;
-    error = SendPart(impl.socket, Share(Bytes(std::move(frame))), false);
+    error = SendPart(impl.socket, Share(Bytes(std::move(frame)), impl.UnsentOf("")), false);
   }
   return StatusOfSending(error);
 }
@@ -236,7 +253,7 @@ std::optional<Incoming> TryReceiveSealed(Socket::Impl& impl) {
     }
     const std::shared_ptr<Unsealer> unsealer = impl.seals->Of(incoming.user);
     if (unsealer != nullptr && frames.size() == 1) {
-      auto opened = unsealer->Open(frames[0].span());
+      auto opened = unsealer->Open(frames[0].span(), impl.unseal_scratch);
       if (std::holds_alternative<Unsealer::More>(opened)) continue;
       if (auto* message = std::get_if<Unsealer::Message>(&opened)) {
         incoming.parts = std::move(*message);
@@ -335,11 +352,17 @@ Status Socket::Send(const std::string& identity, std::vector<std::byte> header, 
   if (impl_->seals != nullptr) return Status::InvalidArgument("send: sealed connections go one way, to this socket");
   if (impl_->sealer) return SendSealed(*impl_, header, payload);
   // Make all parts before sending the first one: running out of memory between them would leave half a message.
-  zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header))), body = Share(payload);
+  zmq::message_t to(identity.data(), identity.size()), head = Share(Bytes(std::move(header)));
+  zmq::message_t body = payload.empty() ? zmq::message_t() : Share(payload, impl_->UnsentOf(identity));
   int error = impl_->router ? SendPart(socket, std::move(to), true) : 0;
   if (error == 0) error = SendPart(socket, std::move(head), !payload.empty());
   if (error == 0 && !payload.empty()) error = SendPart(socket, std::move(body), false);
   return StatusOfSending(error);
+}
+
+std::uint64_t Socket::UnsentBytes(const std::string& identity) const {
+  const auto held = impl_->unsent.find(identity);
+  return held == impl_->unsent.end() ? 0 : held->second->load();
 }
 
 bool Socket::refused() const {
@@ -368,8 +391,7 @@ std::string Socket::local_host() const {
 
 void Socket::EndConnections(const std::string& user) {
   impl_->connections.End(user);
-  const std::shared_ptr<Unsealer> unsealer = impl_->seals == nullptr ? nullptr : impl_->seals->Of(user);
-  if (unsealer != nullptr) unsealer->DropPartial();
+  if (impl_->seals != nullptr) impl_->seals->Retire(user);
 }
 void Socket::EndConnection(const std::string& identity) { impl_->connections.EndOne(identity); }
 

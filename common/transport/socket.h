@@ -74,7 +74,10 @@ class Socket {
   // Unavailable: nobody with this identity (router); ResourceExhausted: the high-water mark is reached.
   Status Send(const std::string& identity, std::vector<std::byte> header, const Bytes& payload = {});
 
-  // Dealers: whether the other end has refused this socket's key; it does not try again.
+  // Bytes of payloads that Send has taken and that have not left this process: to `identity`; of dealers, all.
+  std::uint64_t UnsentBytes(const std::string& identity = {}) const;
+
+  // Dealers: whether the other end has refused this socket's key, or has keys while this socket has none, or the other way round.
   bool refused() const;
 
   // Dealers over tcp: whether there is a connection, and the other end has admitted this one. What is sent now leaves at once.

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "common/view/supersampled_voxel.h"
+
 namespace slabstream {
 namespace {
 
@@ -31,14 +33,8 @@ constexpr double kParallel = 1e-6;  // the length of the cross product of two un
 Vec3 ExtentOf(const VolumeGeometry& geometry) { return ToVec3(geometry.size) * geometry.spacing; }
 double HalfFov(const ViewParameters& view) { return view.fov_degrees * (std::numbers::pi / 360); }
 
-// Orthonormal: right, up and the view direction. Azimuth and elevation turn a sphere's tangent frame, which exists at the poles too, so
-// that elevation +-90 needs no special case.
-struct Frame {
-  Vec3 right, up, forward;
-};
-
 // From an eye that is given.
-Frame LookingFrame(const ViewParameters& view, const Vec3& target) {
+ViewAxes AxesFromEye(const ViewParameters& view, const Vec3& target) {
   const Vec3 forward = Normalized(target - *view.eye);
   Vec3 right = Cross(forward, view.up ? Normalized(*view.up) : Vec3{0, 0, 1});
   if (Length(right) < kParallel) right = Cross(forward, {0, 1, 0});
@@ -46,9 +42,10 @@ Frame LookingFrame(const ViewParameters& view, const Vec3& target) {
   return {right, Cross(right, forward), forward};
 }
 
-Frame FrameByAngles(const ViewParameters& view) {
-  const auto [sin_azimuth, cos_azimuth] = SinCosDegrees(view.azimuth_degrees);
-  const auto [sin_elevation, cos_elevation] = SinCosDegrees(view.elevation_degrees);
+// Azimuth and elevation turn a sphere's tangent frame, which exists at the poles too, so that elevation +-90 needs no special case.
+ViewAxes AxesByAngles(const ViewParameters& view) {
+  const auto [sin_azimuth, cos_azimuth] = SinCosDegrees(view.azimuth_degrees.value_or(0));
+  const auto [sin_elevation, cos_elevation] = SinCosDegrees(view.elevation_degrees.value_or(0));
   const Vec3 right = {cos_azimuth, sin_azimuth, 0};
   const Vec3 up = {-sin_elevation * sin_azimuth, sin_elevation * cos_azimuth, cos_elevation};
   const Vec3 forward = {-cos_elevation * sin_azimuth, cos_elevation * cos_azimuth, -sin_elevation};
@@ -57,7 +54,7 @@ Frame FrameByAngles(const ViewParameters& view) {
 
 // What a view is of a volume, in physical space.
 struct Look {
-  Frame frame;
+  ViewAxes axes;
   Vec3 target;          // of the picture's centre
   double distance = 0;  // from the target to the eye (perspective), or to the eye plane
 };
@@ -67,16 +64,13 @@ Look LookOf(const ViewParameters& view, const VolumeGeometry& geometry) {
   const Vec3 centre = geometry.ToWorld(geometry.centre());
   const Vec3 target = view.look_at.value_or(centre);
   const double radius = BoundingRadius(geometry);
-  auto [right, up, forward] = view.eye ? LookingFrame(view, target) : FrameByAngles(view);
-  const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
-  const Frame rolled = {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
-
+  const ViewAxes axes = AxesOf(view, target);
   Look look;
-  look.frame = {orientation.FromWorld(rolled.right), orientation.FromWorld(rolled.up), orientation.FromWorld(rolled.forward)};
+  look.axes = {orientation.FromWorld(axes.right), orientation.FromWorld(axes.up), orientation.FromWorld(axes.forward)};
   if (view.look_at) look.target = orientation.FromWorld(target - centre);
   if (view.projection != Projection::kPerspective) {
     // The eye plane stands 2 R before the volume's centre, or as far before it as before that of another level.
-    look.distance = (view.distance != 0 ? view.distance : 2 * radius) + Dot(look.frame.forward, look.target);
+    look.distance = (view.distance != 0 ? view.distance : 2 * radius) + Dot(look.axes.forward, look.target);
   } else if (view.eye) {
     look.distance = Length(target - *view.eye);
   } else {
@@ -95,6 +89,21 @@ Axis NearestAxis(const Vec3& direction) {
   return nearest;
 }
 
+// The axis nearest in physical space. If voxels are so long along it that the central ray passes more than kMostShear others from slice to
+// slice, it is the axis nearest in data space, whose slices the ray meets most often. Usual scans keep the nearest one.
+Axis TraversalAxisOf(const Look& look, const VolumeGeometry& geometry, bool perspective) {
+  const Vec3& forward = look.axes.forward;
+  const Axis nearest = NearestAxis(forward);
+  const Vec3 voxels = Absolute(forward / geometry.spacing);  // passed a unit
+  const Axis most = *std::ranges::max_element(kAxes, {}, [&](Axis axis) { return voxels[axis]; });
+  constexpr double kMostShear = 8;
+  if (voxels[most] <= kMostShear * voxels[nearest]) return nearest;
+  // Slices next to the eye would be magnified too much.
+  constexpr double kFar = 2;
+  const double before = look.distance * std::abs(forward[most]) - std::copysign(look.target[most], look.target[most] * forward[most]);
+  return perspective && before < kFar * 0.5 * ExtentOf(geometry)[most] ? nearest : most;
+}
+
 // Row of a data-space form: data point p -> scale * Dot(direction, spacing * (p - centre)) + offset.
 std::array<double, 4> Row(const Vec3& direction, double scale, double offset, const Vec3& spacing, const Vec3& centre) {
   const Vec3 row = scale * (direction * spacing);
@@ -109,20 +118,40 @@ Vec3 Linear(const std::array<double, 4>& row) { return {row[0], row[1], row[2]};
 // multiple of the view direction, to which right is perpendicular).
 double ScaleOf(const Camera& camera) { return Dot(Linear(camera.x_row) / camera.spacing, camera.right); }
 
+// Points of the world may be anywhere, but renderers compute in single precision. From farther away nothing would be seen.
+Status CheckNear(const char* field, const char* what, const Vec3& away, const VolumeGeometry& geometry) {
+  constexpr double kMostRadii = 1e9;
+  const double farthest = kMostRadii * BoundingRadius(geometry), distance = std::hypot(away.x, away.y, away.z);
+  if (distance <= farthest) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{} is {:.6g} from {}, but must be at most {:.6g}, {:g} times half the volume's diagonal",
+                                             field, distance, what, farthest, kMostRadii));
+}
+
 }  // namespace
 
-ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Vec3& centre, double radius) {
+ViewAxes AxesOf(const ViewParameters& view, const Vec3& target) {
+  const auto [right, up, forward] = view.eye ? AxesFromEye(view, target) : AxesByAngles(view);
+  const auto [sin_roll, cos_roll] = SinCosDegrees(view.roll_degrees);
+  return {cos_roll * right + sin_roll * up, cos_roll * up - sin_roll * right, forward};
+}
+
+ViewParameters FitView(const ViewParameters& view, const VolumeGeometry& geometry, const Ball& ball) {
   ViewParameters fitted = view;
   fitted.fit = false;
-  fitted.look_at = geometry.ToWorld(centre);
+  fitted.look_at = ball.centre;
   if (view.projection == Projection::kPerspective) {
-    const double sine = radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
+    const double sine = ball.radius / LookOf(fitted, geometry).distance;  // of the angle at which the eye sees the ball's radius
     if (sine < 1) fitted.zoom *= std::tan(HalfFov(view)) * std::sqrt(1 - sine * sine) / sine;
   } else {
-    fitted.zoom *= BoundingRadius(geometry) / radius;
+    fitted.zoom *= BoundingRadius(geometry) / ball.radius;
   }
-  fitted.zoom = std::min(fitted.zoom, kMaxZoom);
+  fitted.zoom = std::clamp(fitted.zoom, kMinZoom, kMaxZoom);
   return fitted;
+}
+
+double SupersampledVoxel(const VolumeGeometry& geometry) {
+  const double mean = BoundingRadius(geometry) / (0.5 * Length(ToVec3(geometry.size)));
+  return std::max(Least(geometry.spacing), std::min(mean / kMaxStretch, 0.5 * Least(ExtentOf(geometry)) / kMaxVoxelsPerPixel));
 }
 
 Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
@@ -132,7 +161,13 @@ Status CheckView(const ViewParameters& view, const VolumeGeometry& geometry) {
         "right, top and bottom are possible");
   }
   const Look look = LookOf(view, geometry);
-  const Vec3& forward = look.frame.forward;
+  const Vec3 centre = geometry.ToWorld(geometry.centre());
+  Status near = CheckNear("view.look_at", "the volume's centre", look.target, geometry);
+  if (near.ok() && view.eye)
+    near = CheckNear("view.eye", "the point that it looks at", view.look_at.value_or(centre) - *view.eye, geometry);
+  if (near.ok()) near = CheckNear("view.distance: the eye", "the point that it looks at", {view.distance, 0, 0}, geometry);
+  if (!near.ok()) return near;
+  const Vec3& forward = look.axes.forward;
   if (!std::isfinite(Length(forward))) return Status::InvalidArgument("view.eye is at the point that it looks at");
   const Vec3 up = view.up ? geometry.orientation.FromWorld(Normalized(*view.up)) : Vec3{};
   if (view.up && Length(Cross(up, forward)) < kParallel) return Status::InvalidArgument("view.up points along the direction of view");
@@ -156,7 +191,8 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   const bool perspective = view.projection == Projection::kPerspective;
   const Vec3 spacing = geometry.spacing;
   const double radius = BoundingRadius(geometry);
-  const auto& [frame, target, distance] = LookOf(view, geometry);
+  const Look look = LookOf(view, geometry);
+  const auto& [axes, target, distance] = look;
   const Vec3 centre = geometry.centre() + target / spacing;  // data space, of the picture
 
   // Pixels a physical unit at unit depth (perspective) or everywhere (orthographic).
@@ -179,24 +215,24 @@ Camera MakeCamera(const ViewParameters& view, ImageSize size, const VolumeGeomet
   camera.supersample = supersample;
   camera.target_depth = distance;
   camera.spacing = spacing;
-  camera.view_direction = frame.forward;
-  camera.right = frame.right;
-  camera.up = frame.up;
-  camera.eye = centre - distance * (frame.forward / spacing);
+  camera.view_direction = axes.forward;
+  camera.right = axes.right;
+  camera.up = axes.up;
+  camera.eye = centre - distance * (axes.forward / spacing);
 
   const double middle_x = 0.5 * camera.width, middle_y = 0.5 * camera.height;
-  camera.depth_row = Row(frame.forward, 1, distance, spacing, centre);
+  camera.depth_row = Row(axes.forward, 1, distance, spacing, centre);
   if (perspective) {
     camera.w_row = camera.depth_row;
-    camera.x_row = Row(scale * frame.right + middle_x * frame.forward, 1, middle_x * distance, spacing, centre);
-    camera.y_row = Row(-scale * frame.up + middle_y * frame.forward, 1, middle_y * distance, spacing, centre);
+    camera.x_row = Row(scale * axes.right + middle_x * axes.forward, 1, middle_x * distance, spacing, centre);
+    camera.y_row = Row(-scale * axes.up + middle_y * axes.forward, 1, middle_y * distance, spacing, centre);
   } else {
     camera.w_row = {0, 0, 0, 1};
-    camera.x_row = Row(frame.right, scale, middle_x, spacing, centre);
-    camera.y_row = Row(frame.up, -scale, middle_y, spacing, centre);
+    camera.x_row = Row(axes.right, scale, middle_x, spacing, centre);
+    camera.y_row = Row(axes.up, -scale, middle_y, spacing, centre);
   }
-  camera.traversal_axis = NearestAxis(frame.forward);
-  camera.ascending = frame.forward[camera.traversal_axis] > 0;
+  camera.traversal_axis = TraversalAxisOf(look, geometry, perspective);
+  camera.ascending = axes.forward[camera.traversal_axis] > 0;
   return camera;
 }
 

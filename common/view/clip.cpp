@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/view/camera.h"
+#include "common/view/world_limits.h"
 
 namespace slabstream {
 namespace {
@@ -38,7 +38,7 @@ void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<Half
   for (const Axis axis : kAxes) {
     for (const double sign : {1.0, -1.0}) {
       const double bound = sign > 0 ? box.low[axis] : box.high[axis];
-      if (bound == -sign * kMaxWorldCoordinate) continue;
+      if (bound == -sign * kMaxCoordinate) continue;
       const Vec3 normal = sign * Unit(axis);
       if (box.unit == ClipUnit::kWorld) {
         sides.push_back(FromWorld({normal, -sign * bound}, geometry));
@@ -50,6 +50,9 @@ void AddBox(const ClipBox& box, const VolumeGeometry& geometry, std::vector<Half
     }
   }
 }
+
+constexpr double kFarVoxels = 1e9;
+static_assert(kFarVoxels > 4.0 * kMaxVolumeSide);
 
 // Of a slice, in least spacings: positions of samples are rounded by far less.
 constexpr double kSliceThickness = 1.0 / 64;
@@ -105,6 +108,11 @@ Result<ClipRegion> MakeClipRegion(const Clipping& clipping, const VolumeGeometry
     AddSlab(*clipping.slab, geometry, region.sides);
   }
   for (const ClipPlane& plane : clipping.planes) region.sides.push_back(FromWorld(plane, geometry));
+  // A plane that is farther away than any voxel can be is as far as it needs to be: renderers compute in single precision.
+  for (HalfSpace& side : region.sides) {
+    const double farthest = kFarVoxels * Length(side.normal);
+    side.offset = std::clamp(side.offset, -farthest, farthest);
+  }
   if (region.mode == ClipMode::kKeep) {
     std::erase_if(region.sides, [&](const HalfSpace& side) { return DistancesOf(side, geometry.bounds()).least >= 0; });
   }

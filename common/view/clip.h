@@ -28,7 +28,7 @@ enum class ClipUnit : std::uint8_t {
   kPercent = 3,  // of the volume's sides, along the axes of the voxels; 0 and 100 are its borders
 };
 
-// low < high along each axis; each in [-kMaxWorldCoordinate, kMaxWorldCoordinate]. A bound there does not clip.
+// low < high along each axis; each in [-kMaxCoordinate, kMaxCoordinate]. A bound there does not clip.
 struct ClipBox {
   Vec3 low, high;
   ClipUnit unit = ClipUnit::kWorld;
@@ -50,7 +50,7 @@ struct ClipSlab {
   std::optional<Vec3> through;  // a point of the world; none: the volume's centre
   // Instead of `through`: the slice with this index along the axis of the voxels that is nearest to the normal, in its middle.
   std::optional<std::int32_t> index;  // [0, kMaxVolumeSide)
-  double thickness = 0;               // unit of the world, [0, kMaxWorldCoordinate]
+  double thickness = 0;               // unit of the world, [0, kMaxCoordinate]
   friend bool operator==(const ClipSlab&, const ClipSlab&) = default;
 };
 

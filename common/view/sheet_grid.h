@@ -47,8 +47,8 @@ struct SheetGrid {
 
 inline constexpr double kMaxFootprint = 3;  // of SheetGrid::footprint
 
-// The grid for the picture of `camera` (not supersampled). Its sides exceed kMaxGridSide if an oblique view sees many slices that lie
-// hundreds of voxel widths apart: PlanFrame refuses such views.
+// The grid for the picture of `camera` (not supersampled). Its sides may exceed kMaxGridSide under perspective, if an oblique view sees
+// many slices that lie hundreds of voxel widths apart: PlanFrame refuses such views.
 SheetGrid MakeSheetGrid(const Camera& camera, const VolumeGeometry& geometry, double footprint = 1);
 
 // In slice k: column = scale_u u + offset_u, row = scale_v v + offset_v; the scales are pixels a voxel, > 0.

@@ -15,14 +15,18 @@ std::optional<Vec3> PointAhead(const std::optional<Vec3>& before, const std::opt
   return *now + steps * (*now - *before);
 }
 
+std::optional<double> AngleAhead(const std::optional<double>& before, const std::optional<double>& now, double steps) {
+  if (!before || !now) return now;
+  return Wrapped(*now + steps * Wrapped(*now - *before));
+}
+
 }  // namespace
 
 ViewParameters ViewAhead(const ViewParameters& before, const ViewParameters& now, double steps) {
-  const auto turned = [&](double ViewParameters::*angle) { return now.*angle + steps * Wrapped(now.*angle - before.*angle); };
   ViewParameters ahead = now;
-  ahead.azimuth_degrees = Wrapped(turned(&ViewParameters::azimuth_degrees));
-  ahead.elevation_degrees = Wrapped(turned(&ViewParameters::elevation_degrees));
-  ahead.roll_degrees = Wrapped(turned(&ViewParameters::roll_degrees));
+  ahead.azimuth_degrees = AngleAhead(before.azimuth_degrees, now.azimuth_degrees, steps);
+  ahead.elevation_degrees = AngleAhead(before.elevation_degrees, now.elevation_degrees, steps);
+  ahead.roll_degrees = *AngleAhead(before.roll_degrees, now.roll_degrees, steps);
   ahead.zoom = std::min(now.zoom * std::pow(now.zoom / before.zoom, steps), kMaxZoom);
   ahead.look_at = PointAhead(before.look_at, now.look_at, steps);
   ahead.eye = PointAhead(before.eye, now.eye, steps);

@@ -79,6 +79,7 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
   io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
   io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
+  io.Optional("view", m.view, &P::has_view, &P::view, &P::mutable_view);
 }
 
 void Fields(auto& io, Is<PictureGeometry> auto& m) {
@@ -246,9 +247,11 @@ v1::KeysOrder ProtoOf(const KeysOrder&);
 void Fields(auto& io, Is<KeysOrder> auto& m) {
   using P = v1::KeysOrder;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
-  io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kRevoke);
-  if (m.action == KeysAction::kRotate) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
+  io.OneOf("action", m.action, &P::action, &P::set_action, KeysAction::kList, KeysAction::kIssue);
+  const bool of_role = m.action == KeysAction::kRotate || m.action == KeysAction::kIssue;
+  if (of_role) io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Bytes("key", m.key, &P::key, &P::mutable_key, 0, kMaxKeyBytes);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxKeyBytes);
 }
 
 void Fields(auto& io, Is<AdmittedKey> auto& m) {
@@ -256,6 +259,8 @@ void Fields(auto& io, Is<AdmittedKey> auto& m) {
   io.Bytes("key", m.public_key, &P::key, &P::mutable_key, kKeyTextBytes, kKeyTextBytes);
   io.OneOf("role", m.role, &P::role, &P::set_role, Role::kClient, Role::kAdmin);
   io.Text("made", m.made, &P::made, &P::mutable_made, 0, kMaxKeyBytes);
+  io.Text("name", m.name, &P::name, &P::mutable_name, 0, kMaxKeyBytes);
+  io.Optional("silent_ms", m.silent_ms, &P::has_silent_ms, &P::silent_ms, &P::set_silent_ms);
 }
 
 v1::KeysReply ProtoOf(const KeysReply&);
@@ -387,20 +392,39 @@ void Fields(auto& io, Is<StatisticsQuery> auto& m) {
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Text("dataset", m.dataset, &P::dataset, &P::mutable_dataset, 1, kMaxNameBytes);
   io.Message("box", m.box, &P::box, &P::mutable_box);
+  io.Any(m.labels, &P::labels, &P::set_labels);
 }
 inline void Read(const v1::StatisticsQuery& in, StatisticsQuery& out, Checker& check) { ReadFields(WithStandards(in), out, check); }
 
-v1::StatisticsReply ProtoOf(const StatisticsReply&);
-void Fields(auto& io, Is<StatisticsReply> auto& m) {
-  using P = v1::StatisticsReply;
-  auto& [voxels, non_finite, mean, deviation, least, largest] = m.statistics;
-  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+// Two messages have these fields.
+template <class P>
+void BoxStatisticsFields(auto& io, auto& statistics) {
+  auto& [voxels, non_finite, mean, deviation, least, largest] = statistics;
   io.Any(voxels, &P::voxels, &P::set_voxels);
   io.Any(non_finite, &P::non_finite, &P::set_non_finite);
   io.Finite("mean", mean, &P::mean, &P::set_mean);
   io.Between("deviation", deviation, &P::deviation, &P::set_deviation, 0, std::numeric_limits<double>::max());
   io.Finite("least", least, &P::least, &P::set_least);
   io.Finite("largest", largest, &P::largest, &P::set_largest);
+}
+
+void Fields(auto& io, Is<LabelStatistics> auto& m) {
+  using P = v1::LabelStatistics;
+  io.Message("label", m.label, &P::label, &P::mutable_label);
+  BoxStatisticsFields<P>(io, m.statistics);
+}
+
+v1::StatisticsReply ProtoOf(const StatisticsReply&);
+void Fields(auto& io, Is<StatisticsReply> auto& m) {
+  using P = v1::StatisticsReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  BoxStatisticsFields<P>(io, m.statistics);
+  io.Message("description", m.description, &P::description, &P::mutable_description);
+  io.Messages("labels", m.labels, &P::labels, &P::mutable_labels, kMaxLabels);
+  io.Check([&](Checker& check) {
+    for (std::size_t i = 1; i < m.labels.size(); ++i)
+      check.That(m.labels[i - 1].label.value < m.labels[i].label.value, "labels", "values do not rise");
+  });
 }
 
 v1::JointHistogramQuery ProtoOf(const JointHistogramQuery&);
@@ -436,6 +460,29 @@ void Fields(auto& io, Is<PickReply> auto& m) {
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Optional("sample", m.sample, &P::has_sample, &P::sample, &P::mutable_sample);
   io.Finite("depth", m.depth, &P::depth, &P::set_depth);
+}
+
+void Fields(auto& io, Is<Ball> auto& m) {
+  using P = v1::Ball;
+  io.Message("centre", m.centre, &P::centre, &P::mutable_centre);
+  io.Finite("radius", m.radius, &P::radius, &P::set_radius);
+  io.Check([&](Checker& check) { check.Positive("radius", m.radius); });
+}
+
+v1::ViewQuery ProtoOf(const ViewQuery&);
+void Fields(auto& io, Is<ViewQuery> auto& m) {
+  using P = v1::ViewQuery;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
+  io.Optional("framed", m.framed, &P::has_framed, &P::framed, &P::mutable_framed);
+}
+
+v1::ViewReply ProtoOf(const ViewReply&);
+void Fields(auto& io, Is<ViewReply> auto& m) {
+  using P = v1::ViewReply;
+  io.Any(m.nonce, &P::nonce, &P::set_nonce);
+  io.Message("view", m.view, &P::view, &P::mutable_view);
+  io.Optional("framed", m.framed, &P::has_framed, &P::framed, &P::mutable_framed);
 }
 
 v1::PrefetchQuery ProtoOf(const PrefetchQuery&);

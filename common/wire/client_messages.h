@@ -18,6 +18,7 @@
 //   StatisticsQuery --------------------->  StatisticsReply
 //   JointHistogramQuery ----------------->  JointHistogramReply
 //   PickQuery --------------------------->  PickReply
+//   ViewQuery --------------------------->  ViewReply
 //   PrefetchQuery ----------------------->  PrefetchReply
 //   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
 //   OrderRefused.
@@ -89,7 +90,8 @@ struct FrameStatistics {
   PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
   std::optional<FramePrediction> predicted;                                   // if the policy left a choice
   std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
-  std::string lowered;  // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
+  std::string lowered;                 // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
+  std::optional<ViewParameters> view;  // that the picture was made by, complete (ChooseView); final pictures have it
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
@@ -213,13 +215,14 @@ struct ShutDownReply {
   friend bool operator==(const ShutDownReply&, const ShutDownReply&) = default;
 };
 
-enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3 };
+enum class KeysAction : std::uint8_t { kList = 1, kRotate = 2, kRevoke = 3, kIssue = 4 };
 
 struct KeysOrder {
   std::uint64_t nonce = 0;
   KeysAction action = KeysAction::kList;
-  Role role = Role::kClient;  // kRotate: whose file gets a new key; does not travel with other actions
-  std::string key;            // kRevoke: a public one
+  Role role = Role::kClient;  // kRotate: whose file gets a new key; kIssue: what its holder may do; does not travel with other actions
+  std::string key = {};       // kRevoke: a public one, its id or its name; kIssue: a public one
+  std::string name = {};      // kIssue: of the holder; as KeyFolder::Issue takes it
   friend bool operator==(const KeysOrder&, const KeysOrder&) = default;
 };
 
@@ -299,17 +302,20 @@ struct SampleReply {
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
-// The values in a box (coordinator/probe/box_statistics.h).
+// The values in a box, and those of each label there (coordinator/probe/box_statistics.h).
 struct StatisticsQuery {
   std::uint64_t nonce = 0;
   std::string dataset;  // 1 ... kMaxNameBytes
   ClipBox box;
+  bool labels = false;  // those of each label, too
   friend bool operator==(const StatisticsQuery&, const StatisticsQuery&) = default;
 };
 
 struct StatisticsReply {
   std::uint64_t nonce = 0;
   BoxStatistics statistics;
+  VolumeDescription description = {};        // of the voxels that were counted
+  std::vector<LabelStatistics> labels = {};  // of each label of the dataset, if the query says so; values rise; at most kMaxLabels
   friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
 };
 
@@ -342,6 +348,21 @@ struct PickReply {
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
 
+// The view by which a picture would be made (common/planning/framing.h).
+struct ViewQuery {
+  std::uint64_t nonce = 0;
+  FrameRequest frame;               // its policy and previews do not matter
+  std::optional<Ball> framed = {};  // if its view fits: this is framed instead of what shows
+  friend bool operator==(const ViewQuery&, const ViewQuery&) = default;
+};
+
+struct ViewReply {
+  std::uint64_t nonce = 0;
+  ViewParameters view;              // complete, without `fit`
+  std::optional<Ball> framed = {};  // what the picture frames, if its view fits and anything shows
+  friend bool operator==(const ViewReply&, const ViewReply&) = default;
+};
+
 // What a picture would show is fetched from its web server and kept on disk (coordinator/prefetcher.h).
 struct PrefetchQuery {
   std::uint64_t nonce = 0;
@@ -356,20 +377,21 @@ struct PrefetchReply {
 };
 
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
-using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, PrefetchQuery,
-                                      AddVolume, VolumePart, DropVolume>;
+using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery,
+                                      PrefetchQuery, AddVolume, VolumePart, DropVolume>;
 using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
 using CoordinatorToClient =
     std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply, DataReply, OrderRefused,
-                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, PrefetchReply, VolumeCredit>;
+                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply, VolumeCredit>;
 
-using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, PrefetchQuery>;
-using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, PrefetchReply>;
+using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery, PrefetchQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply>;
 inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const JointHistogramQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
+inline const std::string& DatasetOf(const ViewQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const PrefetchQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);

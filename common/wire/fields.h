@@ -224,6 +224,7 @@ class Reader {
   }
   template <class T>
   void Optional(std::string_view field, std::optional<T>& value, bool (P::*has)() const, T (P::*get)() const, void (P::*)(T)) {
+    value.reset();
     if (!(in_.*has)()) return;
     if constexpr (std::is_floating_point_v<T>) {
       value = check_.Finite(field, (in_.*get)());

@@ -129,6 +129,7 @@ void Fields(auto& io, Is<CoarserLevel> auto& m) {
 void Fields(auto& io, Is<FrameSetup> auto& m) {  // all but the renderer, its parameters, the sheets, the clip region and the front
   using P = v1::FrameSetup;
   io.Range("dataset", m.dataset, &P::dataset, &P::set_dataset, 1, std::numeric_limits<DatasetId>::max());
+  io.Between("unit", m.unit, &P::unit, &P::set_unit, 1e-300, 1e300);
   io.Message("description", m.description, &P::description, &P::mutable_description);
   io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Message("range", m.range, &P::range, &P::mutable_range);

@@ -26,11 +26,11 @@ void Fields(auto& io, Is<ImageSize> auto& m) {
 void Fields(auto& io, Is<ViewParameters> auto& m) {
   using P = v1::ViewParameters;
   io.OneOf("projection", m.projection, &P::projection, &P::set_projection, Projection::kOrthographic, Projection::kPerspective);
-  io.Finite("azimuth_degrees", m.azimuth_degrees, &P::azimuth_degrees, &P::set_azimuth_degrees);
-  io.Finite("elevation_degrees", m.elevation_degrees, &P::elevation_degrees, &P::set_elevation_degrees);
+  io.Optional("azimuth_degrees", m.azimuth_degrees, &P::has_azimuth_degrees, &P::azimuth_degrees, &P::set_azimuth_degrees);
+  io.Optional("elevation_degrees", m.elevation_degrees, &P::has_elevation_degrees, &P::elevation_degrees, &P::set_elevation_degrees);
   io.Any("of_patient", m.of_patient, &P::of_patient, &P::set_of_patient);
   io.Optional("look_at", m.look_at, &P::has_look_at, &P::look_at, &P::mutable_look_at);
-  io.Any("fit", m.fit, &P::fit, &P::set_fit);
+  io.Optional("fit", m.fit, &P::has_fit, &P::fit, &P::set_fit);
   io.Optional("eye", m.eye, &P::has_eye, &P::eye, &P::mutable_eye);
   io.Optional("up", m.up, &P::has_up, &P::up, &P::mutable_up);
   io.Finite("distance", m.distance, &P::distance, &P::set_distance);

@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <set>
-#include <span>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/base/printable.h"
 #include "common/base/range_status.h"
-#include "common/renderers/registry.h"
+#include "common/renderers/renderer_choice.h"
 #include "common/wire/field_walk.h"
 
 namespace slabstream {
@@ -20,9 +19,7 @@ namespace {
 // What the schema says of values, one by one. Only the first failure counts.
 class SchemaCheck {
  public:
-  // `renderers`: those of `name` (RenderersFor), which must all be able to do what is asked for; none: that is not checked.
-  explicit SchemaCheck(std::string path, std::string name = {}, std::span<const RendererKind* const> renderers = {})
-      : path_(std::move(path)), name_(std::move(name)), renderers_(renderers) {}
+  explicit SchemaCheck(std::string path) : path_(std::move(path)) {}
 
   template <class Struct>
   Status Of(const Struct& value) {
@@ -55,18 +52,15 @@ class SchemaCheck {
       const v1::About& about = AboutOf(field);
       Text(value, about.most() > 0 ? about.least() : 1, about.most() > 0 ? about.most() : kMaxNameBytes);
     } else if constexpr (std::is_arithmetic_v<T>) {
-      if (!AboutOf(field).ability().empty() && fmt::format("{}", value) != AboutOf(field).standard()) Given(field);
       if (limits.least != 0 || limits.most != 0) Number(double(value), limits);
     } else if constexpr (requires { value.number(); }) {
       const auto* const chosen = field.enum_type()->FindValueByNumber(value.number());
       if (chosen == nullptr || value.number() == 0) {
-        return Keep(Status::InvalidArgument(
+        Keep(Status::InvalidArgument(
             fmt::format("{} is {}, but must be one of: {}", path_, value.number(), fmt::join(WordsOf(*field.enum_type()), ", "))));
       }
-      const std::string& ability = chosen->options().GetExtension(v1::value_ability);
-      if (!ability.empty()) Require(ability, fmt::format("{} '{}'", AboutOf(field).name(), WordOf(*chosen)));
     } else if constexpr (requires { value.has_value(); }) {
-      if (value.has_value()) Given(field), Member(field, *value, most, limits);
+      if (value.has_value()) Member(field, *value, most, limits);
     } else if constexpr (requires { value.index(); }) {
       if (const auto* name = std::get_if<std::string>(&value)) {
         Text(*name, 1, kMaxNameBytes);
@@ -74,7 +68,6 @@ class SchemaCheck {
         Keep(Validate(std::get<TransferFunction>(value)));
       }
     } else if constexpr (requires { value.size(); }) {
-      if (!value.empty()) Given(field);
       if (value.size() > most)
         Keep(Status::InvalidArgument(fmt::format("{} has {} items, at most {} are possible", path_, value.size(), most)));
       if constexpr (requires { value.data(); }) Items(value, limits);
@@ -105,27 +98,11 @@ class SchemaCheck {
     Keep(Status::InvalidArgument(fmt::format("{} has {} bytes, but must have {} to {}", path_, text.size(), least, most)));
   }
 
-  void Given(const Field& field) {
-    const v1::About& about = AboutOf(field);
-    if (!about.ability().empty()) Require(about.ability(), about.name().empty() ? field.name() : about.name());
-  }
-
-  // `name`: of an ability.
-  void Require(const std::string& name, const std::string& what) {
-    const auto found = std::ranges::find(kAbilityNames, name);
-    CHECK(found != kAbilityNames.end()) << name;
-    const auto ability = Ability(found - kAbilityNames.begin());
-    if (std::ranges::all_of(renderers_, [&](const RendererKind* kind) { return kind->Can(ability); })) return;
-    Keep(Status::InvalidArgument(fmt::format("renderer is '{}', but {} needs one of: {}", name_, what, NamesOfAble(NameOf(ability)))));
-  }
-
   void Keep(const Status& status) {
     if (status_.ok()) status_ = status;
   }
 
   std::string path_;
-  std::string name_;
-  std::span<const RendererKind* const> renderers_;
   Status status_;
 };
 
@@ -139,11 +116,12 @@ Status CheckSchema(const char* path, const T& value) {
 // The squared length must be usable, too: it normalises the direction.
 Status CheckDirection(const std::string& field, const Vec3& v) {
   if (std::isnormal(Dot(v, v))) return Status::Ok();
-  return Status::InvalidArgument(fmt::format("{} is {},{},{}, but must be a direction other than 0,0,0", field, v.x, v.y, v.z));
+  return Status::InvalidArgument(
+      fmt::format("{} is {},{},{}, but must be a direction other than 0,0,0, with a length in [1e-150, 1e150]", field, v.x, v.y, v.z));
 }
 
 Status CheckRules(const ViewParameters& view) {
-  if (view.fit && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
+  if (view.fit.value_or(false) && view.look_at) return Status::InvalidArgument("view.fit and view.look_at cannot both be given");
   if (view.up && !view.eye) return Status::InvalidArgument("view.up needs view.eye; without an eye, view.roll_degrees turns the picture");
   if (view.distance > 0 && view.eye) return Status::InvalidArgument("view.distance and view.eye cannot both be given");
   if (view.distance > 0 && view.projection != Projection::kPerspective) {
@@ -232,10 +210,8 @@ Status Validate(const Clipping& clipping) { return ValidatePart("clipping", clip
 Status Validate(const Shading& shading) { return ValidatePart("shading", shading); }
 
 Status Validate(const FrameRequest& request) {
-  const Result<std::vector<const RendererKind*>> renderers = RenderersFor(request.renderer);
-  if (!renderers.ok()) return renderers.status();
-  if (Status s = CheckParameters(request.renderer, *renderers, request.parameters); !s.ok()) return s;
-  if (Status s = SchemaCheck("", request.renderer, *renderers).Of(request); !s.ok()) return s;
+  if (Status s = RenderersFor(request).status(); !s.ok()) return s;
+  if (Status s = CheckSchema("", request); !s.ok()) return s;
   if (Status s = CheckRules(request.size); !s.ok()) return s;
   if (!IsLevel(request.level)) {
     return Status::InvalidArgument(

@@ -6,8 +6,7 @@
 
 namespace slabstream {
 
-// InvalidArgument naming field, value and limit. Names of the policy are looked up later (CheckNames). If the renderer is kAutomatic, all
-// that it may mean must be able to do what is asked for; whether the one that it means has the parameters turns out later (ResolveRequest).
+// InvalidArgument naming field, value and limit, or as RenderersFor. Names of the policy are looked up later (CheckNames).
 Status Validate(const FrameRequest& request);
 
 // The same of its parts.

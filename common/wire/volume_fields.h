@@ -1,6 +1,7 @@
 // Messages by which a client sends a dataset.
 #pragma once
 
+#include "common/frame/dataset_name.h"
 #include "common/wire/value_fields.h"
 #include "common/wire/volume_messages.h"
 #include "slabstream/v1/client.pb.h"
@@ -24,11 +25,24 @@ inline void Read(const v1::NewLabel& in, NewLabel& out, Checker& check) {
   if (in.colored()) out.color = color;
 }
 
+inline void Write(const SentFile& in, v1::SentFile& out) {
+  out.set_name(in.name);
+  out.set_bytes(in.bytes);
+}
+inline void Read(const v1::SentFile& in, SentFile& out, Checker& check) {
+  out.name = check.Text("name", in.name(), 1, kMaxNameBytes);
+  if (check.ok()) check.Adopt(CheckDatasetName(out.name));
+  check.That(!out.name.starts_with('.'), "name", "begins with a dot");
+  out.bytes = check.Range("bytes", in.bytes(), 1, kMaxSentFileBytes);
+}
+
 v1::AddVolume ProtoOf(const AddVolume&);
 void Fields(auto& io, Is<AddVolume> auto& m) {
   using P = v1::AddVolume;
   io.Any(m.nonce, &P::nonce, &P::set_nonce);
   io.Text("name", m.name, &P::name, &P::mutable_name, 1, kMaxNameBytes);
+  io.Optional("file", m.file, &P::has_file, &P::file, &P::mutable_file);
+  if (m.file) return;
   io.Message("description", m.description, &P::description, &P::mutable_description);
   io.Message("layers", m.layers, &P::layers, &P::mutable_layers);
   io.Messages("labels", m.labels, &P::labels, &P::mutable_labels, kMaxLabels);

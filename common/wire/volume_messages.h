@@ -6,7 +6,8 @@
 //   VolumePart + payload ----------------->            in order, within the credit
 //               <--------------------------  DataReply              it is in the catalogue
 //   DropVolume  -------------------------->            answered by OrderRefused (cancelled)
-// A client has one at a time: a new AddVolume ends the one before. If the client falls silent, nothing stays.
+// A client sends one at a time: a new AddVolume ends the one before. If the client falls silent meanwhile, nothing stays. The dataset of a
+// file (SentFile) lasts as long as its client: until a DropVolume of the same nonce, or until the client falls silent.
 #pragma once
 
 #include <array>
@@ -21,6 +22,7 @@
 namespace slabstream {
 
 inline constexpr std::uint32_t kMaxVolumePartBytes = std::uint32_t{1} << 19;
+inline constexpr std::uint64_t kMaxSentFileBytes = std::uint64_t{1} << 40;
 
 struct NewLabel {
   std::uint32_t value = 1;                         // [1, kMaxLabelValue]
@@ -29,16 +31,25 @@ struct NewLabel {
   friend bool operator==(const NewLabel&, const NewLabel&) = default;
 };
 
+// A file that holds the whole dataset, which the coordinator reads.
+struct SentFile {
+  std::string name;         // as CheckDatasetName allows, and no dot begins it; its ending says the format
+  std::uint64_t bytes = 1;  // [1, kMaxSentFileBytes]
+  friend bool operator==(const SentFile&, const SentFile&) = default;
+};
+
 struct AddVolume {
   std::uint64_t nonce = 0;
   std::string name;  // 1 ... kMaxNameBytes
   VolumeDescription description;
   LayerTypes layers;
-  std::vector<NewLabel> labels;  // values rise; at most kMaxLabels, and as many as numbers of the layer's type
+  std::vector<NewLabel> labels;       // values rise; at most kMaxLabels, and as many as numbers of the layer's type
+  std::optional<SentFile> file = {};  // instead of description, layers and labels
   friend bool operator==(const AddVolume&, const AddVolume&) = default;
 
-  // Of the samples of the volume and of its layers.
+  // Of the file, or of the samples of the volume and of its layers.
   std::uint64_t bytes() const {
+    if (file) return file->bytes;
     return std::uint64_t(description.geometry.bounds().voxel_count()) * SampleTypes(description.type, layers).bytes_per_voxel();
   }
 };

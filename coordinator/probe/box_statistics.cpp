@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
+#include <type_traits>
+#include <utility>
+
+#include "common/volume/exact_value.h"
 
 namespace slabstream {
 namespace {
@@ -15,23 +18,25 @@ constexpr double kOnASide = 1e-9;  // of a spacing: rounding leaves no voxel out
 struct Moments {
   std::uint64_t count = 0, non_finite = 0;
   double mean = 0, squares = 0;  // of differences from the mean
+  Int128 sum = 0;                // of whole numbers
   double least = std::numeric_limits<double>::infinity(), largest = -std::numeric_limits<double>::infinity();
 
   template <class T>
   void Add(std::span<const T> row) {
     std::uint64_t finite = 0;
-    double sum = 0;
+    std::conditional_t<std::is_integral_v<T>, Int128, double> row_sum = 0;
     for (const T sample : row) {
       const auto value = double(sample);
       if (!std::isfinite(value)) continue;
       ++finite;
-      sum += value;
+      row_sum += sample;
       least = std::min(least, value);
       largest = std::max(largest, value);
     }
     non_finite += row.size() - finite;
     if (finite == 0) return;
-    const double row_mean = sum / double(finite), apart = row_mean - mean;
+    if constexpr (std::is_integral_v<T>) sum += row_sum;
+    const double row_mean = double(row_sum) / double(finite), apart = row_mean - mean;
     double row_squares = 0;
     for (const T sample : row) {
       const double difference = double(sample) - row_mean;
@@ -41,6 +46,18 @@ struct Moments {
     squares += row_squares + apart * apart * double(count) / all * double(finite);
     mean += apart * double(finite) / all;
     count += finite;
+  }
+
+  // `whole`: of whole numbers.
+  BoxStatistics Under(const ValueMapping& mapping, bool whole) const {
+    BoxStatistics statistics{.voxels = count, .non_finite = non_finite};
+    if (count == 0) return statistics;
+    const double a = mapping.FromStored(least), b = mapping.FromStored(largest);
+    statistics.mean = mapping.FromStored(whole ? double(sum) / double(count) : mean);
+    statistics.deviation = std::abs(mapping.scale) * std::sqrt(squares / double(count));
+    statistics.least = std::min(a, b);
+    statistics.largest = std::max(a, b);
+    return statistics;
   }
 };
 
@@ -52,7 +69,8 @@ struct Interval {
 Interval RowIn(const ClipRegion& region, const Index3& begin, std::int32_t end) {
   double first = begin.x, last = end - 1;
   for (const HalfSpace& side : region.sides) {
-    const double slope = side.normal.x, rest = side.normal.y * begin.y + side.normal.z * begin.z + side.offset + kOnASide;
+    const double slope = side.normal.x,
+                 rest = side.normal.y * begin.y + side.normal.z * begin.z + side.offset + kOnASide * Length(side.normal);
     if (slope > 0) first = std::max(first, -rest / slope);
     if (slope < 0) last = std::min(last, -rest / slope);
     if (slope == 0 && rest < 0) return {};
@@ -61,36 +79,83 @@ Interval RowIn(const ClipRegion& region, const Index3& begin, std::int32_t end) 
   return {std::int32_t(std::ceil(first)), std::int32_t(std::floor(last)) + 1};
 }
 
-}  // namespace
-
-Result<BoxStatistics> StatisticsIn(const VoxelBricks& voxels, const VolumeDescription& volume, const ClipBox& box) {
-  const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.geometry);
-  if (!region.ok()) return region.status();
-  Moments moments;
-  const BrickGrid& grid = voxels.grid();
-  VisitScalarType(voxels.type(), [&]<class T>(const T*) {
-    for (std::size_t number = 0; number < grid.size(); ++number) {
-      const Index3 brick = grid.first + PlaceIn(grid.counts, number);
-      const Box bounds = grid.BoxOf(brick);
-      if (!region->MayKeep(bounds)) continue;
-      const BrickView<T> view = voxels.View<T>(brick);
-      for (std::int32_t z = bounds.begin.z; z < bounds.end.z; ++z) {
-        for (std::int32_t y = bounds.begin.y; y < bounds.end.y; ++y) {
-          const auto [begin, end] = RowIn(*region, {bounds.begin.x, y, z}, bounds.end.x);
-          if (begin < end) moments.Add(std::span(view.Row(y, z) + (begin - bounds.begin.x), std::size_t(end - begin)));
-        }
+// The rows of voxels in the region, brick by brick: use(view_of(brick), y, z, first voxel within the brick, count).
+void EachRow(const BrickGrid& grid, const ClipRegion& region, const auto& view_of, const auto& use) {
+  for (std::size_t number = 0; number < grid.size(); ++number) {
+    const Index3 brick = grid.first + PlaceIn(grid.counts, number);
+    const Box bounds = grid.BoxOf(brick);
+    if (!region.MayKeep(bounds)) continue;
+    const auto view = view_of(brick);
+    for (std::int32_t z = bounds.begin.z; z < bounds.end.z; ++z) {
+      for (std::int32_t y = bounds.begin.y; y < bounds.end.y; ++y) {
+        const auto [begin, end] = RowIn(region, {bounds.begin.x, y, z}, bounds.end.x);
+        if (begin < end) use(view, y, z, begin - bounds.begin.x, std::size_t(end - begin));
       }
     }
+  }
+}
+
+// Calls measure(view of a brick, mapping, whether they are whole numbers) with a function that views the best samples there are.
+decltype(auto) WithSamples(const MeasuredVolume& volume, const auto& measure) {
+  if (volume.exact) {
+    return std::visit(
+        [&]<class T>(std::span<const T> samples) {
+          const Index3 size = volume.voxels.box().size();
+          const std::ptrdiff_t row = size.x, slice = row * size.y;
+          const auto view_of = [&, row, slice](const Index3& brick) {
+            const Index3 begin = volume.voxels.grid().BoxOf(brick).begin, offset = begin - volume.voxels.box().begin;
+            return BrickView<T>{samples.data() + offset.z * slice + offset.y * row + offset.x, begin, row, slice};
+          };
+          return measure(view_of, volume.exact->mapping, true);
+        },
+        volume.exact->samples);
+  }
+  return VisitScalarType(volume.voxels.type(), [&]<class T>(const T*) {
+    return measure([&](const Index3& brick) { return volume.voxels.View<T>(brick); }, volume.description.mapping, std::is_integral_v<T>);
   });
-  BoxStatistics statistics{.voxels = moments.count, .non_finite = moments.non_finite};
-  if (moments.count == 0) return statistics;
-  const ValueMapping& mapping = volume.mapping;
-  const double a = mapping.FromStored(moments.least), b = mapping.FromStored(moments.largest);
-  statistics.mean = mapping.FromStored(moments.mean);
-  statistics.deviation = std::abs(mapping.scale) * std::sqrt(moments.squares / double(moments.count));
-  statistics.least = std::min(a, b);
-  statistics.largest = std::max(a, b);
-  return statistics;
+}
+
+}  // namespace
+
+Result<BoxStatistics> StatisticsIn(const MeasuredVolume& volume, const ClipBox& box) {
+  const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.description.geometry);
+  if (!region.ok()) return region.status();
+  return WithSamples(volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) {
+    Moments moments;
+    EachRow(volume.voxels.grid(), *region, view_of,
+            [&](const auto& view, std::int32_t y, std::int32_t z, std::int32_t first, std::size_t count) {
+              moments.Add(std::span(view.Row(y, z) + first, count));
+            });
+    return moments.Under(mapping, whole);
+  });
+}
+
+Result<std::vector<BoxStatistics>> StatisticsByLabel(const MeasuredVolume& volume, const ClipBox& box, const BrickedVoxels& labels,
+                                                     std::size_t label_count) {
+  const Result<ClipRegion> region = MakeClipRegion({.box = box}, volume.description.geometry);
+  if (!region.ok()) return region.status();
+  return WithSamples(volume, [&](const auto& view_of, const ValueMapping& mapping, bool whole) {
+    std::vector<Moments> moments(label_count + 1);  // the first: of no label
+    VisitScalarType(labels.type(), [&]<class L>(const L*) {
+      const auto views_of = [&](const Index3& brick) { return std::pair(view_of(brick), labels.View<L>(brick)); };
+      EachRow(volume.voxels.grid(), *region, views_of,
+              [&](const auto& views, std::int32_t y, std::int32_t z, std::int32_t first, std::size_t count) {
+                const auto* const samples = views.first.Row(y, z) + first;
+                const L* const numbers = views.second.Row(y, z) + first;
+                for (std::size_t begin = 0; begin < count;) {  // runs of one label
+                  std::size_t end = begin + 1;
+                  while (end < count && numbers[end] == numbers[begin]) ++end;
+                  const auto number = std::size_t(numbers[begin]);
+                  if (number > 0 && number <= label_count) moments[number].Add(std::span(samples + begin, end - begin));
+                  begin = end;
+                }
+              });
+    });
+    std::vector<BoxStatistics> statistics;
+    statistics.reserve(label_count);
+    for (std::size_t number = 1; number <= label_count; ++number) statistics.push_back(moments[number].Under(mapping, whole));
+    return statistics;
+  });
 }
 
 }  // namespace slabstream

@@ -20,7 +20,7 @@ namespace slabstream {
 
 struct Picked {
   Vec3 at;           // data space
-  double depth = 0;  // as depths of the picture's pixels (common/view/camera.h)
+  double depth = 0;  // in the setup's unit (common/view/camera.h)
   // That the pixel shows. Points of a surface lie between voxels, so where opacity is gathered it is the one that holds the point a
   // least spacing farther along the ray.
   Index3 voxel = {};

@@ -81,7 +81,7 @@ class StoreWriter {
   StoreWriter(const StoreFolder& stores, std::string name, std::string file, SliceStream& stream, const BrickStoreOptions& options)
       : stores_(stores), name_(std::move(name)), file_(std::move(file)), stream_(stream), options_(options) {}
 
-  Status Write() {
+  Status Write(const StoreFolder::Lock& alone) {
     // A compressed file tells best how well its voxels can be packed.
     std::error_code error;
     const std::uint64_t least = fs::file_size(stream_.info().files.back(), error);
@@ -89,10 +89,10 @@ class StoreWriter {
     if (stores_.RoomFor(name_) < least) return Full(least, "");
     Result<OmeZarrOptions> layout = Layout();
     if (!layout.ok()) return layout.status();
-    Status status = WriteWithin(*layout);
+    Status status = WriteWithin(*layout, alone);
     if (status.code() == StatusCode::kInvalidArgument) {  // what is there was begun otherwise
       fs::remove_all(stores_.PathOf(name_), error);
-      status = WriteWithin(*layout);
+      status = WriteWithin(*layout, alone);
     }
     if (status.ok()) status = stores_.Seal(name_);
     if (!status.ok() && status.code() != StatusCode::kCancelled) stores_.Remove(name_);
@@ -125,7 +125,8 @@ class StoreWriter {
                                                  MemoryText(least), MemoryText(layout.memory)));
   }
 
-  Status WriteWithin(OmeZarrOptions layout) {
+  Status WriteWithin(OmeZarrOptions layout, const StoreFolder::Lock& alone) {
+    if (Status begun = stores_.Begin(name_); !begun.ok()) return begun;
     std::stop_source stop;
     const std::stop_callback passed_on(options_.stop, [&] { stop.request_stop(); });
     layout.stop = stop.get_token();
@@ -133,6 +134,7 @@ class StoreWriter {
     std::uint64_t written = 0;
     double share = 0;
     layout.progress = [&](const OmeZarrProgress& progress) {
+      TouchLock(alone);
       written = stores_.BytesOf(name_);
       share = double(progress.done_bytes) / double(progress.all_bytes);
       const std::uint64_t room = stores_.RoomFor(name_);
@@ -170,6 +172,7 @@ Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& st
   Result<SourceText> text = ParseSourceText(source);
   if (!text.ok()) return text.status();
   text->options.progress = progress;
+  text->options.describe = true;
   const Result<std::shared_ptr<SliceStream>> stream = SliceStream::Open(text->path, text->options, context);
   if (!stream.ok()) return stream.status();
   const SourceInfo& info = (*stream)->info();
@@ -177,15 +180,15 @@ Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& st
   if (!name.ok()) return name.status();
   StoreWriter writer(stores, *name, text->path, **stream, options);
   while (true) {
-    Result<StoreFolder::Lock> in_use = stores.LockShared(*name);
-    if (!in_use.ok()) return writer.Full(std::uint64_t(info.levels.front().description.voxel_bytes()), in_use.status().message());
+    Result<StoreFolder::Lock> in_use = stores.LockShared(*name, options.stop);
+    if (!in_use.ok()) return Status(in_use.status().code(), text->path + ": " + in_use.status().message());
     if (stores.IsWhole(*name)) return OpenStore(stores.PathOf(*name), info, context, *std::move(in_use));
     ::close(in_use->Release());
-    const Result<StoreFolder::Lock> alone = stores.LockAlone(*name);
-    if (!alone.ok()) return alone.status();
+    const Result<StoreFolder::Lock> alone = stores.LockAlone(*name, options.stop);
+    if (!alone.ok()) return Status(alone.status().code(), text->path + ": " + alone.status().message());
     if (stores.IsWhole(*name)) continue;  // another one has written it meanwhile
     LogInfo(fmt::format("reads {} into '{}'", text->path, stores.PathOf(*name)));
-    if (Status status = writer.Write(); !status.ok()) return status;
+    if (Status status = writer.Write(*alone); !status.ok()) return status;
   }
 }
 

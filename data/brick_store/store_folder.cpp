@@ -1,14 +1,9 @@
 #include "data/brick_store/store_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <sys/statvfs.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <system_error>
@@ -16,7 +11,6 @@
 
 #include "common/base/cache_folder.h"
 #include "common/base/files.h"
-#include "common/base/log.h"
 
 namespace slabstream {
 namespace {
@@ -54,14 +48,6 @@ Contents In(const fs::path& folder) {
   return found;
 }
 
-// Whether the descriptor is still that of the path: whoever removes a store removes its lock file, too.
-bool IsOf(const FileDescriptor& file, const std::string& path) {
-  struct stat held {
-  }, there{};
-  return ::fstat(file.number(), &held) == 0 && ::stat(path.c_str(), &there) == 0 && held.st_ino == there.st_ino &&
-         held.st_dev == there.st_dev;
-}
-
 }  // namespace
 
 Result<StoreFolder> StoreFolder::Usual() {
@@ -72,33 +58,22 @@ Result<StoreFolder> StoreFolder::Usual() {
   return StoreFolder(*cache + "/streams", std::uint64_t(disk.f_blocks) * disk.f_frsize / kShareOfDisk);
 }
 
-Result<StoreFolder::Lock> StoreFolder::Wait(const std::string& name, int mode) const {
-  const std::string file = PathOf(name) + std::string(kLockEnding);
-  const auto failure = [&] { return Status::Unavailable(fmt::format("cannot write '{}': {}", file, std::strerror(errno))); };
-  std::error_code error;
-  fs::create_directories(path_, error);
-  if (error) return Status::Unavailable(fmt::format("cannot write '{}': {}", path_, error.message()));
-  while (true) {
-    Lock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-    if (lock.number() < 0) return failure();
-    if (::flock(lock.number(), mode | LOCK_NB) != 0) {
-      if (errno != EWOULDBLOCK) return failure();
-      LogInfo("waits for whoever else reads or uses '" + PathOf(name) + "'");
-      while (::flock(lock.number(), mode) != 0) {
-        if (errno != EINTR) return failure();
-      }
-    }
-    if (IsOf(lock, file)) return lock;
-  }
+std::string StoreFolder::LockOf(const std::string& name) const { return PathOf(name) + std::string(kLockEnding); }
+
+Result<StoreFolder::Lock> StoreFolder::Wait(const std::string& name, LockMode mode, const std::stop_token& stop) const {
+  if (Status made = MakeOwnFolder(path_); !made.ok()) return made;
+  return LockFile(LockOf(name), mode, patience_, stop);
 }
 
-Result<StoreFolder::Lock> StoreFolder::LockShared(const std::string& name) const {
-  Result<Lock> lock = Wait(name, LOCK_SH);
-  if (lock.ok()) ::futimens(lock->number(), nullptr);
+Result<StoreFolder::Lock> StoreFolder::LockShared(const std::string& name, const std::stop_token& stop) const {
+  Result<Lock> lock = Wait(name, LockMode::kShared, stop);
+  if (lock.ok()) TouchLock(*lock);
   return lock;
 }
 
-Result<StoreFolder::Lock> StoreFolder::LockAlone(const std::string& name) const { return Wait(name, LOCK_EX); }
+Result<StoreFolder::Lock> StoreFolder::LockAlone(const std::string& name, const std::stop_token& stop) const {
+  return Wait(name, LockMode::kAlone, stop);
+}
 
 std::uint64_t StoreFolder::Room(std::uint64_t own, std::uint64_t others) const {
   const struct statvfs disk = DiskOf(path_);
@@ -128,15 +103,14 @@ void StoreFolder::MakeRoom(const std::string& name, std::uint64_t bytes) const {
     const std::string file = each->path().filename().string();
     if (!each->is_directory(error) || file == name) continue;
     std::error_code without_lock;
-    const fs::file_time_type used = fs::last_write_time(PathOf(file) + std::string(kLockEnding), without_lock);
+    const fs::file_time_type used = fs::last_write_time(LockOf(file), without_lock);
     stores.push_back({file, without_lock ? fs::file_time_type::min() : used});
   }
   std::ranges::sort(stores, {}, &OtherStore::used);
   for (const OtherStore& store : stores) {
     if (RoomFor(name) >= bytes) return;
-    const std::string file = PathOf(store.name) + std::string(kLockEnding);
-    const Lock lock(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
-    if (lock.number() < 0 || ::flock(lock.number(), LOCK_EX | LOCK_NB) != 0 || !IsOf(lock, file)) continue;  // it is in use
+    const Result<Lock> lock = TryLockFile(LockOf(store.name), LockMode::kAlone);
+    if (!lock.ok()) continue;  // it is in use
     Remove(store.name);
   }
 }
@@ -147,13 +121,18 @@ bool StoreFolder::IsWhole(const std::string& name) const {
   return seal.ok() && *seal == In(PathOf(name)).Text();
 }
 
-Status StoreFolder::Seal(const std::string& name) const { return WriteTextFile(PathOf(name) + "/" + kSeal, In(PathOf(name)).Text()); }
+Status StoreFolder::Begin(const std::string& name) const { return MakeOwnFolder(PathOf(name)); }
+
+Status StoreFolder::Seal(const std::string& name) const {
+  TakeRightsOfOthers(PathOf(name));
+  return WritePrivateTextFile(PathOf(name) + "/" + kSeal, In(PathOf(name)).Text());
+}
 
 void StoreFolder::Remove(const std::string& name) const {
   std::error_code ignored;
   fs::remove(fs::path(PathOf(name)) / kSeal, ignored);  // first, if this process ends meanwhile
   fs::remove_all(PathOf(name), ignored);
-  fs::remove(PathOf(name) + std::string(kLockEnding), ignored);
+  fs::remove(LockOf(name), ignored);
 }
 
 }  // namespace slabstream

@@ -4,21 +4,24 @@
 //               and how many bytes, so that a store of which somebody has removed a part is not used
 //   NAME.lock   whoever uses the store holds it shared, whoever writes or removes it holds it alone; its time is that of the last use
 //
-// Locks are the kernel's (flock), so they end with the process that holds them. Any thread.
+// Locks are those of common/base/file_lock.h. The folder and all in it are for this user alone (cache_folder.h). Any thread.
 #pragma once
 
 #include <cstdint>
+#include <stop_token>
 #include <string>
 
 #include "common/base/file_descriptor.h"
+#include "common/base/file_lock.h"
 #include "common/base/status.h"
 
 namespace slabstream {
 
 class StoreFolder {
  public:
-  // `budget`: bytes that all stores in it may take together.
-  StoreFolder(std::string path, std::uint64_t budget) : path_(std::move(path)), budget_(budget) {}
+  // `budget`: bytes that all stores in it may take together. `patience`: as of LockFile.
+  StoreFolder(std::string path, std::uint64_t budget, Duration patience = kLockPatience)
+      : path_(std::move(path)), budget_(budget), patience_(patience) {}
 
   // Stores in the cache folder, which take at most a quarter of its disk.
   static Result<StoreFolder> Usual();
@@ -28,10 +31,10 @@ class StoreFolder {
 
   // Of a store, until it is destroyed.
   using Lock = FileDescriptor;
-  // Waits until nobody writes the store, and notes that it is used. Unavailable: the lock cannot be made.
-  Result<Lock> LockShared(const std::string& name) const;
-  // Waits until nobody else uses or writes it.
-  Result<Lock> LockAlone(const std::string& name) const;
+  // Waits until nobody writes the store, and notes that it is used. Errors of MakeOwnFolder and LockFile.
+  Result<Lock> LockShared(const std::string& name, const std::stop_token& stop = {}) const;
+  // Waits until nobody else uses or writes it. Whoever writes for long touches the lock.
+  Result<Lock> LockAlone(const std::string& name, const std::stop_token& stop = {}) const;
 
   // Bytes that one more store may take: what the budget and the disk leave, beside stores that are in use.
   std::uint64_t RoomFor(const std::string& name) const;
@@ -40,16 +43,19 @@ class StoreFolder {
   // What it takes now.
   std::uint64_t BytesOf(const std::string& name) const;
   bool IsWhole(const std::string& name) const;
-  // Whoever calls these holds it alone. Unavailable: the seal cannot be written.
+  // Whoever calls these holds it alone. Begin makes its folder. Unavailable: the folder cannot be made, the seal cannot be written.
+  Status Begin(const std::string& name) const;
   Status Seal(const std::string& name) const;
   void Remove(const std::string& name) const;
 
  private:
-  Result<Lock> Wait(const std::string& name, int mode) const;
+  std::string LockOf(const std::string& name) const;
+  Result<Lock> Wait(const std::string& name, LockMode mode, const std::stop_token& stop) const;
   std::uint64_t Room(std::uint64_t own, std::uint64_t others) const;
 
   std::string path_;
   std::uint64_t budget_;
+  Duration patience_;
 };
 
 }  // namespace slabstream

@@ -35,14 +35,14 @@ std::string Listed(const std::shared_ptr<Hdf5File>& file, const std::vector<std:
   return list;
 }
 
-// No dataset of three axes or more: what there is instead.
-Status NoVolume(const std::shared_ptr<Hdf5File>& file, const Hdf5File::Found& found) {
+// Of a file without a dataset of three axes or more, those of two: slices.
+Result<std::vector<std::string>> SlicesIn(const std::shared_ptr<Hdf5File>& file, const Hdf5File::Found& found) {
   for (const std::string& path : found.closed) {
     if (const Status status = file->Dataset(path).status(); !status.ok()) return status;
   }
-  const std::vector<std::string> pictures = file->Datasets(2).paths;
-  return Status::InvalidArgument(file->path() + ": has no dataset of three axes or more" +
-                                 (pictures.empty() ? "" : "; --dataset takes one of two: " + Listed(file, pictures)));
+  std::vector<std::string> slices = file->Datasets(2).paths;
+  if (slices.empty()) return Status::InvalidArgument(file->path() + ": has no dataset of two axes or more");
+  return slices;
 }
 
 Result<std::string> ChosenDataset(const std::shared_ptr<Hdf5File>& file, const ReadOptions& options) {
@@ -56,8 +56,9 @@ Result<std::string> ChosenDataset(const std::shared_ptr<Hdf5File>& file, const R
   }
   if (paths.empty()) {
     Hdf5File::Found found = file->Datasets(3);
-    if (found.paths.empty()) return NoVolume(file, found);
-    paths = std::move(found.paths);
+    Result<std::vector<std::string>> images = found.paths.empty() ? SlicesIn(file, found) : std::move(found.paths);
+    if (!images.ok()) return images.status();
+    paths = *std::move(images);
   }
   if (paths.size() == 1) return paths[0];
   return Status::InvalidArgument(

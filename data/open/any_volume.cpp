@@ -11,8 +11,8 @@
 #include "data/open/open_source.h"
 #include "data/positional/slice_stream.h"
 #include "data/survey/survey.h"
-#include "data/volume_io/chosen_channel.h"
 #include "data/volume_io/exact_samples.h"
+#include "data/volume_io/file_parts.h"
 #include "data/volume_io/formats.h"
 
 namespace slabstream {
@@ -56,8 +56,25 @@ VolumeFileInfo FileInfoOf(const SourceInfo& source) {
           .notes = source.notes};
 }
 
-void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info) {
-  if (const auto text = ShownChannelText(path, info.channels, info.channel, options)) LogWarning(*text);
+namespace {
+
+FileParts PartsBy(const VolumeFileInfo& info) {
+  return {.times = info.times, .time = info.time, .channels = info.channels, .channel = info.channel};
+}
+
+}  // namespace
+
+void WarnOfPart(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info) {
+  for (const std::string& text : ShownTexts(path, PartsBy(info), options)) LogWarning(text);
+}
+
+Result<std::vector<std::string>> TextsOfPart(const std::string& path, const ReadOptions& options) {
+  if (IsReadWhole(path, options)) {
+    const Result<FileParts> parts = PartsOf(path, options);
+    return parts.ok() ? Result(ShownTexts(path, *parts, options)) : parts.status();
+  }
+  const Result<std::shared_ptr<VolumeSource>> source = OpenSource(path, options, ProcessReadContext());
+  return source.ok() ? Result(ShownTexts(path, PartsBy(FileInfoOf((*source)->info())), options)) : source.status();
 }
 
 bool IsReadWhole(const std::string& path, const ReadOptions& options) {
@@ -70,7 +87,7 @@ Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& o
     return source.ok() ? ReadFinest(**source, path, options) : source.status();
   }
   Result<LoadedVolume> loaded = ReadVolume(path, options);
-  if (loaded.ok()) WarnOfChannel(path, options, loaded->info);
+  if (loaded.ok()) WarnOfPart(path, options, loaded->info);
   return loaded;
 }
 
@@ -79,7 +96,7 @@ Result<LoadedVolume> ReadFinest(VolumeSource& source, const std::string& path, c
   if (!level.ok()) return level.status();
   LoadedVolume loaded{FileInfoOf(source.info()), std::move(level->volume), std::move(level->exact)};
   loaded.rounded = loaded.exact != nullptr;
-  WarnOfChannel(path, options, loaded.info);
+  WarnOfPart(path, options, loaded.info);
   return loaded;
 }
 

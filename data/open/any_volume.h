@@ -22,15 +22,18 @@ void SetReadMemory(std::uint64_t process_bytes);
 // Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
 VolumeFileInfo FileInfoOf(const SourceInfo& source);
 
-// Logs a line if this is one of several channels, and the options do not say which.
-void WarnOfChannel(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info);
+// Logs a line for each choice among times and channels that the options leave open (data/volume_io/file_parts.h).
+void WarnOfPart(const std::string& path, const ReadOptions& options, const VolumeFileInfo& info);
+
+// The same lines, by the headers alone. Errors of CheckAnyVolumeHeaders.
+Result<std::vector<std::string>> TextsOfPart(const std::string& path, const ReadOptions& options);
 
 // For whoever shows the volume: logs a line if its values are rounded, and keeps exact samples only of rounded whole numbers.
 void PrepareToShow(const std::string& path, LoadedVolume& loaded);
 
-// ReadVolume and WarnOfChannel, or ReadFinest.
+// ReadVolume and WarnOfPart, or ReadFinest.
 Result<LoadedVolume> ReadAnyVolume(const std::string& path, const ReadOptions& options = {});
-// The finest level of a source that is open; and WarnOfChannel. `exact` is there only if whole numbers are rounded.
+// The finest level of a source that is open; and WarnOfPart. `exact` is there only if whole numbers are rounded.
 Result<LoadedVolume> ReadFinest(VolumeSource& source, const std::string& path, const ReadOptions& options);
 // CheckVolumeHeaders, or the files of a source, which it opens, or of a compressed stream, which may be larger than the memory.
 Result<std::vector<std::string>> CheckAnyVolumeHeaders(const std::string& path, const ReadOptions& options = {});

@@ -6,8 +6,9 @@
 namespace slabstream {
 
 Result<std::shared_ptr<VolumeSource>> OpenSameSource(const StoredAt& stored, const SourceContext& context) {
-  const Result<SourceText> text = ParseSourceText(stored.source);
+  Result<SourceText> text = ParseSourceText(stored.source);
   if (!text.ok()) return text.status();
+  text->options.describe = true;
   Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, context);
   if (!source.ok()) return source;
   const SourceInfo& info = (*source)->info();

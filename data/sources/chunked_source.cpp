@@ -15,6 +15,7 @@
 #include "common/base/log.h"
 #include "common/base/printable.h"
 #include "common/base/url.h"
+#include "common/volume/memory_budget.h"
 #include "data/sources/copy_samples.h"
 
 namespace slabstream {
@@ -155,6 +156,11 @@ class Level : public std::enable_shared_from_this<Level> {
       reading->BeginPart();
     }
     const std::uint64_t bytes = 2 * level_.array->shape().chunk_bytes();  // packed and decoded
+    // More than chunks may take together: one may be under way all the same, if there is memory for it.
+    constexpr std::uint64_t kLarge = std::uint64_t{128} << 20;
+    if (Status fits = bytes > kLarge ? CheckFitsMemory(std::int64_t(bytes), name_ + ": a chunk") : Status::Ok(); !fits.ok()) {
+      return End(chunk, TakeFlight(chunk), fits);
+    }
     try {
       context_->Admit(bytes, [self = shared_from_this(), chunk, bytes] { self->Begin(chunk, bytes); });
     } catch (const std::exception& error) {
@@ -404,6 +410,15 @@ Result<VolumeGeometry> GeometryOf(const std::string& name, const Pyramid& pyrami
   return geometry;
 }
 
+// What is noted of a chunk that is read takes more than a small one. With many of them it would be memory and time for nothing.
+Status CheckChunks(const std::string& name, const Index3& size, const Index3& chunk, std::uint64_t chunk_bytes) {
+  constexpr std::uint64_t kSmallBytes = 64, kMostSmall = std::uint64_t{1} << 20;
+  const std::uint64_t count = CountIn((size - Uniform(1)) / chunk + Uniform(1));
+  if (chunk_bytes >= kSmallBytes || count <= kMostSmall) return Status::Ok();
+  return Status::InvalidArgument(fmt::format("{}: {} chunks of {} byte{}: of chunks of less than {} bytes at most {} are read", name, count,
+                                             chunk_bytes, chunk_bytes == 1 ? "" : "s", kSmallBytes, kMostSmall));
+}
+
 }  // namespace
 
 Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name, Pyramid pyramid, const SourceContext& context) {
@@ -428,7 +443,9 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
     if (Status status = CheckShape(level_name, level); !status.ok()) return status;
     const Result<VolumeGeometry> geometry = GeometryOf(level_name, pyramid, level);
     if (!geometry.ok()) return geometry.status();
+    const std::uint64_t chunk_bytes = level.array->shape().chunk_bytes();
     levels.push_back(std::make_shared<Level>(level_name, std::move(level), geometry->size, context, findings));
+    if (Status status = CheckChunks(level_name, geometry->size, levels.back()->chunk(), chunk_bytes); !status.ok()) return status;
     info.levels.push_back({{*geometry, kept.type, mapping}, levels.back()->chunk()});
   }
   return std::shared_ptr<VolumeSource>(std::make_shared<ChunkedSource>(name, std::move(info), std::move(levels)));

@@ -37,8 +37,8 @@ struct Pyramid {
   SourceInfo info = {};              // without its levels and exact; file_type: "" means that of the arrays
 };
 
-// InvalidArgument, naming `name`: no level; one whose sides are out of [1, kMaxVolumeSide]; levels of different types; a spacing that is
-// not above 0 and finite.
+// InvalidArgument, naming `name`: no level; one whose sides are out of [1, kMaxVolumeSide], or that has too many chunks of a few bytes;
+// levels of different types; a spacing that is not above 0 and finite.
 Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name, Pyramid pyramid, const SourceContext& context);
 
 }  // namespace slabstream

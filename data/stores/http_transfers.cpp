@@ -8,6 +8,7 @@
 #include <cctype>
 #include <ctime>
 #include <deque>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <random>
@@ -120,6 +121,11 @@ struct HttpTransfers::Impl {
   struct Host {
     std::deque<Owned> waiting;
     std::map<CURL*, Owned> active;
+    std::size_t open = 0;           // requests: these and those that pause
+    Time heard;                     // last time that an answer ended or enough had come, later by what it was not asked since
+    std::uint64_t heard_bytes = 0;  // from then on
+    Time left_alone;                // since when it is not asked, if nothing is active
+    Time asked_again;               // not before, since it was silent
   };
 
   const Timing timing;
@@ -133,6 +139,7 @@ struct HttpTransfers::Impl {
   std::map<std::string, std::string> regions;  // by the beginning of the addresses there
   std::set<std::string> headless;              // hosts that do not say by HEAD how long an object is
   std::vector<CURL*> idle;                     // to be used again
+  Time looked = MonotonicNow();                // for silent hosts
   std::minstd_rand random{std::random_device{}()};
   std::jthread thread;
 
@@ -153,6 +160,7 @@ struct HttpTransfers::Impl {
         ended = true;
       }
       if (ended) continue;  // others may begin
+      LeaveSilentHosts(MonotonicNow());
       const Duration until = paused.empty() ? Duration(seconds(1)) : paused.begin()->first - MonotonicNow();
       const auto wait = std::clamp<Duration>(until, Duration(0), seconds(1));
       curl_multi_poll(multi, nullptr, 0, int(std::chrono::ceil<milliseconds>(wait).count()), nullptr);
@@ -166,14 +174,32 @@ struct HttpTransfers::Impl {
       const std::lock_guard lock(mutex);
       taken.swap(asked);
     }
-    for (Owned& transfer : taken) Wait(std::move(transfer));
+    for (Owned& transfer : taken) {
+      Open(transfer->host);
+      Wait(std::move(transfer));
+    }
+  }
+
+  void Open(const std::string& name) {
+    Host& host = hosts[name];
+    if (host.open++ > 0) return;
+    host.heard = host.left_alone = MonotonicNow();
+    host.heard_bytes = 0;
+  }
+  void Close(const std::string& name) { --hosts.at(name).open; }
+
+  void Lead(Transfer& transfer, const std::string& url) {
+    Close(transfer.host);
+    transfer.Lead(url);
+    Open(transfer.host);
   }
 
   void Wait(Owned transfer) {
     if (const auto region = regions.find(BeginOf(transfer->get.url)); region != regions.end() && transfer->region.empty()) {
       transfer->region = region->second;
-      transfer->Lead(InRegion(transfer->url, transfer->region));
+      Lead(*transfer, InRegion(transfer->url, transfer->region));
     }
+    if (MonotonicNow() < hosts.at(transfer->host).asked_again) return FailSilent(std::move(transfer));
     if (transfer->get.only_size && headless.contains(transfer->host)) transfer->ReadStart();
     hosts[transfer->host].waiting.push_back(std::move(transfer));
   }
@@ -185,6 +211,7 @@ struct HttpTransfers::Impl {
     for (auto other = host.waiting.begin(); other != host.waiting.end();) {
       if (transfer.TakesAlong(**other)) {
         transfer.TakeAlong(std::move(**other));
+        Close(transfer.host);
         host.waiting.erase(other);
         other = host.waiting.begin();
       } else {
@@ -195,6 +222,8 @@ struct HttpTransfers::Impl {
     if (easy == nullptr) return Answer(std::move(owned), Status::ResourceExhausted(transfer.get.url + ": no memory to ask for it"));
     if (!idle.empty()) idle.pop_back();
     transfer.Prepare(easy, timing);
+    transfer.heard_bytes = &host.heard_bytes;
+    if (host.active.empty()) host.heard += transfer.tried - host.left_alone;
     host.active.emplace(easy, std::move(owned));
     curl_multi_add_handle(multi, easy);
   }
@@ -203,18 +232,67 @@ struct HttpTransfers::Impl {
     Transfer* asked_for = nullptr;
     curl_easy_getinfo(easy, CURLINFO_PRIVATE, &asked_for);
     Transfer& transfer = *asked_for;
-    Owned owned = std::move(hosts.at(transfer.host).active.extract(easy).mapped());
-    Count(transfer.host, [&](WebTraffic& count) {
-      ++count.requests;
-      count.retries += transfer.tries > 1 ? 1 : 0;
-      count.unchanged += transfer.status() == 304 ? 1 : 0;
-      count.bytes += transfer.body.size();
-      count.milliseconds += std::uint64_t(std::chrono::duration_cast<milliseconds>(MonotonicNow() - transfer.tried).count());
-    });
-    curl_multi_remove_handle(multi, easy);
+    Host& host = hosts.at(transfer.host);
+    if (code == CURLE_OK) host.heard = MonotonicNow();
+    Owned owned = Take(host, easy);
     Decide(std::move(owned), code);  // which asks the handle, and may be the end of the transfer
     curl_easy_reset(easy);
     idle.push_back(easy);
+  }
+
+  // Ends a try. The handle still knows what came.
+  Owned Take(Host& host, CURL* easy) {
+    Owned owned = std::move(host.active.extract(easy).mapped());
+    if (host.active.empty()) host.left_alone = MonotonicNow();
+    Count(owned->host, [&](WebTraffic& count) {
+      ++count.requests;
+      count.retries += owned->tries > 1 ? 1 : 0;
+      count.unchanged += owned->status() == 304 ? 1 : 0;
+      count.bytes += owned->body.size();
+      count.milliseconds += std::uint64_t(std::chrono::duration_cast<milliseconds>(MonotonicNow() - owned->tried).count());
+    });
+    curl_multi_remove_handle(multi, easy);
+    return owned;
+  }
+
+  void LeaveSilentHosts(Time now) {
+    constexpr Duration kStoodStill = seconds(5);  // a process that was stopped has heard nobody
+    const Duration since = now - std::exchange(looked, now);
+    const std::uint64_t enough = kLeastBytes * std::uint64_t(std::chrono::ceil<seconds>(timing.silence).count());
+    for (auto& [name, host] : hosts) {
+      if (since > kStoodStill) host.heard += since;
+      if (host.heard_bytes >= enough) {
+        host.heard = now;
+        host.heard_bytes = 0;
+      }
+      if (!host.active.empty() && now > host.heard + timing.silence) Leave(name, host, now);
+    }
+    std::erase_if(hosts, [&](const auto& each) { return each.second.open == 0 && now >= each.second.asked_again; });
+  }
+
+  void Leave(const std::string& name, Host& host, Time now) {
+    host.asked_again = now + timing.rest;
+    std::vector<Owned> left;
+    while (!host.active.empty()) {
+      CURL* const easy = host.active.begin()->first;
+      left.push_back(Take(host, easy));
+      curl_easy_reset(easy);
+      idle.push_back(easy);
+    }
+    std::ranges::move(host.waiting, std::back_inserter(left));
+    host.waiting.clear();
+    for (auto each = paused.begin(); each != paused.end();) {
+      const auto next = std::next(each);
+      if (each->second->host == name) left.push_back(std::move(paused.extract(each).mapped()));
+      each = next;
+    }
+    for (Owned& transfer : left) FailSilent(std::move(transfer));
+  }
+
+  void FailSilent(Owned owned) {
+    const std::string why = fmt::format("no answer from {} within {} s, or less than {} bytes a second", owned->host,
+                                        std::chrono::ceil<seconds>(timing.silence).count(), kLeastBytes);
+    Fail(std::move(owned), StatusCode::kUnavailable, why);
   }
 
   // Answers, follows a redirect, or tries again later. The transfer's handle is still there.
@@ -276,9 +354,11 @@ struct HttpTransfers::Impl {
     Answer(std::move(owned), std::move(object));
   }
 
+  // One that is too long to remember for each object tells nothing.
   static std::string VersionOf(const Transfer& transfer) {
-    const std::string tag = transfer.header("ETag");
-    return tag.empty() ? transfer.header("Last-Modified") : tag;
+    constexpr std::size_t kMost = 512;
+    const std::string tag = transfer.header("ETag"), version = tag.empty() ? transfer.header("Last-Modified") : tag;
+    return version.size() <= kMost ? version : "";
   }
 
   // The same request in another way, which counts as the same try.
@@ -300,7 +380,10 @@ struct HttpTransfers::Impl {
       return fail(fmt::format("leads to a {} address, which is not followed", scheme.empty() ? "strange" : scheme));
     }
     if (++transfer.redirects > kMostRedirects) return fail(fmt::format("leads on more than {} times", kMostRedirects));
-    transfer.Lead(url);
+    const char* address = nullptr;
+    curl_easy_getinfo(transfer.easy, CURLINFO_PRIMARY_IP, &address);
+    transfer.led_by = ReachOf(std::string(address == nullptr ? "" : address));
+    Lead(transfer, url);
     Once(std::move(owned));
   }
 
@@ -328,6 +411,7 @@ struct HttpTransfers::Impl {
   void Answer(Owned owned, Result<HttpObject> answer) {
     // That an object is not there is an answer: volumes leave out chunks that hold nothing.
     if (!answer.ok() && answer.status().code() != StatusCode::kNotFound) Count(owned->host, [](WebTraffic& count) { ++count.failures; });
+    Close(owned->host);
     for (Asker& asker : owned->askers) {
       if (!answer.ok() || owned->askers.size() == 1) {
         asker.done(answer);
@@ -342,7 +426,9 @@ struct HttpTransfers::Impl {
 
   template <class Change>
   void Count(const std::string& host, Change&& change) {
+    constexpr std::size_t kMostCounted = 4096;  // a server may lead to any number of others
     const std::lock_guard lock(mutex);
+    if (traffic.size() >= kMostCounted && !traffic.contains(host)) return;
     WebTraffic& count = traffic[host];
     count.server = host;
     change(count);

@@ -12,8 +12,12 @@
 //
 // Parts of one object that wait for their turn and lie side by side, such as the chunks of a shard, become one request.
 //
-// Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may not end at a loopback or
-// link-local address, so that no server on the internet makes this process ask what only this machine sees.
+// Redirects are followed within HTTP and from HTTP to HTTPS, never back. One that leads to another host may end on the internet, or where
+// its own server is: at this machine, or in a private network (address_reach.h). So no server on the internet makes this process ask what
+// only this machine sees. The address counts, not the name.
+//
+// A host is silent if, for kSilence, no answer of it ends and it sends less than kLeastBytes a second in all, although it is asked. Then
+// all requests of it fail, those that wait, too, and so do others that come in the next kRest.
 //
 // Certificates must be signed by an authority that the system knows, or that is in the file SSL_CERT_FILE of the environment.
 #pragma once
@@ -71,11 +75,17 @@ class HttpTransfers {
   static constexpr Duration kFirstPause = std::chrono::milliseconds(200), kLongestPause = std::chrono::seconds(30);
   static constexpr Duration kConnecting = std::chrono::seconds(10);  // for a connection to be there
   static constexpr Duration kStalled = std::chrono::seconds(20);     // without a byte
-  // So long after its first try a request fails, unless at least 1 KiB a second comes.
+  // So long after its first try a request fails, unless at least so many bytes a second come.
   static constexpr Duration kPatience = std::chrono::seconds(60);
+  static constexpr std::uint64_t kLeastBytes = 1024;
+  // Of a host. Two processes may try one after the other, a worker and the coordinator, and a minute is the promise for both.
+  static constexpr Duration kSilence = std::chrono::seconds(30), kRest = std::chrono::seconds(10);
+  // Of an answer: headers and trailers, and what is no object, such as the page of an error.
+  static constexpr std::uint64_t kMostOfHead = std::uint64_t{256} << 10, kMostOfPage = std::uint64_t{1} << 20;
 
   struct Timing {
-    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled, patience = kPatience;
+    Duration first_pause = kFirstPause, connecting = kConnecting, stalled = kStalled, patience = kPatience, silence = kSilence,
+             rest = kRest;
     int tries = kTries;  // at least 1
   };
 

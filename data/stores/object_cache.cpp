@@ -28,6 +28,9 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kParts = 16;  // of the budget: one is the largest entry, and what is written between two looks at the folder
 constexpr std::uint64_t kFormat = 0x316A626F62616C73;  // "slabobj1"
+// A file takes whole blocks of the disk, and so many at least. It is filled up with zeros, so that its length is what it takes, and a
+// budget holds for the disk, and for the number of files, however small objects are.
+constexpr std::uint64_t kBlock = 4096;
 
 // In front of bytes, name and version, in the machine's byte order: the folder is this machine's own. The bytes come first, so that those
 // of a file that was read begin where numbers may.
@@ -38,6 +41,8 @@ struct Head {
   std::uint64_t name = 0, version = 0, bytes = 0;  // lengths
 };
 constexpr std::size_t kUnchecked = 2 * sizeof(std::uint64_t);
+
+std::uint64_t InBlocks(std::uint64_t bytes) { return (bytes + kBlock - 1) / kBlock * kBlock; }
 
 std::span<const std::byte> BytesOf(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -56,13 +61,13 @@ std::optional<ObjectCache::Entry> ReadEntry(int file, const std::string& name, s
   if (!all.ok() || all->size() < sizeof head) return std::nullopt;
   std::memcpy(&head, all->span().data(), sizeof head);
   const std::uint64_t length = all->size();
-  if (head.format != kFormat || head.name != name.size() || head.version > length || head.bytes > length ||
-      sizeof head + head.name + head.version + head.bytes != length) {
-    return std::nullopt;
-  }
+  if (head.format != kFormat || head.name != name.size() || head.version > length || head.bytes > length) return std::nullopt;
+  const std::uint64_t end = sizeof head + head.name + head.version + head.bytes;
+  if (InBlocks(end) != length) return std::nullopt;
   const Bytes bytes = all->Part(sizeof head, head.bytes), of = all->Part(sizeof head + head.bytes, head.name),
-              version = all->Part(length - head.version, head.version);
-  if (!std::ranges::equal(of.span(), BytesOf(name)) || ChecksumOf(head, {bytes.span(), of.span(), version.span()}) != head.checksum) {
+              version = all->Part(end - head.version, head.version), rest = all->Part(end, length - end);
+  if (std::ranges::any_of(rest.span(), [](std::byte each) { return each != std::byte{0}; }) ||
+      !std::ranges::equal(of.span(), BytesOf(name)) || ChecksumOf(head, {bytes.span(), of.span(), version.span()}) != head.checksum) {
     return std::nullopt;
   }
   return ObjectCache::Entry{{reinterpret_cast<const char*>(version.span().data()), version.size()}, head.size, bytes};
@@ -90,7 +95,7 @@ struct ObjectCache::State {
     if (!lock) return;  // another thread looks
     unlooked = 0;
     struct File {
-      fs::file_time_type used;
+      std::pair<std::int64_t, std::int64_t> used;  // seconds, nanoseconds
       std::uint64_t bytes = 0;
       fs::path path;
     };
@@ -98,12 +103,11 @@ struct ObjectCache::State {
     std::uint64_t all = 0;
     std::error_code error;
     for (fs::recursive_directory_iterator each(folder, error), end; !error && each != end; each.increment(error)) {
-      std::error_code gone;  // other processes remove files, too
-      if (!each->is_regular_file(gone)) continue;
-      const std::uint64_t bytes = each->file_size(gone);
-      const fs::file_time_type used = each->last_write_time(gone);
-      if (gone) continue;
-      files.push_back({used, bytes, each->path()});
+      struct stat found {};
+      if (::lstat(each->path().c_str(), &found) != 0 || !S_ISREG(found.st_mode)) continue;  // other processes remove files, too
+      constexpr std::uint64_t kUnit = 512;  // of st_blocks; a disk may have larger blocks than kBlock, or may count them later
+      const std::uint64_t bytes = std::max(InBlocks(std::uint64_t(found.st_size)), kUnit * std::uint64_t(found.st_blocks));
+      files.push_back({{found.st_mtim.tv_sec, found.st_mtim.tv_nsec}, bytes, each->path()});
       all += bytes;
     }
     const std::uint64_t most = budget / 8 * 7;
@@ -118,9 +122,7 @@ struct ObjectCache::State {
 };
 
 Result<ObjectCache> ObjectCache::Open(std::string folder, std::uint64_t budget) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) return Status::Unavailable(fmt::format("--cache: cannot make the folder '{}': {}", folder, error.message()));
+  if (const Status made = MakeOwnFolder(folder); !made.ok()) return Status::Unavailable("--cache: " + made.message());
   if (const Status status = CheckCanWrite("--cache", folder + "/entry"); !status.ok()) return Status::Unavailable(status.message());
   auto state = std::make_shared<State>(std::move(folder), budget);
   state->MakeRoom();
@@ -143,7 +145,7 @@ std::optional<ObjectCache::Entry> ObjectCache::Find(const std::string& name) con
 }
 
 void ObjectCache::Keep(const std::string& name, const Entry& entry) const {
-  const std::uint64_t bytes = sizeof(Head) + name.size() + entry.version.size() + entry.bytes.size();
+  const std::uint64_t length = sizeof(Head) + name.size() + entry.version.size() + entry.bytes.size(), bytes = InBlocks(length);
   if (bytes > state_->budget / kParts) return;
   if (state_->unlooked.fetch_add(bytes) + bytes > state_->budget / kParts) {
     state_->MakeRoom();
@@ -152,8 +154,7 @@ void ObjectCache::Keep(const std::string& name, const Entry& entry) const {
   Head head{.size = entry.size, .name = name.size(), .version = entry.version.size(), .bytes = entry.bytes.size()};
   head.checksum = ChecksumOf(head, {entry.bytes.span(), BytesOf(name), BytesOf(entry.version)});
   const std::string path = state_->PathOf(name);
-  std::error_code error;
-  fs::create_directories(fs::path(path).parent_path(), error);
+  ::mkdir(fs::path(path).parent_path().c_str(), S_IRWXU);
   Result<OutputFile> file = OutputFile::Create(path, 0600);
   Status written = file.status();
   if (file.ok()) {
@@ -161,6 +162,7 @@ void ObjectCache::Keep(const std::string& name, const Entry& entry) const {
     file->Append(entry.bytes.span());
     file->Append(name);
     file->Append(entry.version);
+    file->Append(std::string(bytes - length, '\0'));
     written = file->Finish();
   }
   if (!written.ok() && !state_->complained.exchange(true)) LogWarning("what servers send is not kept: " + written.message());

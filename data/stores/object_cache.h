@@ -1,10 +1,12 @@
 // ObjectCache: a folder on disk with what servers have sent. The processes of a host share it, within a budget.
 //
-// An entry is a file: whose part it is, which version that was, and the bytes, with a checksum of it all. It is written beside its place
-// and then renamed, so it is there as a whole or not at all. What is damaged all the same, after a crash of the machine, is not used and
-// goes. An entry does not tell whether the server still has that version: whoever uses it asks the server (HttpGet::known).
+// An entry is a file of whole blocks of the disk: whose part it is, which version that was, and the bytes, with a checksum of it all. It is
+// written beside its place and then renamed, so it is there as a whole or not at all. What is damaged all the same, after a crash of the
+// machine, is not used and goes. An entry does not tell whether the server still has that version: whoever uses it asks the server
+// (HttpGet::known).
 //
-// Entries that were used longest ago go first, until seven eighths of the budget are left. A process looks after that each time that it has
+// The budget is of blocks, so it limits the number of files, too. Entries that were used longest ago go first, until seven eighths of it
+// are left. A process looks after that each time that it has
 // written a sixteenth of the budget, so that two processes that write at a time stay within it.
 //
 // Copies are the same cache.
@@ -28,7 +30,8 @@ class ObjectCache {
     Bytes bytes;
   };
 
-  // The folder need not exist. Unavailable: it cannot be made or written. Waits for the disk, as the other functions do.
+  // The folder need not exist. Unavailable: it cannot be made or written, or is not its user's own (MakeOwnFolder). Waits for the disk, as
+  // the other functions do.
   static Result<ObjectCache> Open(std::string folder, std::uint64_t budget);
 
   // `name`: of a part of an object, unique among all servers. Any thread.

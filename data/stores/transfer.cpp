@@ -1,14 +1,11 @@
 #include "data/stores/transfer.h"
 
-#include <arpa/inet.h>
 #include <fmt/format.h>
-#include <netinet/in.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <iterator>
 #include <new>
 #include <utility>
@@ -21,28 +18,10 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr std::size_t kMostOfPage = 4096;
+constexpr std::size_t kKeptOfPage = 4096;
 
-// What only this machine or its link sees.
-bool IsLocal(const sockaddr* address) {
-  const auto is_local_v4 = [](std::uint32_t host_order) {
-    return host_order >> 24 == 127 || host_order >> 24 == 0 || host_order >> 16 == 0xA9FE;  // 127/8, 0/8, 169.254/16
-  };
-  if (address->sa_family == AF_INET) {
-    sockaddr_in v4{};
-    std::memcpy(&v4, address, sizeof v4);
-    return is_local_v4(ntohl(v4.sin_addr.s_addr));
-  }
-  if (address->sa_family != AF_INET6) return true;
-  sockaddr_in6 v6{};
-  std::memcpy(&v6, address, sizeof v6);
-  const in6_addr& at = v6.sin6_addr;
-  if (IN6_IS_ADDR_V4MAPPED(&at) || IN6_IS_ADDR_V4COMPAT(&at)) {
-    std::uint32_t v4 = 0;
-    std::memcpy(&v4, at.s6_addr + 12, sizeof v4);
-    return is_local_v4(ntohl(v4));
-  }
-  return IN6_IS_ADDR_LOOPBACK(&at) || IN6_IS_ADDR_LINKLOCAL(&at) || IN6_IS_ADDR_UNSPECIFIED(&at);
+std::size_t TakeHead(char*, std::size_t, std::size_t bytes, void* transfer) {
+  return static_cast<Transfer*>(transfer)->OnHead(bytes) ? bytes : 0;
 }
 
 std::size_t TakeBody(char* data, std::size_t, std::size_t bytes, void* transfer) {
@@ -53,13 +32,15 @@ int TakeProgress(void* transfer, curl_off_t, curl_off_t bytes, curl_off_t, curl_
   return static_cast<Transfer*>(transfer)->OnProgress(std::uint64_t(bytes)) ? 0 : 1;
 }
 
-curl_socket_t OpenSocket(void* data, curlsocktype, curl_sockaddr* address) {
-  auto& transfer = *static_cast<Transfer*>(data);
-  if (transfer.elsewhere() && IsLocal(&address->addr)) {
-    transfer.stopped = Status::Unavailable(fmt::format("leads to {}, which is an address of this machine or its link", transfer.host));
-    return CURL_SOCKET_BAD;
-  }
+// Before a connection is made. What is refused hears nothing from us.
+curl_socket_t OpenSocket(void* transfer, curlsocktype, curl_sockaddr* address) {
+  if (!static_cast<Transfer*>(transfer)->OnPlace(ReachOf(&address->addr))) return CURL_SOCKET_BAD;
   return ::socket(address->family, address->socktype | SOCK_CLOEXEC, address->protocol);
+}
+
+// Before a request goes out, perhaps over a connection that was there.
+int CheckPlace(void* transfer, char* address, char*, int, int) {
+  return static_cast<Transfer*>(transfer)->OnPlace(ReachOf(address)) ? CURL_PREREQFUNC_OK : CURL_PREREQFUNC_ABORT;
 }
 
 const std::string& UserAgent() {
@@ -190,6 +171,7 @@ void Transfer::Prepare(CURL* handle, const HttpTransfers::Timing& timing) {
   ++tries;
   body = {};
   page.clear();
+  head_bytes = page_bytes = 0;
   stopped.reset();
   reason[0] = 0;
   headers.reset();
@@ -199,11 +181,14 @@ void Transfer::Prepare(CURL* handle, const HttpTransfers::Timing& timing) {
   curl_easy_setopt(easy, CURLOPT_USERAGENT, UserAgent().c_str());
   if (const char* const authorities = std::getenv("SSL_CERT_FILE")) curl_easy_setopt(easy, CURLOPT_CAINFO, authorities);
   curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
-  curl_easy_setopt(easy, CURLOPT_PIPEWAIT, 1L);  // one connection for all, if the server speaks HTTP/2
+  // One connection for all, if the server speaks HTTP/2, which it says when the connection is encrypted.
+  curl_easy_setopt(easy, CURLOPT_PIPEWAIT, url.starts_with("https:") ? 1L : 0L);
   curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, long(std::chrono::ceil<milliseconds>(timing.connecting).count()));
   curl_easy_setopt(easy, CURLOPT_LOW_SPEED_LIMIT, 1L);
   curl_easy_setopt(easy, CURLOPT_LOW_SPEED_TIME, long(std::chrono::ceil<seconds>(timing.stalled).count()));
   curl_easy_setopt(easy, CURLOPT_ERRORBUFFER, reason);
+  curl_easy_setopt(easy, CURLOPT_HEADERFUNCTION, TakeHead);
+  curl_easy_setopt(easy, CURLOPT_HEADERDATA, this);
   curl_easy_setopt(easy, CURLOPT_WRITEFUNCTION, TakeBody);
   curl_easy_setopt(easy, CURLOPT_WRITEDATA, this);
   curl_easy_setopt(easy, CURLOPT_NOPROGRESS, 0L);
@@ -211,6 +196,8 @@ void Transfer::Prepare(CURL* handle, const HttpTransfers::Timing& timing) {
   curl_easy_setopt(easy, CURLOPT_XFERINFODATA, this);
   curl_easy_setopt(easy, CURLOPT_OPENSOCKETFUNCTION, OpenSocket);
   curl_easy_setopt(easy, CURLOPT_OPENSOCKETDATA, this);
+  curl_easy_setopt(easy, CURLOPT_PREREQFUNCTION, CheckPlace);
+  curl_easy_setopt(easy, CURLOPT_PREREQDATA, this);
   curl_easy_setopt(easy, CURLOPT_NOBODY, get.only_size && !reads_start ? 1L : 0L);
   if (get.span) {
     curl_easy_setopt(easy, CURLOPT_RANGE, fmt::format("{}-{}", get.span->begin, get.span->begin + get.span->bytes - 1).c_str());
@@ -238,12 +225,23 @@ void Transfer::Sign(const S3Access& s3) {
 
 void Transfer::AddHeader(const std::string& line) { headers.reset(curl_slist_append(headers.release(), line.c_str())); }
 
+bool Transfer::OnHead(std::uint64_t bytes) {
+  *heard_bytes += bytes;
+  head_bytes += bytes;
+  if (head_bytes > HttpTransfers::kMostOfHead)
+    stopped = Status::Unavailable(fmt::format("the server sends more than {} bytes of headers", HttpTransfers::kMostOfHead));
+  return !stopped;
+}
+
 bool Transfer::OnBody(std::span<const std::byte> bytes) {
+  *heard_bytes += bytes.size();
   const long code = status();
   if (code != 200 && code != 206) {
-    const std::size_t more = std::min(bytes.size(), kMostOfPage - page.size());
-    page.append(reinterpret_cast<const char*>(bytes.data()), more);
-    return true;
+    page_bytes += bytes.size();
+    page.append(reinterpret_cast<const char*>(bytes.data()), std::min(bytes.size(), kKeptOfPage - page.size()));
+    if (page_bytes > HttpTransfers::kMostOfPage)
+      stopped = Status::Unavailable(fmt::format("HTTP {}, with a page of more than {} bytes", code, HttpTransfers::kMostOfPage));
+    return !stopped;
   }
   // A server that sends whole objects alone may be asked for an object that is no longer than the part.
   const std::uint64_t said = is_encoded() ? 0 : length().value_or(0), least = std::max<std::uint64_t>(body.size() + bytes.size(), said);
@@ -263,13 +261,18 @@ bool Transfer::OnBody(std::span<const std::byte> bytes) {
 }
 
 bool Transfer::OnProgress(std::uint64_t bytes) {
-  constexpr std::uint64_t kLeastBytes = 1024;  // a second
   const Time now = MonotonicNow();
   if (now < begun + patience) return true;
   const auto in_seconds = [](Duration time) { return std::uint64_t(std::chrono::duration_cast<seconds>(time).count()); };
-  if (bytes > in_seconds(now - tried) * kLeastBytes) return true;
-  stopped = Status::Unavailable(fmt::format("no answer within {} s, or less than {} bytes a second; {} {}", in_seconds(patience),
-                                            kLeastBytes, tries, tries == 1 ? "try" : "tries"));
+  if (bytes > in_seconds(now - tried) * HttpTransfers::kLeastBytes) return true;
+  stopped = Status::Unavailable(fmt::format("no answer from {} within {} s, or less than {} bytes a second; {} {}", host,
+                                            in_seconds(patience), HttpTransfers::kLeastBytes, tries, tries == 1 ? "try" : "tries"));
+  return false;
+}
+
+bool Transfer::OnPlace(Reach place) {
+  if (redirects == 0 || !elsewhere() || MayLead(led_by, place)) return true;
+  stopped = Status::Unavailable(fmt::format("leads to {}, which is an address of {} and was not named", host, ToString(place)));
   return false;
 }
 

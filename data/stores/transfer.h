@@ -14,6 +14,7 @@
 #include "common/base/pooled_vector.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "data/stores/address_reach.h"
 #include "data/stores/http_transfers.h"
 
 namespace slabstream {
@@ -38,17 +39,21 @@ struct Transfer {
   std::string host;
   std::string region;  // that its bucket is in, as far as the server has told; empty: it has told none
   int tries = 0, redirects = 0;
-  bool reads_start = false;  // to learn the object's size, if the server does not answer HEAD
-  bool as_sent = false;      // a Content-Encoding says nothing true about the bytes
-  Time begun;                // the first try
-  Duration patience{};       // from then on, for a server that sends little or nothing
+  bool reads_start = false;         // to learn the object's size, if the server does not answer HEAD
+  bool as_sent = false;             // a Content-Encoding says nothing true about the bytes
+  Reach led_by = Reach::kInternet;  // where the server is that led here; redirects > 0
+  Time begun;                       // the first try
+  Duration patience{};              // from then on, for a server that sends little or nothing
 
   // Of the present try.
   Time tried;
   CURL* easy = nullptr;
   PooledVector<std::byte> body;
-  std::string page;               // the beginning of an answer that is no object
-  std::optional<Status> stopped;  // by us, and why
+  std::string page;              // the beginning of an answer that is no object
+  std::uint64_t head_bytes = 0;  // of headers and trailers
+  std::uint64_t page_bytes = 0;
+  std::uint64_t* heard_bytes = nullptr;  // of the host: counts all that comes
+  std::optional<Status> stopped;         // by us, and why
   char reason[CURL_ERROR_SIZE] = {};
   std::unique_ptr<curl_slist, void (*)(curl_slist*)> headers{nullptr, curl_slist_free_all};
 
@@ -71,8 +76,11 @@ struct Transfer {
   // Begins a try with this handle.
   void Prepare(CURL* handle, const HttpTransfers::Timing& timing);
 
+  // Each says whether the try goes on; else `stopped` says why it does not.
+  bool OnHead(std::uint64_t bytes);
   bool OnBody(std::span<const std::byte> bytes);
   bool OnProgress(std::uint64_t bytes);  // so many have come in this try
+  bool OnPlace(Reach place);             // where the server is
 
  private:
   void AddHeader(const std::string& line);

@@ -1,14 +1,10 @@
 #include "data/survey/index_file.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <xxhash.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <span>
 #include <system_error>
@@ -16,6 +12,7 @@
 #include <vector>
 
 #include "common/base/cache_folder.h"
+#include "common/base/file_lock.h"
 #include "common/base/files.h"
 #include "common/base/url.h"
 
@@ -41,30 +38,6 @@ Result<std::uint64_t> VersionOfFolder(const std::string& folder) {
   for (const std::string& file : files) version = XXH3_64bits_withSeed(file.data(), file.size(), version);
   return version;
 }
-
-Status MakeFolder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!error) return Status::Ok();
-  return Status::Unavailable(
-      fmt::format("cannot make the folder '{}': {}; $XDG_CACHE_HOME chooses another place", folder, error.message()));
-}
-
-// Waits until no other process has the lock.
-class FileLock {
- public:
-  explicit FileLock(const std::string& path) : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    if (descriptor_ >= 0) ::flock(descriptor_, LOCK_EX);
-  }
-  ~FileLock() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  FileLock(const FileLock&) = delete;
-  FileLock& operator=(const FileLock&) = delete;
-
- private:
-  const int descriptor_;
-};
 
 // Of the samples of a level as they are packed, with all that is beside them.
 std::uint64_t MostBytes(const SourceInfo& source, const std::string& name) {
@@ -113,6 +86,8 @@ std::optional<IndexFile::Facts> IndexFile::facts() const {
 }
 
 Result<std::optional<BrickIndex>> IndexFile::Read(const std::string& name, const SourceInfo& source) const {
+  if (std::error_code error; !fs::exists(path_, error)) return std::optional<BrickIndex>();
+  if (Status own = MakeOwnFolder(fs::path(path_).parent_path().string()); !own.ok()) return own;
   const Result<std::string> text = ReadTextFile(path_, MostBytes(source, name));
   if (text.status().code() == StatusCode::kNotFound) return std::optional<BrickIndex>();
   if (text.status().code() == StatusCode::kResourceExhausted)
@@ -126,7 +101,7 @@ Result<std::optional<BrickIndex>> IndexFile::Read(const std::string& name, const
 Status IndexFile::Write(const std::string& name, const BrickIndex& index, const SourceInfo& source) const {
   const Result<std::vector<std::byte>> bytes = EncodeIndex(index, source, name);
   if (!bytes.ok()) return bytes.status();
-  if (Status made = MakeFolder(fs::path(path_).parent_path().string()); !made.ok()) return made;
+  if (Status made = MakeOwnFolder(fs::path(path_).parent_path().string()); !made.ok()) return made;
   constexpr unsigned kMode = 0600;
   Result<OutputFile> file = OutputFile::Create(path_, kMode);
   if (!file.ok()) return file.status();
@@ -136,9 +111,10 @@ Status IndexFile::Write(const std::string& name, const BrickIndex& index, const 
 
 Status IndexFile::Merge(const std::string& name, BrickIndex index, const SourceInfo& source) const {
   const std::string folder = fs::path(path_).parent_path().string();
-  if (Status made = MakeFolder(folder); !made.ok()) return made;
-  // The folder itself is locked: a lock of the file would be that of one that is replaced.
-  const FileLock lock(folder);
+  if (Status made = MakeOwnFolder(folder); !made.ok()) return made;
+  // A file beside it is locked: a lock of the file itself would be that of one that is replaced.
+  const Result<FileDescriptor> lock = LockFile(folder + "/lock", LockMode::kAlone);
+  if (!lock.ok()) return lock.status();
   if (const Result<std::optional<BrickIndex>> kept = Read(name, source); kept.ok() && *kept) {
     for (std::size_t level = 0; level < index.levels.size(); ++level) {
       std::ranges::transform(index.levels[level], (**kept).levels[level], index.levels[level].begin(),

@@ -9,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/volume/box_assembly.h"
 #include "common/volume/memory_budget.h"
 #include "data/sources/copy_samples.h"
 #include "data/survey/pieces.h"
@@ -26,16 +25,25 @@ std::vector<Box> SampleOf(const SourceLevel& level, std::int64_t most) {
   for (const Axis axis : kAxes) {
     while (CountIn(block) * BytesPerSample(level.description.type) < kLeastBytes && block[axis] < bounds.end[axis]) block[axis] *= 2;
   }
-  const std::vector<Box> all = CutAtBlocks(bounds, block);
+  // Of a block that is larger than the sample, a part is enough.
+  for (const auto bytes = [&] { return std::int64_t(CountIn(block) * BytesPerSample(level.description.type)); };
+       bytes() > std::max(most, 2 * kPieceBytes);) {
+    std::int32_t& longest = block[*std::ranges::max_element(kAxes, {}, [&](Axis axis) { return block[axis]; })];
+    longest = (longest + 1) / 2;
+  }
+  // They are counted and not listed: a volume may say that it has any number of them.
+  const Index3 counts = (bounds.end + block - Uniform(1)) / block;
+  const std::size_t all = CountIn(counts);
   const double share = std::min(1.0, double(most) / double(level.description.voxel_bytes()));
-  const auto count = std::clamp<std::size_t>(std::size_t(share * double(all.size())), 1, all.size());
+  const auto count = std::clamp<std::size_t>(std::size_t(share * double(all)), 1, all);
   // One of each stretch of them: each time at another place in it, or rows of blocks as long as a stretch would give the same column.
   constexpr double kGoldenRatio = 0.6180339887498949;
   std::vector<Box> sample;
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t first = i * all.size() / count, end = (i + 1) * all.size() / count;
+    const std::size_t first = i * all / count, end = (i + 1) * all / count;
     const double turn = kGoldenRatio * (double(i) + 0.5);
-    sample.push_back(all[first + std::size_t((turn - std::floor(turn)) * double(end - first))]);
+    const Index3 begin = PlaceIn(counts, first + std::size_t((turn - std::floor(turn)) * double(end - first))) * block;
+    sample.push_back(Intersection({begin, begin + block}, bounds));
   }
   return sample;
 }

@@ -18,7 +18,7 @@ namespace {
 
 class BmpFile : public SliceFile {
  public:
-  static std::vector<std::string_view> Endings() { return {".bmp"}; }
+  static constexpr std::string_view kFormat = "BMP";
 
   explicit BmpFile(std::string path) : path_(std::move(path)), file_(path_, std::ios::binary) {}
 
@@ -107,6 +107,6 @@ class BmpFile : public SliceFile {
 
 }  // namespace
 
-VolumeFormat Bmp() { return StackFormat<BmpFile>("BMP", "a folder of numbered .bmp pictures"); }
+VolumeFormat Bmp() { return StackFormat<BmpFile>(); }
 
 }  // namespace slabstream

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 
 namespace slabstream {
@@ -33,7 +34,7 @@ Result<std::size_t> ChooseArray(const std::string& path, const std::vector<GridA
     const auto named = numbers([&](const GridArray& array) { return array.at == at && !wanted.empty() && array.name == wanted; });
     if (!named.empty()) return readable(named.front());
   }
-  if (!wanted.empty()) return wrong(fmt::format("has no array '{}'; it has {}", wanted, NamesOf(arrays)));
+  if (!wanted.empty()) return wrong(fmt::format("has no array '{}'; it has {}{}", wanted, NamesOf(arrays), DidYouMean(wanted, arrays)));
 
   for (const ValuesAt at : kPlaces) {
     const auto active = numbers([&](const GridArray& array) { return array.at == at && array.active; });

@@ -19,7 +19,7 @@ namespace {
 // libjpeg leaves by longjmp, so no function that calls it behind setjmp has objects with destructors.
 class JpegFile : public SliceFile {
  public:
-  static std::vector<std::string_view> Endings() { return {".jpg", ".jpeg"}; }
+  static constexpr std::string_view kFormat = "JPEG";
 
   explicit JpegFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
     jpeg_.err = jpeg_std_error(&errors_);
@@ -113,6 +113,6 @@ class JpegFile : public SliceFile {
 
 }  // namespace
 
-VolumeFormat Jpeg() { return StackFormat<JpegFile>("JPEG", "a folder of numbered .jpg pictures"); }
+VolumeFormat Jpeg() { return StackFormat<JpegFile>(); }
 
 }  // namespace slabstream

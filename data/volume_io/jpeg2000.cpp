@@ -17,7 +17,7 @@ namespace {
 
 class Jpeg2000File : public SliceFile {
  public:
-  static std::vector<std::string_view> Endings() { return {".jp2", ".j2k", ".j2c", ".jpf"}; }
+  static constexpr std::string_view kFormat = "JPEG 2000";
 
   explicit Jpeg2000File(std::string path) : path_(std::move(path)) {}
 
@@ -105,6 +105,6 @@ class Jpeg2000File : public SliceFile {
 
 }  // namespace
 
-VolumeFormat Jpeg2000() { return StackFormat<Jpeg2000File>("JPEG 2000", "a folder of numbered .jp2 pictures"); }
+VolumeFormat Jpeg2000() { return StackFormat<Jpeg2000File>(); }
 
 }  // namespace slabstream

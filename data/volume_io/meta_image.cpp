@@ -62,17 +62,23 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
 
   // Of synonyms the one that MetaIO prefers comes first.
   const std::size_t count = sizes->size();
-  const auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, {1, 1, 1});
-  const auto origin = text.Numbers({"Origin", "Offset", "Position"}, count, {0, 0, 0});
-  const auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, {});
+  auto spacing = text.Numbers({"ElementSpacing", "ElementSize"}, count, {1, 1, 1});
+  auto origin = text.Numbers({"Origin", "Offset", "Position"}, count, {0, 0, 0});
+  auto directions = text.Numbers({"TransformMatrix", "Rotation", "Orientation"}, count * count, {});
   for (const auto* numbers : {&spacing, &origin, &directions}) {
     if (!numbers->ok()) return numbers->status();
   }
   header.type = *type;
+  if (count == 2) {  // a slice, as thick as its pixels are wide
+    spacing->push_back(spacing->front());
+    origin->push_back(0);
+  }
   header.steps = StepsOf(Triple(*spacing));
   header.unit = LengthUnitNamed(text.Find("DistanceUnits").value_or(""));
   std::array<Vec3, 3> axes = StepsOf({1, 1, 1});
-  for (std::size_t i = 0; i < 3 && !directions->empty(); ++i) axes[i] = Triple(*directions, i * count);
+  for (std::size_t i = 0; i < std::min<std::size_t>(count, 3) && !directions->empty(); ++i) {
+    axes[i] = count == 2 ? Vec3{(*directions)[2 * i], (*directions)[2 * i + 1], 0} : Triple(*directions, i * count);
+  }
   // Without a matrix and an origin there is no orientation, unless letters name one.
   const std::string letters = text.Find("AnatomicalOrientation").value_or("");
   if (letters.find_first_not_of('?') == std::string::npos && directions->empty() && Triple(*origin) == Vec3{}) return header;
@@ -98,13 +104,14 @@ Result<TextPayload> ReadPayload(const TextHeader& text) {
     return text.Refused("samples as text (BinaryData = False) are not supported");
   }
   const std::string file = *text.Find("ElementDataFile"), skipped = text.Find("HeaderSize").value_or("0");
-  TextPayload payload{
-      .file = file,
-      .slices = ParseNumber<std::int64_t>(text.Find("DimSize")->substr(text.Find("DimSize")->find_last_of(" \t") + 1)).value_or(1),
-      .compression = IsTrue(text, "CompressedData") ? Compression::kDeflate : Compression::kNone,
-      .big_endian = IsTrue(text, "BinaryDataByteOrderMSB") || IsTrue(text, "ElementByteOrderMSB"),
-      .bytes_key = "HeaderSize",
-      .bytes = skipped};
+  const std::string sizes = *text.Find("DimSize");
+  const std::int64_t last = ParseNumber<std::int64_t>(sizes.substr(sizes.find_last_of(" \t") + 1)).value_or(1);
+  TextPayload payload{.file = file,
+                      .slices = text.Find("NDims") == "2" ? 1 : last,
+                      .compression = IsTrue(text, "CompressedData") ? Compression::kDeflate : Compression::kNone,
+                      .big_endian = IsTrue(text, "BinaryDataByteOrderMSB") || IsTrue(text, "ElementByteOrderMSB"),
+                      .bytes_key = "HeaderSize",
+                      .bytes = skipped};
   if (ToLower(file) != "local") return payload;
   // Bytes of this file, too, if there is such a field.
   payload.file = skipped == "0" ? std::nullopt : std::optional(std::filesystem::path(text.path).filename().string());
@@ -161,6 +168,10 @@ Status Write(const FileSamples& samples, const std::string& path) {
   header->Append(HeaderOf(samples, std::filesystem::path(data_path).filename().string()));
   // Store both files before either takes its place.
   if (Status status = header->Close(); !status.ok()) return status;
+  if (Status status = data->Close(); !status.ok()) return status;
+  // The header of a volume that was there does not stand beside the voxels of this one, not even if the program ends in between.
+  std::error_code ignored;
+  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(path, ignored))) std::filesystem::remove(path, ignored);
   if (Status status = data->Finish(); !status.ok()) return status;
   return header->Finish();
 }

@@ -125,8 +125,8 @@ Result<LocatedSamples> Locate(const std::string& path, const ReadOptions& option
   const Vec3 spacing = options.spacing.value_or(Vec3{1, 1, 1});
   header.steps = StepsOf(spacing);
   if (fortran) {
-    // z runs fastest.
-    std::swap(header.steps[0], header.steps[2]);
+    // The first axis of the array, z or of a slice y, runs fastest.
+    std::swap(header.steps[0], header.steps[shape->size() == 2 ? 1 : 2]);
   } else {
     std::ranges::reverse(*shape);
   }

@@ -87,12 +87,14 @@ Result<RawHeader> ReadHeader(const TextHeader& text, const ReadOptions& options)
   if (Status status = SetSize(header, text.path, axes->sizes, options, axes->channels); !status.ok()) return status;
   header.labels = text.Find("segment0_id:=").has_value();  // as 3D Slicer writes segmentations
   const auto count = std::size_t(ParseNumber<int>(*text.Find("dimension")).value_or(0));
-  const auto spacings = text.Numbers({"spacings"}, count, std::vector<double>(count, 1));
-  const auto origin = text.Numbers({"space origin"}, axes->space_numbers, std::vector<double>(axes->space_numbers, 0));
+  auto spacings = text.Numbers({"spacings"}, count, std::vector<double>(count, 1));
+  auto origin = text.Numbers({"space origin"}, axes->space_numbers, std::vector<double>(axes->space_numbers, 0));
   for (const auto* numbers : {&spacings, &origin}) {
     if (!numbers->ok()) return numbers->status();
   }
 
+  if (spacings->size() == axes->first + 2) spacings->push_back((*spacings)[axes->first]);  // a slice, as thick as its pixels are wide
+  if (origin->size() == 2) origin->push_back(0);
   header.steps = StepsOf(Triple(*spacings, axes->first));
   const auto of_space = text.Find("space units");
   header.unit = of_space ? UnitOf(*of_space, 0) : UnitOf(text.Find("units").value_or(""), axes->first);

@@ -67,8 +67,9 @@ Result<std::size_t> ReadDirections(const TextHeader& text, const std::string& va
       continue;
     }
     if (count == 0) count = vector.size();
-    if (vector.size() != count || count < 3 || count > 4) return wrong("must have vectors of 3 numbers, or of 4 with time");
-    axes[i].direction = Triple(vector);
+    const bool plane = count == 2 && axes.size() == 2;
+    if (vector.size() != count || (count < 3 && !plane) || count > 4) return wrong("must have vectors of 3 numbers, or of 4 with time");
+    axes[i].direction = {vector[0], vector[1], plane ? 0 : vector[2]};
     const double time = count == 4 ? vector[3] : 0;
     axes[i].role = time != 0 && axes[i].direction == Vec3{} ? Role::kTime : Role::kSpace;
     if (time != 0 && axes[i].role == Role::kSpace) return wrong("has an axis that runs along space and time");
@@ -115,7 +116,8 @@ Result<NrrdAxes> ReadNrrdAxes(const TextHeader& text) {
   const auto is_space = [](const NrrdAxis& axis) { return axis.role == Role::kSpace; };
   const auto first = std::ranges::find_if(all, is_space);
   const auto count = std::ranges::count_if(all, is_space);
-  if (count != 3) return text.NotAVolume(fmt::format("has {} axes of space, must have 3", count));
+  const bool is_slice = count == 2 && is_space(all.back());
+  if (count != 3 && !is_slice) return text.NotAVolume(fmt::format("has {} axes of space, must have 3, or 2 of a slice", count));
   axes.first = std::size_t(first - all.begin());
   std::array<Vec3, 3> steps;
   std::size_t found = 0;
@@ -140,6 +142,10 @@ Result<NrrdAxes> ReadNrrdAxes(const TextHeader& text) {
     } else if (axis.size != 1) {
       return text.Refused(fmt::format("axis {} of {} lies between axes of space, but is none of them: not supported", i + 1, all.size()));
     }
+  }
+  if (is_slice) {
+    steps[2] = Length(steps[0]) * Normalized(Cross(steps[0], steps[1]));  // as thick as its first pixel is wide
+    axes.sizes.push_back(1);
   }
   if (text.Find("space directions")) axes.directions = steps;
   return axes;

@@ -19,7 +19,7 @@ namespace {
 // libpng leaves by longjmp, so no function that calls it behind setjmp has objects with destructors.
 class PngFile : public SliceFile {
  public:
-  static std::vector<std::string_view> Endings() { return {".png"}; }
+  static constexpr std::string_view kFormat = "PNG";
 
   explicit PngFile(std::string path) : path_(std::move(path)), file_(std::fopen(path_.c_str(), "rb")) {
     png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, this, OnError, [](png_structp, png_const_charp) {});
@@ -109,6 +109,6 @@ class PngFile : public SliceFile {
 
 }  // namespace
 
-VolumeFormat Png() { return StackFormat<PngFile>("PNG", "a folder of numbered .png pictures"); }
+VolumeFormat Png() { return StackFormat<PngFile>(); }
 
 }  // namespace slabstream

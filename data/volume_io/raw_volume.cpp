@@ -18,8 +18,9 @@ namespace slabstream {
 
 Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options, double channels) {
   while (sizes.size() > 3 && sizes.back() == 1) sizes.pop_back();
+  if (sizes.size() == 2) sizes.push_back(1);
   if (sizes.size() != 3 && sizes.size() != 4) {
-    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 3, or 4 with time", path, sizes.size()));
+    return Status::InvalidArgument(fmt::format("{}: has {} dimensions, must have 2 or 3, or 4 with time", path, sizes.size()));
   }
   for (const Axis axis : kAxes) {
     const double side = sizes[std::size_t(Number(axis))];
@@ -69,6 +70,7 @@ Result<std::int64_t> ChosenVolume(const std::string& path, std::int64_t count, c
 Status CheckChannel(const std::string& path, const RawHeader& header, const ReadOptions& options) {
   const int components = header.components;
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("{}: {}", path, why)); };
+  if (!options.channel && options.describe) return Status::Ok();
   const bool luminance = options.channel == kLuminance, colour = components == 3 || components == 4;
   if (components == 1 && (options.channel.value_or(0) == 0 || !header.channels.empty())) return Status::Ok();
   if (components == 1) return wrong("has 1 component a voxel, so channel must be 0");

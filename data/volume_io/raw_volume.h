@@ -78,9 +78,9 @@ inline std::array<Vec3, 3> StepsOf(const Vec3& spacing) { return {Vec3{spacing.x
 // From left, posterior, superior to right, anterior, superior, and back.
 inline constexpr Vec3 kRasFromLps = {-1, -1, 1};
 
-// Sets the size and the number of the volume by what a file says of its dimensions; those of 1 behind the third are left out.
-// `channels`: of an image, each with all of its volumes behind the one before; options.channel takes one. InvalidArgument naming `path`:
-// there are fewer than three or more than four dimensions, one of three is no whole number in [1, kMaxVolumeSide], there are several
+// Sets the size and the number of the volume by what a file says of its dimensions: two of a slice, three, or four with time; those of 1
+// behind the third are left out. `channels`: of an image, each with all volumes behind the one before; options.channel takes one. Errors:
+// there are fewer than two or more than four dimensions, one of three is no whole number in [1, kMaxVolumeSide], there are several
 // volumes and options.time does not take one, there is no such channel, or voxels of channels have several components.
 Status SetSize(RawHeader& header, const std::string& path, std::vector<double> sizes, const ReadOptions& options, double channels = 1);
 // Which of `count` volumes options.time takes; the first one if options.describe. InvalidArgument: none, although there are several, or one

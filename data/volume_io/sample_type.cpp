@@ -71,7 +71,7 @@ KeptSamples Narrow(AlignedVector<std::byte>& bytes) {
   if (fits) {
     const T shift = low >= 0 && high <= kSpan ? T{0} : low;
     // shift + sample is computed as double.
-    const bool exact = std::is_floating_point_v<T> || std::max(std::abs(double(low)), std::abs(double(high))) <= 0x1p53;
+    const bool exact = std::is_floating_point_v<T> || std::max(std::abs(double(low)), std::abs(double(high))) < 0x1p53;
     kept = {ScalarType::kUint16, double(shift), exact, {}};
     kept.bytes.resize(samples.size() * sizeof(std::uint16_t));
     const std::span<std::uint16_t> out = SamplesOf<std::uint16_t>(kept.bytes);

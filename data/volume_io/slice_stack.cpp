@@ -33,18 +33,45 @@ std::vector<std::string> SlicesIn(const std::string& folder, const std::vector<s
   return paths;
 }
 
+namespace {
+
+const std::vector<PictureKind>& PictureKinds() {
+  static const std::vector<PictureKind> kKinds = {
+      {"PNG", {".png"}, "a .png picture or a folder of numbered ones"},
+      {"JPEG", {".jpg", ".jpeg"}, "a .jpg picture or a folder of numbered ones"},
+      {"JPEG 2000", {".jp2", ".j2k", ".j2c", ".jpf"}, "a .jp2 picture or a folder of numbered ones"},
+      {"BMP", {".bmp"}, "a .bmp picture or a folder of numbered ones"}};
+  return kKinds;
+}
+
+bool IsPictureOf(const std::string& path, const PictureKind& kind) {
+  std::error_code error;
+  return std::ranges::count(kind.endings, ToLower(std::filesystem::path(path).extension().string())) > 0 &&
+         std::filesystem::is_regular_file(path, error);
+}
+
+}  // namespace
+
+const PictureKind& PictureKindOf(std::string_view format) { return *std::ranges::find(PictureKinds(), format, &PictureKind::format); }
+
+bool IsPicture(const std::string& path) {
+  return std::ranges::any_of(PictureKinds(), [&](const PictureKind& kind) { return IsPictureOf(path, kind); });
+}
+
 bool HasVolumeFiles(const std::string& folder) {
   std::vector<std::string_view> of_volumes;
   for (const VolumeFormat& format : VolumeFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
   return !SlicesIn(folder, of_volumes).empty();
 }
 
-bool IsStackOfPictures(const std::string& folder, const std::vector<std::string_view>& endings) {
-  const std::vector<std::string> slices = SlicesIn(folder, endings);
-  if (slices.size() < 2) return false;
+std::vector<std::string> SlicesOfPictures(const std::string& path, const PictureKind& kind) {
+  if (IsPictureOf(path, kind)) return {path};
+  // In a folder at least two, whose names differ in nothing but their numbers, and no volume files.
+  std::vector<std::string> slices = SlicesIn(path, kind.endings);
+  if (slices.size() < 2) return {};
   const std::string name = WithoutNumbers(slices.front());
-  if (!std::ranges::all_of(slices, [&](const std::string& slice) { return WithoutNumbers(slice) == name; })) return false;
-  return !HasVolumeFiles(folder);
+  const bool numbered = std::ranges::all_of(slices, [&](const std::string& slice) { return WithoutNumbers(slice) == name; });
+  return numbered && !HasVolumeFiles(path) ? slices : std::vector<std::string>();
 }
 
 Result<RawHeader> HeaderOfSlices(const std::string& path, RawHeader slice, std::int64_t count, std::int64_t file_bytes,

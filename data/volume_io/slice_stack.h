@@ -1,4 +1,5 @@
-// Folders of pictures, one a slice: which files of a folder they are, in which order, and how they become a volume.
+// Pictures, one a slice: which files of a folder they are, in which order, and how they become a volume. A picture alone is a volume of one
+// slice.
 #pragma once
 
 #include <cstddef>
@@ -19,11 +20,18 @@ namespace slabstream {
 // is no folder.
 std::vector<std::string> SlicesIn(const std::string& folder, const std::vector<std::string_view>& endings);
 
+// Formats of pictures.
+struct PictureKind {
+  std::string_view format;
+  std::vector<std::string_view> endings;  // in lower case
+  std::string_view text;                  // VolumeFormat::also
+};
+const PictureKind& PictureKindOf(std::string_view format);
+// Whether the path is a file with the ending of a picture.
+bool IsPicture(const std::string& path);
+
 // Whether files of this folder have the ending of a volume format.
 bool HasVolumeFiles(const std::string& folder);
-
-// A folder of numbered pictures and no volume files: at least two pictures, whose names differ in nothing but their numbers.
-bool IsStackOfPictures(const std::string& folder, const std::vector<std::string_view>& endings);
 
 // An open picture. Messages name its file.
 class SliceFile {
@@ -55,22 +63,30 @@ Result<RawVolume> ReadSliceStack(const std::string& folder, const std::vector<st
 // 0 if it cannot be told.
 std::int64_t BytesOfFile(const std::string& path);
 
-// The format of folders of numbered pictures. `File` is a SliceFile that is made from a path. It has a `Status Open()`, called once and
-// before all else, and `Endings()`, those of its files, for SlicesIn.
+// The slices of a picture or of a folder of numbered ones; none: it is neither.
+std::vector<std::string> SlicesOfPictures(const std::string& path, const PictureKind& kind);
+
 template <class File>
-VolumeFormat StackFormat(std::string_view name, std::string_view also) {
+std::vector<std::string> SlicesOf(const std::string& path) {
+  return SlicesOfPictures(path, PictureKindOf(File::kFormat));
+}
+
+// The format of pictures of a kind. `File` is a SliceFile that is made from a path. It has a `Status Open()`, called once and before all
+// else, and `kFormat`, the name of its PictureKind.
+template <class File>
+VolumeFormat StackFormat() {
   constexpr OpenSlice kOpen = [](const std::string& path) -> Result<std::unique_ptr<SliceFile>> {
     auto file = std::make_unique<File>(path);
     if (Status status = file->Open(); !status.ok()) return status;
     return std::unique_ptr<SliceFile>(std::move(file));
   };
-  return {.name = name,
+  return {.name = File::kFormat,
           .endings = {},
-          .also = also,
-          .recognises = [](const std::string& path, const ReadOptions&) { return IsStackOfPictures(path, File::Endings()); },
+          .also = PictureKindOf(File::kFormat).text,
+          .recognises = [](const std::string& path, const ReadOptions&) { return !SlicesOf<File>(path).empty(); },
           .options = {"channel", "spacing"},
-          .read = [](const std::string& folder,
-                     const ReadOptions& options) { return ReadSliceStack(folder, SlicesIn(folder, File::Endings()), kOpen, options); }};
+          .read = [](const std::string& path,
+                     const ReadOptions& options) { return ReadSliceStack(path, SlicesOf<File>(path), kOpen, options); }};
 }
 
 }  // namespace slabstream

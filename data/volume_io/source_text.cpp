@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/base/trimmed.h"
 #include "common/base/url.h"
@@ -105,7 +106,8 @@ Result<SourceText> ParseSourceText(const std::string& text) {
   SourceText source{parts.place, {}, {}};
   const auto wrong = [&](const std::string& why) { return Status::InvalidArgument(fmt::format("'{}': {}", ShownSource(text), why)); };
   const auto no_option = [&](std::string_view name) {
-    return wrong(fmt::format("'{}' is no option for reading a file, which are {}", name, NamesOf(ReadOptionList())));
+    return wrong(fmt::format("'{}' is no option for reading a file, which are {}{}", name, NamesOf(ReadOptionList()),
+                             DidYouMean(name, ReadOptionList())));
   };
   std::error_code error;
   if (is_address && !std::filesystem::exists(parts.place, error)) {

@@ -138,6 +138,18 @@ int TiffFile::ResolutionUnit() const {
   std::uint16_t unit = 0;
   return TIFFGetField(tiff_.get(), TIFFTAG_RESOLUTIONUNIT, &unit) != 0 ? unit : 0;
 }
+bool TiffFile::HoldsDirectory(std::uint64_t offset) const {
+  const bool big = TIFFIsBigTIFF(tiff_.get()) != 0;
+  const std::size_t place = big ? 8 : 4, counted = big ? 8 : 2, entry = big ? 20 : 12;
+  std::array<std::byte, 8> bytes{};
+  if (input_->ReadAt(offset, bytes.data(), counted) != counted) return false;
+  std::uint64_t entries = 0;
+  for (std::size_t i = 0; i < counted; ++i) {
+    const std::size_t at = TIFFIsBigEndian(tiff_.get()) != 0 ? i : counted - 1 - i;
+    entries = entries << 8 | std::uint64_t(bytes[at]);
+  }
+  return entries <= input_->size() / entry && offset + counted + entries * entry + place <= input_->size();
+}
 std::uint64_t TiffFile::size() const { return input_->size(); }
 
 Status TiffFile::CheckCompression() const {

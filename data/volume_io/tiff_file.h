@@ -54,6 +54,8 @@ class TiffFile : public SliceFile {
   double XResolution() const;
   double YResolution() const;
   int ResolutionUnit() const;
+  // Whether the file goes on to the end of the directory at `offset`, where it says whether there is another one.
+  bool HoldsDirectory(std::uint64_t offset) const;
   std::uint64_t size() const;  // of the file, in bytes
 
   // Its notes say what of the picture is not applied, such as a colour map. InvalidArgument: a compression, a kind of colours or a type

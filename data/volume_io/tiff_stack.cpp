@@ -245,9 +245,8 @@ Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& opti
   }
 
   if (layout.slices == 1 && layout.times > 1 && !options.time) TakeTimesAsSlices(path, layout);
-  if (layout.slices == 1) {
-    return Status::InvalidArgument(fmt::format("{}: has 2 dimensions, must have 3 (a page for each slice): {}", path, layout.Text()));
-  }
+  // One page may be what is left of several.
+  if (layout.slices == 1 && !(*file)->HoldsDirectory((*some_page)->offset)) return Status::DataLoss(path + ": truncated after page 1");
   Result<Chosen> chosen = Choose(path, layout, page->components, options);
   if (!chosen.ok()) return chosen.status();
   TiffStack stack{.files = layout.files, .of_pages = options, .window = layout.window};

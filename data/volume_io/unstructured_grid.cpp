@@ -1,4 +1,5 @@
 // Unstructured grids as volumes: their values on a lattice, and their cells beside them.
+#include <optional>
 #include <utility>
 
 #include "common/mesh/lattice.h"
@@ -10,8 +11,9 @@ namespace slabstream {
 namespace {
 
 Result<RawVolume> Read(const std::string& path, const ReadOptions& options) {
+  const std::optional<int> channel = options.channel || !options.describe ? options.channel : std::optional(0);
   Result<LoadedMesh> loaded =
-      ReadMesh(path, {.array = options.array, .time = options.time, .channel = options.channel, .headers_only = options.headers_only});
+      ReadMesh(path, {.array = options.array, .time = options.time, .channel = channel, .headers_only = options.headers_only});
   if (!loaded.ok()) return loaded.status();
   if (options.headers_only) return RawVolume{.header = {.size = {1, 1, 1}, .type = SampleType::kFloat32}};
   const VolumeGeometry lattice = LatticeOf(loaded->bounds, std::int64_t(loaded->mesh.tetrahedra.size()), options.lattice);

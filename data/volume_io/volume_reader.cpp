@@ -11,6 +11,7 @@
 #include "common/base/printable.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/exact_samples.h"
+#include "data/volume_io/file_parts.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/raw_volume.h"
 #include "data/volume_io/world_placement.h"
@@ -136,6 +137,9 @@ Result<LoadedVolume> ReadVolume(const std::string& path, const ReadOptions& opti
   return WithinMemory(path, [&]() -> Result<LoadedVolume> {
     Result<ReadFile> file = ReadRaw(path, options);
     if (!file.ok()) return file.status();
+    if (const FileParts components{.components = file->raw.header.components}; options.describe) {
+      for (const std::string& text : ShownTexts(path, components, options)) LogWarning(text);
+    }
     TakeChannel(file->raw, options);
     return Finish(std::move(file->raw), *file->format, path, options);
   });
@@ -151,6 +155,17 @@ Result<std::vector<std::string>> CheckVolumeHeaders(const std::string& path, con
     std::vector<std::string> files = {path};
     for (const std::filesystem::path& other : file->raw.other_files) files.push_back(other.string());
     return files;
+  });
+}
+
+Result<FileParts> PartsOf(const std::string& path, const ReadOptions& options) {
+  return WithinMemory(path, [&]() -> Result<FileParts> {
+    ReadOptions of_headers = options;
+    of_headers.headers_only = true;
+    const Result<ReadFile> file = ReadRaw(path, of_headers);
+    if (!file.ok()) return file.status();
+    const RawHeader& header = file->raw.header;
+    return FileParts{int(header.volumes), int(header.number), header.channels, header.channel, header.components};
   });
 }
 

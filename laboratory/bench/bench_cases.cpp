@@ -10,6 +10,7 @@
 
 #include "client/cli/input_volume.h"
 #include "client/request/volume_argument.h"
+#include "common/base/did_you_mean.h"
 #include "common/renderers/sampling_rate.h"
 #include "data/open/any_volume.h"
 
@@ -197,7 +198,8 @@ Result<BenchCase> ParseBenchCase(const std::string& text, bool at_service) {
     if (!source.ok()) return Status(source.status().code(), "CASE " + source.status().message());
     const Status known = CheckAnyVolume(source->path, source->options);
     if (known.code() == StatusCode::kNotFound) {
-      return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them)", text));
+      return Status::NotFound(fmt::format("CASE '{}' is neither a file nor a standard case (--list names them){}", text,
+                                          DidYouMean(text, StandardBenchCases())));
     }
     if (!known.ok()) return Status(known.code(), "CASE " + known.message());
     bench_case.dataset = Stem(source->path);

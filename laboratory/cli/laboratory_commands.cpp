@@ -83,10 +83,10 @@ void DeclareReplay(CLI::App& experiment, std::function<Status()>& run) {
 // The options of all experiments, which may stand before or after the experiment's name.
 void AddCommonOptions(CLI::App& app, ExperimentOptions& options) {
   app.add_option("-o,--output", options.folder, "Folder for the results and all measurements; made if it does not exist")->type_name("DIR");
-  app.add_flag("--quick", options.quick, "Take less than a tenth of the time: fewer sizes and workers, one repeat");
+  app.add_flag("--quick", options.quick, "Take minutes: fewer and smaller sizes, and fewer workers, with repeats enough to rank these");
   AddNumber(app, "--scale", options.scale, {kMinScale, 1}, "Scale the sides of spheres and pictures, to try things out");
   AddInteger(app, "--repeats", options.repeats, 1, kMaxRepeats, "Number of times that everything is measured")
-      ->default_str(fmt::format("{}; with --quick 1", kRankingRepeats));
+      ->default_str(fmt::format("{}; with --quick {}", kRankingRepeats, kQuickRepeats));
   AddParsed(
       app, "--seed", options.seed,
       [](const std::string& option, const std::string& text) { return ParseInteger(option, text, 0, std::numeric_limits<int>::max()); },

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <sys/resource.h>
 #include <tbb/task_arena.h>
 
@@ -9,6 +10,7 @@
 #include <random>
 
 #include "common/base/check.h"
+#include "common/cli/add_option.h"
 #include "common/combining/schemes.h"
 #include "common/kernels/combine.h"
 #include "common/renderers/registry.h"
@@ -163,7 +165,8 @@ Cases CasesOf(const ExperimentContext& context) {
     c.side = context.Scaled(c.side);
     cases.simulated.push_back({part, std::move(c)});
   };
-  for (const std::string& scheme : AllSchemes()) {
+  const std::vector<std::string>& chosen = context.options().own.methods;
+  for (const std::string& scheme : chosen.empty() ? AllSchemes() : chosen) {
     for (const double share : {1.0, kSparse}) {
       for (const int p : measured_ranks) cases.measured.push_back({scheme, p, context.Scaled(1024), share});
       for (const int p : ranks) simulate("over workers", {.scheme = scheme, .ranks = p, .share = share});
@@ -178,6 +181,12 @@ Cases CasesOf(const ExperimentContext& context) {
 }
 
 }  // namespace
+
+void DeclareCombining(CLI::App& app, OwnOptions& options) {
+  static const std::vector<std::string> schemes = AllSchemes();
+  AddParsedList(app, "--schemes", options.methods, OneOf({schemes.begin(), schemes.end()}),
+                fmt::format("Schemes to compare, as --combine takes them: {} (default: all)", fmt::join(schemes, ", ")));
+}
 
 void RunCombining(ExperimentContext& context, Results& results) {
   const Cases cases = CasesOf(context);

@@ -27,7 +27,7 @@ struct OwnOptions {
   std::vector<int> workers;        // numbers of workers
   std::vector<const RendererKind*> renderers;
   std::vector<std::string> paths;         // of walks
-  std::vector<std::string> methods;       // of balance, by name
+  std::vector<std::string> methods;       // of balance or of combining, by name
   std::vector<int> footprints;            // diameters of footprints, pixels
   std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a path
   ServiceChoice service;                  // a running service whose frames are measured, instead of this machine
@@ -38,10 +38,10 @@ struct ExperimentOptions {
   std::string name;
   std::string sweep_file;  // of `sweep`; else empty
   std::string folder;
-  bool quick = false;  // less than a tenth of the time: fewer sizes, one repeat
+  bool quick = false;  // fewer and smaller sizes, fewer workers
   double scale = 1;    // [kMinScale, 1]: of the sides of spheres and pictures
   std::uint64_t seed = 1;
-  int repeats = 0;  // [1, kMaxRepeats]; 0: kRankingRepeats, of a quick run 1
+  int repeats = 0;  // [1, kMaxRepeats]; 0: kRankingRepeats, of a quick run kQuickRepeats
   Resume resume = Resume::kSame;
   std::vector<std::string> volumes;  // FILE[:TRANSFER], beside or instead of the standard ones
   bool list = false;
@@ -52,6 +52,8 @@ inline constexpr int kMaxRepeats = 1000, kLeastScaledSide = 8;
 // Enough to rank 1638 comparisons of a section of a page: 2 * 2^-16 <= 0.05 / 1638 (python/slabstream_lab/ranking.py). By default no
 // section has more.
 inline constexpr int kRankingRepeats = 16;
+// Enough for the 435 comparisons that a quick run has at most in a section (partitions).
+inline constexpr int kQuickRepeats = 15;
 inline constexpr double kMinScale = 0.05;
 
 // A sphere's side or a picture's under --scale, at least kLeastScaledSide.
@@ -105,6 +107,7 @@ void DeclarePartitions(CLI::App& app, OwnOptions& options);
 void RunBalance(ExperimentContext& context, Results& results);
 void CheckBalance(const ExperimentOptions& options);
 void DeclareBalance(CLI::App& app, OwnOptions& options);
+void DeclareCombining(CLI::App& app, OwnOptions& options);
 void RunCombining(ExperimentContext& context, Results& results);
 void RunStreaming(ExperimentContext& context, Results& results);
 void RunScaling(ExperimentContext& context, Results& results);

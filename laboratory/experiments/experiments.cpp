@@ -11,7 +11,7 @@ const std::vector<Experiment>& Experiments() {
        CheckPartitions},
       {"balance", "ways to keep workers evenly loaded while a view, a look, a volume or a worker changes", RunBalance, DeclareBalance,
        CheckBalance, false, SubjectsAtService},
-      {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining},
+      {"combining", "combining schemes over picture sizes, active pixels, workers and links", RunCombining, DeclareCombining},
       {"streaming", "groups against efficiency, memory of a worker and the time to the first preview", RunStreaming},
       {"scaling", "strong and weak scaling of both pipelines", RunScaling},
       {"sweep", "your own: volumes, views, policies and workers named by a FILE.json (docs/experiments.md)", RunSweep, DeclareSweep,

@@ -86,12 +86,12 @@ std::string AnglesOf(const ViewParameters& view) {
   const auto point = [](const char* what, const std::optional<Vec3>& p) {
     return p ? fmt::format(" {} {:.4g},{:.4g},{:.4g}", what, p->x, p->y, p->z) : std::string();
   };
-  std::string name = fmt::format("{:.4g}/{:.4g}", azimuth, elevation);
+  std::string name = fmt::format("{:.4g}/{:.4g}", *azimuth, *elevation);
   if (roll != 0) name += fmt::format(" roll {:.4g}", roll);
   if (zoom != 1) name += fmt::format(" zoom {:.4g}", zoom);
   if (projection == Projection::kPerspective) name += fmt::format(" fov {:.4g}", fov);
   if (distance > 0) name += fmt::format(" distance {:.4g}", distance);
-  return name + point("at", look_at) + point("from", eye) + point("up", up) + (fit ? " fit" : "") + (of_patient ? " of a patient" : "");
+  return name + point("at", look_at) + point("from", eye) + point("up", up) + (*fit ? " fit" : "") + (of_patient ? " of a patient" : "");
 }
 
 }  // namespace

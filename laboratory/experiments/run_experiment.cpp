@@ -10,6 +10,7 @@
 
 #include "client/cli/interrupt.h"
 #include "commit.h"
+#include "common/base/did_you_mean.h"
 #include "common/base/files.h"
 #include "common/base/find_named.h"
 #include "common/base/version.h"
@@ -110,7 +111,10 @@ void Find(const Experiment& experiment, ExperimentContext& context, const Machin
 
 void Run(const ExperimentOptions& options) {
   const Experiment* experiment = FindNamed(Experiments(), options.name);
-  if (experiment == nullptr) throw Failure(Status::NotFound(fmt::format("NAME '{}' is no experiment (--list names them)", options.name)));
+  if (experiment == nullptr) {
+    throw Failure(Status::NotFound(
+        fmt::format("NAME '{}' is no experiment (--list names them){}", options.name, DidYouMean(options.name, Experiments()))));
+  }
   if (experiment->takes_file && options.sweep_file.empty())
     throw Failure(Status::InvalidArgument(fmt::format("experiment '{}' needs a FILE", options.name)));
   if (options.folder.empty()) throw Failure(Status::InvalidArgument("-o (--output) is missing: the folder for the results"));
@@ -137,7 +141,7 @@ ExperimentContext::ExperimentContext(ExperimentOptions options, TrialLog log, st
 int Scaled(const ExperimentOptions& options, int side) { return std::max(kLeastScaledSide, int(std::lround(side * options.scale))); }
 
 void ExperimentContext::Run(std::vector<Trial> trials) {
-  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? 1 : kRankingRepeats;
+  repeats_ = options_.repeats > 0 ? options_.repeats : quick() ? kQuickRepeats : kRankingRepeats;
   trials = Distinct(std::move(trials));
   std::cout << fmt::format("{} kinds of trials, repeats: {}\n", trials.size(), repeats_) << std::flush;
   // Before and after: a machine that became slower shows.

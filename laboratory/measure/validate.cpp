@@ -68,7 +68,7 @@ Result<std::vector<View>> MakeViews(const ValidationCase& what, int count) {
     View& view = views.emplace_back(View{.request = what.request});
     view.request.dataset = kDataset;
     view.request.straight8 = true;
-    view.request.view.azimuth_degrees += 360.0 * i / count;
+    *view.request.view.azimuth_degrees += 360.0 * i / count;
     Result<FramePlan> plan = PlanFrame(view.request, 1, summary, roster);
     if (!plan.ok()) return plan.status();
     view.plan = *std::move(plan);

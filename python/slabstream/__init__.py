@@ -20,6 +20,7 @@ from .errors import (
     NotFound,
     ResourceExhausted,
     SlabstreamError,
+    SlabstreamWarning,
     Unavailable,
     UnknownOption,
 )
@@ -28,7 +29,7 @@ from .image import Geometry, Image, Statistics
 from .loading import Volume, load, render, show
 from .local import shutdown
 from .presets import presets
-from .probe import Histogram, JointHistogram, Label, Sample
+from .probe import Histogram, JointHistogram, Label, LabelStatistics, Sample
 from .service import Service, connect
 from .sources import Level, Source, open
 from .status import Dataset, DatasetLevel, Status, WebTraffic, Worker
@@ -51,6 +52,7 @@ __all__ = [
     "InvalidArgument",
     "JointHistogram",
     "Label",
+    "LabelStatistics",
     "Level",
     "NotFound",
     "Progress",
@@ -59,6 +61,7 @@ __all__ = [
     "Sample",
     "Service",
     "SlabstreamError",
+    "SlabstreamWarning",
     "Source",
     "Statistics",
     "Status",

@@ -145,7 +145,8 @@ def _started_here(endpoint: str | None) -> dict[str, Any] | None:
     for file in files:
         try:
             state = json.loads(file.read_text())
-            found = _runs(int(state["coordinator"])) and (endpoint is None or state["endpoint"] == endpoint)
+            meant = not state.get("unlisted") if endpoint is None else state["endpoint"] == endpoint
+            found = meant and _runs(int(state["coordinator"]))
             if found and (newest is None or state["started_unix"] > newest["started_unix"]):
                 newest = state
         except (OSError, ValueError, KeyError, TypeError):

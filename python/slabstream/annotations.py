@@ -1,5 +1,5 @@
-"""Annotations of pictures: title, scale bar, sides of a patient, colour bar and legend, drawn by the program `slabstream`, so that they are
-those of the command line."""
+"""Annotations of pictures (title, scale bar, sides of a patient, colour bar and legend), drawn by the program `slabstream`, so that they are
+those of the command line; and files of types that it alone writes."""
 from __future__ import annotations
 
 import dataclasses
@@ -11,6 +11,7 @@ from typing import Any, Sequence
 import numpy
 
 from .errors import InvalidArgument, NotFound, Unavailable
+from .options import in_keywords
 from .programs import find_program
 from .runs import Floats
 
@@ -25,6 +26,7 @@ class Annotations:
     sides_only: bool = False       # of a patient the letters without the axes, as in slices
     color_bar: str | None = None   # its caption; "": none
     legend: bool = False
+    font_size: float | None = None  # points
 
     def any(self) -> bool:
         return bool(self.title) or self.scale_bar or self.orientation_marker or self.color_bar is not None or self.legend
@@ -74,24 +76,33 @@ def _geometry_fields(geometry: Any) -> dict[str, Any]:
     }
 
 
-def draw(rgba: Floats, annotations: Annotations, panes: Sequence[Any], key: dict[str, Any] | None) -> Floats:
-    """The pixels with annotations on them. `panes`: the geometries of pictures of equal widths, from left to right."""
+def _run(rgba: Floats, format: Any, panes: Sequence[Any], purpose: str, **more: Any) -> bytes:
+    """What `slabstream annotate` makes of the pixels. `panes`: the geometries of pictures of equal widths, from left to right."""
     height, width = rgba.shape[:2]
-    order = {"size": [width, height], "panes": [_geometry_fields(pane) for pane in panes], **dataclasses.asdict(annotations)}
-    if annotations.color_bar is None:
-        del order["color_bar"]
-    if key:
-        order["key"] = key
+    order = {"size": [width, height], "panes": [_geometry_fields(pane) for pane in panes] or [{}], "background": format.background,
+             **dataclasses.asdict(format.annotations), "dpi": format.dots_per_inch, "key": format.key, **more}
     try:
         program = find_program()
     except NotFound:
-        raise NotFound("annotations are drawn by the program slabstream, which is not here: put it on the path, or name its folder in "
+        raise NotFound(f"{purpose} the program slabstream, which is not here: put it on the path, or name its folder in "
                        "$SLABSTREAM_PROGRAMS") from None
     pixels = numpy.ascontiguousarray(rgba, numpy.float32)
-    done = subprocess.run([program, "annotate"], input=json.dumps(order).encode() + b"\n" + pixels.tobytes(), capture_output=True)
+    given = json.dumps({name: value for name, value in order.items() if value is not None})
+    done = subprocess.run([program, "annotate"], input=given.encode() + b"\n" + pixels.tobytes(), capture_output=True)
     if done.returncode != 0:
         sentence = done.stderr.decode(errors="replace").strip().removeprefix("slabstream annotate: ")
-        raise (InvalidArgument if done.returncode == 2 else Unavailable)(sentence or "slabstream annotate failed")
-    if len(done.stdout) != pixels.nbytes:
-        raise Unavailable(f"slabstream annotate gave {len(done.stdout)} bytes of {pixels.nbytes}")
-    return numpy.frombuffer(done.stdout, numpy.float32).reshape(pixels.shape)
+        raise (InvalidArgument if done.returncode == 2 else Unavailable)(in_keywords(sentence) or "slabstream annotate failed")
+    return done.stdout
+
+
+def draw(rgba: Floats, format: Any, panes: Sequence[Any]) -> Floats:
+    """The pixels with the format's annotations on them."""
+    drawn = _run(rgba, format, panes, "annotations are drawn by")
+    if len(drawn) != rgba.size * 4:
+        raise Unavailable(f"slabstream annotate gave {len(drawn)} bytes of {rgba.size * 4}")
+    return numpy.frombuffer(drawn, numpy.float32).reshape(rgba.shape)
+
+
+def encode(rgba: Floats, format: Any, panes: Sequence[Any], ending: str, bits: int, quality: int) -> bytes:
+    """A file of the type that has this ending (".jpg"), with the format's annotations."""
+    return _run(rgba, format, panes, f"files of type {ending} are written by", file=ending[1:], depth=bits, quality=quality)

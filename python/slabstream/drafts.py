@@ -24,6 +24,7 @@ class Draft:
 
     frame: Any = dataclasses.field(default_factory=schema.FrameRequest)
     format: PictureFormat = PictureFormat()
+    colors: transfer.Colors | None = None  # that take the place of those of the preset, once the dataset's values are known
     # Of slices.
     plane: str = ""
     at: values.Vector | None = None
@@ -62,7 +63,7 @@ def _scalar_range(scalar_range: Any, name: str, value: Any) -> None:
     scalar_range.min, scalar_range.max, scalar_range.percentiles = values.scalar_range(name, value)
 
 
-def _clip_box(box: Any, name: str, value: Any) -> None:
+def set_clip_box(box: Any, name: str, value: Any) -> None:
     low, high, unit = values.clip_box(name, value)
     _set_vector(box.low, low)
     _set_vector(box.high, high)
@@ -105,7 +106,7 @@ def _label_ranges(ranges: Any, name: str, value: Any) -> None:
 
 #: By the type of the field's messages.
 _MESSAGES: dict[str, Callable[[Any, str, Any], None]] = {
-    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": _clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
+    "ImageSize": _size, "ScalarRange": _scalar_range, "ClipBox": set_clip_box, "ClipPlane": _clip_planes, "Isosurface": _isosurfaces,
     "GradientOpacityPoint": _gradient_opacities, "LabelOpacity": _label_opacities, "LabelRange": _label_ranges,
 }
 
@@ -141,7 +142,7 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     holder = functools.reduce(getattr, outer, draft.frame)
     field = holder.DESCRIPTOR.fields_by_name[name]
     if name == "preset":
-        transfer.choose(option.name, value, holder)
+        _transfer(draft, option, value, holder)
     elif field.message_type is None:
         setattr(holder, name, _scalar(field, option, value))
     elif field.message_type.name == "Vec3" and field.label != FieldDescriptor.LABEL_REPEATED:
@@ -149,6 +150,21 @@ def _field(draft: Draft, option: Option, value: Any) -> None:
     else:
         put = _lights if field.message_type.name == "Vec3" else _MESSAGES[field.message_type.name]
         put(getattr(holder, name), option.name, value)
+
+
+_PRESET_OF_MAPS = "viridis"  # it spans values and has opacities as all colour maps do
+
+
+def _transfer(draft: Draft, option: Option, value: Any, choice: Any) -> None:
+    colors = transfer.color_map(value)
+    if colors is None:
+        transfer.choose(option.name, value, choice)
+    elif option.path.startswith("transfer."):
+        draft.colors, choice.preset = colors, _PRESET_OF_MAPS
+    else:  # an overlay's: its values are not known here, so it is stretched over all of them
+        choice.function.CopyFrom(transfer.mapped(colors, 0, 1, transfer.TransferFunction(opacities=[(0, 0), (1, 1)]).message().opacities))
+        if not choice.HasField("scalar_range"):
+            choice.scalar_range.min, choice.scalar_range.max, choice.scalar_range.percentiles = 0, 100, True
 
 
 def _parameter(draft: Draft, option: Option, value: Any) -> None:
@@ -223,6 +239,16 @@ def _depth(draft: Draft, option: Option, value: Any) -> None:
     draft.format = dataclasses.replace(draft.format, png_bits=(8, 16)[values.choice(option.name, value, option.choices)])
 
 
+def _format(field: str) -> Put:
+    """A whole number of PictureFormat."""
+
+    def put(draft: Draft, option: Option, value: Any) -> None:
+        number = values.integer(option.name, value, int(option.least), int(option.most))
+        draft.format = dataclasses.replace(draft.format, **{field: number})
+
+    return put
+
+
 def _annotation(parse: Callable[[Option, Any], Any]) -> Put:
     def put(draft: Draft, option: Option, value: Any) -> None:
         annotations = dataclasses.replace(draft.format.annotations, **{option.name: parse(option, value)})
@@ -261,6 +287,9 @@ _PUT: dict[str, Put] = {
     "camera": _camera,
     "background": _background,
     "depth": _depth,
+    "quality": _format("quality"),
+    "dpi": _format("dots_per_inch"),
+    "font_size": _annotation(lambda option, value: values.number(option.name, value, option.least, option.most)),
     "title": _annotation(_line),
     "scale_bar": _annotation(lambda option, value: values.flag(option.name, value)),
     "orientation_marker": _annotation(lambda option, value: values.flag(option.name, value)),
@@ -286,7 +315,7 @@ def _check(command: str, given: Mapping[str, Any]) -> None:
     for name in given:
         if name not in known:
             close = difflib.get_close_matches(name, known, 1, 0.6)
-            raise UnknownOption(f"there is no option '{name}'" + (f"; is '{close[0]}' meant?" if close else ""))
+            raise UnknownOption(f"there is no option '{name}'" + (f"; did you mean '{close[0]}'?" if close else ""))
     for name in given:
         for other in known[name].excludes:
             if other in given:
@@ -322,6 +351,14 @@ def draft_of(dataset: str, options: Mapping[str, Any]) -> Draft:
     if not frame.HasField("size"):
         _put(draft, COMMANDS["render"]["size"], COMMANDS["render"]["size"].default)  # replies are compared with it
     return draft
+
+
+def camera_draft_of(dataset: str, options: Mapping[str, Any], index: int, camera: Mapping[str, Any]) -> Draft:
+    """The request at a camera of a path."""
+    try:
+        return draft_of(dataset, {**options, "camera": camera})
+    except InvalidArgument as error:
+        raise InvalidArgument(f"camera {index + 1} of the path: {error}") from None
 
 
 # How one looks at a plane: the view, the plane's normal, and whether only patients have it (client/cli/slice_planes.h).
@@ -366,6 +403,7 @@ def slice_drafts_of(dataset: str, options: Mapping[str, Any]) -> list[Draft]:
         draft.format = dataclasses.replace(planes.format, annotations=annotations)
         frame = draft.frame
         frame.MergeFrom(planes.frame)
+        draft.colors = planes.colors
         frame.renderer = _renderer_with("labels", "overlay") if layers else _renderer_with("projection-mode")
         if layers:
             frame.shading.model = schema.SHADING_MODEL_NONE

@@ -6,10 +6,26 @@ of Python's own that fits, so that `except ValueError` or `except TimeoutError` 
 from __future__ import annotations
 
 import concurrent.futures
+import sys
+import warnings
+
+from .options import in_keywords
 
 
 class SlabstreamError(Exception):
     """Any failure of this package. Its text is one line."""
+
+
+class SlabstreamWarning(UserWarning):
+    """What a picture does not show as one may expect. Its text is one line."""
+
+
+def warn(text: str) -> None:
+    """A SlabstreamWarning at the line of the caller's that led here."""
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and str(frame.f_globals.get("__name__")).partition(".")[0] == __package__:
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, SlabstreamWarning, stacklevel=level)
 
 
 class InvalidArgument(SlabstreamError, ValueError):
@@ -61,5 +77,5 @@ _BY_CODE: dict[int, type[SlabstreamError]] = {
 
 
 def error_of(code: int, message: str) -> SlabstreamError:
-    """The exception for a Status of the wire."""
-    return _BY_CODE.get(code, Internal)(message)
+    """The exception for a Status of the wire. The service's sentence names fields and options of the command line: here they are keywords."""
+    return _BY_CODE.get(code, Internal)(in_keywords(message))

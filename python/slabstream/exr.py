@@ -28,7 +28,7 @@ def _packed(block: numpy.typing.NDArray[Any]) -> bytes:
     return packed if len(packed) < len(plain) else plain
 
 
-def encode(channels: dict[str, numpy.typing.NDArray[Any]], text: dict[str, str] | None = None) -> bytes:
+def encode(channels: dict[str, numpy.typing.NDArray[Any]], text: dict[str, str] | None = None, dots_per_inch: int | None = None) -> bytes:
     """`channels`: height, width of float32 each, by name. `text`: attributes of the file."""
     names = sorted(channels)
     height, width = channels[names[0]].shape
@@ -45,6 +45,7 @@ def encode(channels: dict[str, numpy.typing.NDArray[Any]], text: dict[str, str] 
         _attribute("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
         _attribute("screenWindowWidth", "float", struct.pack("<f", 1)),
         *(_attribute(name, "string", value.encode()) for name, value in (text or {}).items()),
+        *([] if dots_per_inch is None else [_attribute("xDensity", "float", struct.pack("<f", dots_per_inch))]),
     ]) + b"\0"
     parts = []
     for y in range(0, height, _ROWS):

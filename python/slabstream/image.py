@@ -15,12 +15,14 @@ import numpy
 import numpy.typing
 
 from . import exr, png, schema
-from .annotations import Annotations, draw
+from .annotations import Annotations, draw, encode
 from .errors import InvalidArgument, Unavailable
 from .runs import Floats, Rectangle
 
 Vector = tuple[float, float, float]
 
+_ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".exr", ".pdf", ".svg")
+_ENDINGS_WITH_BITS = (".png", ".tif", ".tiff")
 _STAGES = ("fetch", "prepare", "transform", "shade", "splat", "composite", "zbuffer", "combine", "encode", "resolve", "render", "sample")
 
 
@@ -29,7 +31,9 @@ class PictureFormat:
     """How pixels become a picture, by whoever shows it."""
 
     background: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # straight, each in [0, 1]
-    png_bits: int = 8  # 8 or 16
+    png_bits: int = 8  # of PNG and TIFF: 8 or 16
+    quality: int = 90  # of JPEG and WebP
+    dots_per_inch: int | None = None  # that files state
     annotations: Annotations = Annotations()
     key: dict[str, Any] | None = None  # of colour bar and legend, if they are wanted
 
@@ -172,7 +176,7 @@ class Image:
         if not annotations.any() or not self._panes:
             return self.rgba
         if self._drawn is None:
-            self._drawn = draw(self.rgba, annotations, self._panes, self.format.key)
+            self._drawn = draw(self.rgba, self.format, self._panes)
         return self._drawn
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> numpy.typing.NDArray[Any]:
@@ -183,7 +187,7 @@ class Image:
         """The picture as a PNG file with 8 or 16 bits a channel; None: as the option `depth` said."""
         if bits not in (None, 8, 16):
             raise InvalidArgument(f"bits is {bits}, must be 8 or 16")
-        return png.encode(_codes(self._shown(), bits or self.format.png_bits), {"Software": "slabstream"})
+        return png.encode(_codes(self._shown(), bits or self.format.png_bits), {"Software": "slabstream"}, self.format.dots_per_inch)
 
     def exr(self) -> bytes:
         """The picture as an OpenEXR file: `rgba` as the channels R, G, B and A, and `depth`, if there is one, as Z."""
@@ -191,17 +195,27 @@ class Image:
         channels = {name: shown[..., number] for number, name in enumerate("RGBA")}
         if self.depth is not None:
             channels["Z"] = self.depth
-        return exr.encode(channels, {"software": "slabstream"})
+        return exr.encode(channels, {"software": "slabstream"}, self.format.dots_per_inch)
 
     def save(self, path: str | os.PathLike[str], bits: int | None = None) -> None:
-        """Writes a PNG or OpenEXR file, as its name ends, whole or not at all. `bits` is for PNG."""
+        """Writes a file of the type that its name's ending says, whole or not at all: .png, .jpg, .webp, .tif, .exr, .pdf or .svg, with the
+        options `quality`, `dpi` and `depth` of the picture. `bits` is for PNG and TIFF, instead of `depth`. The program `slabstream`
+        writes all but PNG and OpenEXR, and it must be on this machine for them."""
         file = pathlib.Path(path)
         kind = file.suffix.lower()
-        if kind not in (".png", ".exr"):
-            raise InvalidArgument(f"'{file}' must end in .png or .exr; numpy.asarray(image) and image.rgba hold the pixels for other formats")
-        if kind == ".exr" and bits is not None:
-            raise InvalidArgument(f"bits is {bits}, but samples of .exr are floats")
-        content = self.exr() if kind == ".exr" else self.png(bits)
+        if kind not in _ENDINGS:
+            raise InvalidArgument(f"'{file}' must end in {', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}; numpy.asarray(image) and image.rgba hold the "
+                                  "pixels for other types")
+        if bits not in (None, 8, 16):
+            raise InvalidArgument(f"bits is {bits}, must be 8 or 16")
+        if bits is not None and kind not in _ENDINGS_WITH_BITS:
+            raise InvalidArgument(f"bits is {bits}, but samples of {kind} {'are floats' if kind == '.exr' else 'have 8'}")
+        if kind == ".exr":
+            content = self.exr()
+        elif kind == ".png":
+            content = self.png(bits)
+        else:
+            content = encode(self.rgba, self.format, self._panes, kind, bits or self.format.png_bits, self.format.quality)
         try:
             with tempfile.NamedTemporaryFile(dir=file.parent, prefix=f".{file.name}.", delete=False) as temporary:
                 try:

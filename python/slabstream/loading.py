@@ -9,14 +9,15 @@ import tempfile
 import weakref
 from typing import Any, Callable, Iterator
 
+from .drafts import draft_of
 from .errors import InvalidArgument, NotFound, SlabstreamError, Unavailable
 from .frame import Frame
 from .image import Image
 from .local import lock, running
 from .options import takes_options_of
 from .service import Service
-from .viewer import Viewer
-from .volumes import Grid, check_spacing, on_grid, volume_of, write_nrrd
+from .viewer import VIEWER_OPTIONS, Viewer
+from .volumes import Grid, check_spacing, labels_of, on_grid, volume_of, write_nrrd
 from .volumes import Volume as VolumeData
 
 _TAKE_AWAY_SECONDS = 5.0
@@ -92,8 +93,8 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
          overlay: Any = None, service: Service | None = None) -> Volume:
     """Brings a volume to a service, for any number of pictures.
 
-    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, xarray.DataArray, an image of
-    nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
+    `volume` is a path of any format that slabstream reads, or an array of z, y, x: numpy, dask, zarr, h5py, torch, jax, xarray.DataArray, an
+    image of nibabel, a list of pydicom datasets. `spacing` and `origin` are z, y, x too, or `spacing` one number for all axes; row i of `direction` is where the array's axis i points to,
     as z, y, x of the world; `world` is "scene" or "patient" (x to the right, y to anterior, z to superior; mm). `labels` and `overlay` are
     volumes on the same grid, or paths. `service`: one that takes data: arrays are sent to it, wherever it runs; files are read there;
     None: one of this process' own, which is started if need be and ends with it.
@@ -135,7 +136,10 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
             text = written(checked)
         for what, layer in (("labels", labels), ("overlay", overlay)):
             if layer is not None:
-                path = path_text(layer, what) if _is_path(layer) else written(on_grid(volume_of(layer), grid))
+                if _is_path(layer):
+                    path = path_text(layer, what)
+                else:
+                    path = written(on_grid(labels_of(layer) if what == "labels" else volume_of(layer), grid))
                 text += f",{what}={path}"
         where.add_data(f"{name}={text}")
     except BaseException:
@@ -143,6 +147,11 @@ def load(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any
             file.unlink(missing_ok=True)
         raise
     return Volume(where, name, shows, files)
+
+
+def _check(options: dict[str, Any], others: tuple[str, ...]) -> None:
+    """A wrong option is refused before a service is started, or anything is written for it. `others`: that are none of pictures."""
+    draft_of("volume", {name: value for name, value in options.items() if name not in others})
 
 
 _numbers = itertools.count(1)  # of volumes, for their names
@@ -153,6 +162,7 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
            overlay: Any = None, service: Service | None = None, **options: Any) -> Image:
     """A picture of an array or a file: load() and render() in one. For several pictures of one array, load() it once. Files stay loaded, and
     are read again when they change."""
+    _check(options, ("deadline",))
     given: dict[str, Any] = {"spacing": spacing, "origin": origin, "direction": direction, "world": world, "labels": labels,
                              "overlay": overlay, "service": service}
     if service is None and all(layer is None or _is_path(layer) for layer in (volume, labels, overlay)):
@@ -171,5 +181,6 @@ def render(volume: Any, *, spacing: Any = None, origin: Any = None, direction: A
 def show(volume: Any, *, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None, labels: Any = None,
          overlay: Any = None, service: Service | None = None, **options: Any) -> Viewer:
     """The viewer of an array or a file, for a notebook: load() and show() in one. The volume stays as long as the viewer."""
+    _check(options, VIEWER_OPTIONS)
     return load(volume, spacing=spacing, origin=origin, direction=direction, world=world, labels=labels, overlay=overlay,
                 service=service).show(**options)

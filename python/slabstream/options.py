@@ -33,6 +33,7 @@ class Option:
     excludes: tuple[str, ...]
     needs: tuple[str, ...]
     same_picture: bool      # it never changes the finished picture
+    negatable: bool         # a flag that may be on by itself: False turns it off
     renderers: tuple[dict[str, Any], ...]  # of the option renderer: name, title, purpose, abilities, and the default of each parameter
     windows: dict[str, tuple[float, float]]  # of the option window: width and level by name
 
@@ -57,6 +58,7 @@ def _option(entry: dict[str, Any]) -> Option:
         excludes=tuple(map(_keyword, entry.get("excludes", ()))),
         needs=tuple(map(_keyword, entry.get("needs", ()))),
         same_picture=entry.get("same_picture", False),
+        negatable=entry.get("negatable", False),
         renderers=tuple(entry.get("renderers", ())),
         windows={window["name"]: (window["width"], window["level"]) for window in entry.get("windows", ())},
     )
@@ -75,14 +77,19 @@ COMMANDS = _load()
 _LAYER_HELP = {"labels": "Shows the dataset's labels as usual", "overlay": "Shows the dataset's overlay as usual"}
 
 
-def _in_keywords(text: str, command: str) -> str:
-    """Options of this command as one writes them here."""
+_BY_PATH = {option.path: option.name for options in COMMANDS.values() for option in options.values() if "." in option.path}
+
+
+def in_keywords(text: str, command: str | None = None) -> str:
+    """Options of this command, or of all, as one writes them here, in place of --options and of the fields of a request."""
+    commands = COMMANDS.values() if command is None else [COMMANDS[command]]
 
     def keyword(found: re.Match[str]) -> str:
         name = _keyword(found[1])
-        return name if name in COMMANDS[command] else found[0]
+        return name if any(name in known for known in commands) else found[0]
 
-    return re.sub(r"--([a-z]+(?:-[a-z]+)*)", keyword, text)
+    text = re.sub(r"--([a-z]+(?:-[a-z]+)*)(?![a-z-]*[/.])", keyword, text)
+    return re.sub(r"\b[a-z_]+(?:\.[a-z_]+)+\b", lambda found: _BY_PATH.get(found[0], found[0]), text)
 
 
 def _limits_of(option: Option) -> list[str]:
@@ -97,7 +104,7 @@ def _help_of(command: str, names: Iterable[str]) -> str:
         if option.group != group:
             group = option.group
             lines += ["", f"{group.partition(' (')[0]}:"]
-        head, *rest = _in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
+        head, *rest = in_keywords(_LAYER_HELP.get(name, option.help), command).split("\n")
         limits = _limits_of(option)
         head += f" ({'; '.join(limits)})" if limits else ""
         lines.append(f"  {name}: {option.type if option.type and name not in _LAYER_HELP else 'bool'}")
@@ -117,7 +124,8 @@ def takes_options_of(command: str) -> Callable[[Function], Function]:
         own = [p for p in signature.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
         named = {p.name for p in own}
         options = [option for option in COMMANDS[command].values() if option.name not in named]
-        more = [inspect.Parameter(o.name, inspect.Parameter.KEYWORD_ONLY, default=False if o.type is None else o.default) for o in options]
+        off = {o.name for o in options if o.type is None and not o.negatable}
+        more = [inspect.Parameter(o.name, inspect.Parameter.KEYWORD_ONLY, default=False if o.name in off else o.default) for o in options]
         function.__signature__ = signature.replace(parameters=own + more)  # type: ignore[attr-defined]
         about = inspect.cleandoc(function.__doc__ or "")
         function.__doc__ = f"{about}\n\nOptions, as of `slabstream {command}`:\n{_help_of(command, (o.name for o in options))}\n"

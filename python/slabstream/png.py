@@ -18,7 +18,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
 
 
-def encode(codes: numpy.typing.NDArray[Any], text: dict[str, str] | None = None) -> bytes:
+def encode(codes: numpy.typing.NDArray[Any], text: dict[str, str] | None = None, dots_per_inch: int | None = None) -> bytes:
     """`codes`: height, width, 4 of uint8 or uint16. `text`: Latin-1, by keyword."""
     height, width, _ = codes.shape
     bits = 8 * codes.dtype.itemsize
@@ -28,6 +28,9 @@ def encode(codes: numpy.typing.NDArray[Any], text: dict[str, str] | None = None)
     filtered[:1, 1:] = rows[:1]
     numpy.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
     parts = [_SIGNATURE, _chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, _RGBA, 0, 0, 0))]
+    if dots_per_inch is not None:
+        density = round(dots_per_inch / 0.0254)  # a metre
+        parts.append(_chunk(b"pHYs", struct.pack(">IIB", density, density, 1)))
     for keyword, value in (text or {}).items():
         parts.append(_chunk(b"tEXt", keyword.encode("latin-1") + b"\0" + value.encode("latin-1", "replace")))
     parts += [_chunk(b"IDAT", zlib.compress(filtered.tobytes(), _LEVEL)), _chunk(b"IEND", b"")]

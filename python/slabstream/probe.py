@@ -7,6 +7,8 @@ from typing import Any
 import numpy
 import numpy.typing
 
+from . import schema
+
 Vector = tuple[float, float, float]
 _JOINT_VALUES, _JOINT_SLOPES = 128, 64
 
@@ -39,6 +41,21 @@ class Label:
     value: int                         # as in the file, from 1
     name: str                          # "": none is known
     color: tuple[float, float, float]  # straight red, green, blue, from 0 to 1
+
+
+@dataclasses.dataclass(frozen=True)
+class LabelStatistics:
+    """The voxels of a label. What follows `voxels` is None if no voxel is finite."""
+
+    label: Label
+    volume: float            # in `unit`
+    unit: str                # "ml" if the world's unit is mm, cm or m; else the unit cubed, such as "\u00b5m^3"
+    voxels: int              # finite ones
+    non_finite: int          # the others
+    mean: float | None
+    deviation: float | None  # standard deviation: the root of the mean squared difference from the mean
+    least: float | None
+    largest: float | None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,8 +92,32 @@ def joint_histogram_of(message: Any) -> JointHistogram:
     )
 
 
+def _label_of(message: Any) -> Label:
+    return Label(message.value, message.name, (message.red, message.green, message.blue))
+
+
 def labels_of(message: Any) -> list[Label]:
-    return [Label(label.value, label.name, (label.red, label.green, label.blue)) for label in message.labels]
+    return [_label_of(label) for label in message.labels]
+
+
+def label_statistics_of(message: Any) -> list[LabelStatistics]:
+    spacing, orientation = message.description.spacing, message.description.orientation
+    cubed = spacing.x * spacing.y * spacing.z
+    per_unit = {schema.LENGTH_UNIT_MILLIMETRE: 1e-3, schema.LENGTH_UNIT_CENTIMETRE: 1.0, schema.LENGTH_UNIT_METRE: 1e6}
+    others = {schema.LENGTH_UNIT_MICROMETRE: "\u00b5m^3", schema.LENGTH_UNIT_NANOMETRE: "nm^3", schema.LENGTH_UNIT_ANGSTROM: "\u00c5^3"}
+    length = orientation.unit
+    if length == 0 and orientation.world == schema.WORLD_PATIENT:
+        length = schema.LENGTH_UNIT_MILLIMETRE
+    if length in per_unit:
+        unit, voxel = "ml", cubed * per_unit[length]
+    else:
+        bare = orientation.world in (0, schema.WORLD_VOXELS) and (spacing.x, spacing.y, spacing.z) == (1, 1, 1)
+        unit, voxel = others.get(length, "voxels^3" if bare else "units^3"), cubed
+    found = []
+    for each in message.labels:
+        numbers = (each.mean, each.deviation, each.least, each.largest) if each.voxels else (None,) * 4
+        found.append(LabelStatistics(_label_of(each.label), (each.voxels + each.non_finite) * voxel, unit, each.voxels, each.non_finite, *numbers))
+    return found
 
 
 def sample_of(message: Any, depth: float | None = None) -> Sample | None:

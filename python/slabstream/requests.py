@@ -24,7 +24,7 @@ _MOST_RESUBMITS = 3    # before it fails
 _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
 _ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused", "summary_reply",
-            "sample_reply", "joint_histogram_reply", "pick_reply", "prefetch_reply")
+            "sample_reply", "joint_histogram_reply", "pick_reply", "view_reply", "prefetch_reply", "statistics_reply")
 MOST_PART_BYTES = 1 << 19  # of a volume that is sent
 
 _log = logging.getLogger("slabstream")
@@ -136,6 +136,10 @@ class Requests:
             envelope = schema.Envelope.FromString(bytes(parts[0]))
         except DecodeError:
             envelope = schema.Envelope()
+        if envelope.version not in (0, schema.WIRE_VERSION):
+            other = f"speaks version {envelope.version} of the wire protocol, this package version {schema.WIRE_VERSION}"
+            self.fail_all(f"the service at {self._endpoint} {other}: both must be of the same release", for_good=True)
+            return
         kind = envelope.WhichOneof("message")
         expected = sum(share.runs.encoded_bytes for share in envelope.frame_reply.shares) if kind == "frame_reply" else 0
         if len(parts) > 2 or envelope.version != schema.WIRE_VERSION or kind is None or len(payload) != expected:

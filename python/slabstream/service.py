@@ -5,7 +5,6 @@ import collections
 import contextlib
 import copy
 import dataclasses
-import math
 import os
 from typing import Any, Callable, Iterator
 
@@ -13,17 +12,30 @@ from . import schema
 from .address import Address, find_service
 from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
-from .drafts import Draft, draft_of, slice_drafts_of
+from .drafts import Draft, camera_draft_of, draft_of, set_clip_box, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
-from .options import takes_options_of
-from .probe import Histogram, JointHistogram, Label, Sample, histogram_of, joint_histogram_of, labels_of, sample_of
+from .moves import Path, cameras_of, turned_views
+from .options import COMMANDS, takes_options_of
+from .probe import (
+    Histogram,
+    JointHistogram,
+    Label,
+    LabelStatistics,
+    Sample,
+    histogram_of,
+    joint_histogram_of,
+    label_statistics_of,
+    labels_of,
+    sample_of,
+)
 from .status import Dataset, Status, dataset_of, status_of
+from .transfer import TransferFunction, mapped
 from .uploads import upload_of
 from .values import integer, number, point
 from .viewer import Viewer
-from .volumes import on_grid, volume_of
+from .volumes import layers_of, on_grid, volume_of
 
 DEADLINE_SECONDS = 600.0
 _ORDER_SECONDS = 30.0
@@ -32,16 +44,13 @@ _MOST_ITEMS = 128
 _MOST_FRAMES, _MOST_TURNS, _MOST_IN_FLIGHT = 100000, 1000, 64
 
 
-def turntable_drafts(draft: Draft, frames: int, turns: int) -> Iterator[Draft]:
-    """Frame i is turned by i / frames of all turns, from the azimuth of `draft` on."""
-    start = draft.frame.view.azimuth_degrees
-    for i in range(frames):
-        turned = copy.copy(draft)
-        turned.frame = schema.FrameRequest()
-        turned.frame.CopyFrom(draft.frame)
-        # Back into one turn, so that a start near the limit of angles stays valid.
-        turned.frame.view.azimuth_degrees = math.fmod(start + 360.0 * turns * i / frames, 360.0)
-        yield turned
+def _with_views(draft: Draft, views: Iterator[Any]) -> Iterator[Draft]:
+    for view in views:
+        moved = copy.copy(draft)
+        moved.frame = schema.FrameRequest()
+        moved.frame.CopyFrom(draft.frame)
+        moved.frame.view.CopyFrom(view)
+        yield moved
 
 
 class Service(contextlib.AbstractContextManager["Service"]):
@@ -73,44 +82,60 @@ class Service(contextlib.AbstractContextManager["Service"]):
         service. `deadline` is in seconds, up to a day.
         """
         draft = draft_of(dataset, options)
-        self._add_keys([draft])
+        self._settle([draft])
         draft.frame.previews = previews or on_preview is not None
         return Frame(self._connection, draft, deadline, on_progress, on_preview)
 
     @takes_options_of("render")
-    def turntable(self, dataset: str, frames: int, *, turns: int = 1, in_flight: int = 2, deadline: float = DEADLINE_SECONDS,
-                  **options: Any) -> Iterator[Image]:
-        """Pictures of full turns about the volume's z axis, one by one, in order. `in_flight` of them are asked for before they are needed,
-        so that the service never waits. Frames that are open when the iterator is closed are cancelled."""
+    def turntable(self, dataset: str, frames: int, *, turns: int = 1, path: Any = None, in_flight: int = 2,
+                  deadline: float = DEADLINE_SECONDS, **options: Any) -> Iterator[Image]:
+        """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
+        the file of one (docs/movies.md). `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
+        that are open when the iterator is closed are cancelled."""
         frames = integer("frames", frames, 1, _MOST_FRAMES)
         turns = integer("turns", turns, 0, _MOST_TURNS)
         in_flight = integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, options)
-        if draft.frame.view.HasField("eye") and turns > 0:
-            raise InvalidArgument(
-                "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
-            )
-        self._add_keys([draft])
-        return self._pipelined(turntable_drafts(draft, frames, turns), in_flight, deadline)
+        if path is None:
+            if draft.frame.view.HasField("eye") and turns > 0:
+                raise InvalidArgument(
+                    "eye fixes the viewpoint, but a turntable turns by azimuth, about look_at; turns=0 fixes the view"
+                )
+            views = turned_views(self._whole_view(draft), frames, turns)
+        else:
+            for name, value in options.items():
+                if value is not None and name in COMMANDS["render"]["camera"].excludes + ("camera",):
+                    raise InvalidArgument(f"path excludes {name}")
+            times, cameras = cameras_of(path)
+            drafts = [camera_draft_of(dataset, options, i, camera) for i, camera in enumerate(cameras)]
+            views = Path(times, [self._whole_view(each) for each in drafts]).views(frames)
+        self._settle([draft])
+        return self._pipelined(_with_views(draft, views), in_flight, deadline)
+
+    def _whole_view(self, draft: Draft) -> Any:
+        """The view of a picture, with what its options leave to the volume."""
+        return self._connection.ask("view_query", schema.ViewQuery(frame=draft.frame), _QUESTION_SECONDS).view
 
     @property
     def address(self) -> Address:
         return self._connection.address
 
     @takes_options_of("render")
-    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None, keep: Any = None,
-             **options: Any) -> Viewer:
+    def show(self, dataset: str, *, width: int | str = "100%", height: int = 640, embed: bool | None = None,
+             behind_proxy: str | None = None, keep: Any = None, **options: Any) -> Viewer:
         """The viewer of a dataset, for a notebook: the value of a cell. It starts a gateway on this machine, which ends with this process. Where
         the browser does not reach it (JupyterHub), or there is none, a picture with these options is shown; `embed=False` asks for it,
-        `embed=True` for the viewer. `keep` stays as long as the viewer."""
+        `embed=True` for the viewer. Where a page cannot be framed (Visual Studio Code), its address stands below the picture.
+        `behind_proxy`: the address of a proxy through which the browser reaches this machine, with {port} for the gateway's port. `keep`
+        stays as long as the viewer."""
         draft_of(dataset, options)  # a wrong one is refused here
-        return Viewer(self, dataset, keep, width, height, embed, options)
+        return Viewer(self, dataset, keep, width, height, embed, behind_proxy, options)
 
     @takes_options_of("slice")
     def slice(self, dataset: str, *, deadline: float = DEADLINE_SECONDS, **options: Any) -> Image:
         """Planes or thick slabs of a volume; several are put side by side."""
         drafts = slice_drafts_of(dataset, options)
-        self._add_keys(drafts)
+        self._settle(drafts)
         return side_by_side(list(self._pipelined(iter(drafts), 3, deadline)))
 
     def histogram(self, dataset: str, *, timeout: float = _QUESTION_SECONDS) -> Histogram:
@@ -125,6 +150,13 @@ class Service(contextlib.AbstractContextManager["Service"]):
         """The labels that occur in a dataset, by value; empty: it has no labels."""
         return labels_of(self._summary(dataset, timeout))
 
+    def label_statistics(self, dataset: str, *, clip_box: Any = None, timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
+        """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
+        dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it."""
+        query = schema.StatisticsQuery(dataset=dataset, labels=True)
+        set_clip_box(query.box, "clip_box", ":,:,:" if clip_box is None else clip_box)
+        return label_statistics_of(self._connection.ask("statistics_query", query, timeout))
+
     def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
         x, y, z = point("at", at)
@@ -135,7 +167,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def pick(self, dataset: str, x: float, y: float, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> Sample | None:
         """What the picture with these options shows at (x, y): pixels from its upper left corner, with the first pixel's centre at 0.5. None: it
         shows nothing there. docs/rendering.md says which point of the ray that is."""
-        frame = draft_of(dataset, options).frame
+        draft = draft_of(dataset, options)
+        self._settle([draft])
+        frame = draft.frame
         query = schema.PickQuery(frame=frame, x=number("x", x, 0, frame.size.width), y=number("y", y, 0, frame.size.height))
         reply = self._connection.ask("pick_query", query, timeout)
         return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
@@ -145,7 +179,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         """Says that the picture with these options may be asked for soon. For a second, the service fetches what it shows from the dataset's web
         server, a few blocks at a time, and keeps it on disk (`--cache`). False: the dataset lies behind no web server, or the service
         keeps nothing on disk."""
-        query = schema.PrefetchQuery(frame=draft_of(dataset, options).frame)
+        draft = draft_of(dataset, options)
+        self._settle([draft])
+        query = schema.PrefetchQuery(frame=draft.frame)
         return bool(self._connection.ask("prefetch_query", query, timeout).fetches)
 
     def status(self, timeout: float = ANSWER_SECONDS) -> Status:
@@ -173,7 +209,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
         until remove_data(), or until the coordinator ends. Arrays as load() takes them, layers on the same grid; dask and zarr arrays are sent
         chunk by chunk. Needs the role admin where the service has keys."""
         checked = volume_of(volume, spacing, origin, direction, world)
-        layers = [None if layer is None else on_grid(volume_of(layer), checked.grid) for layer in (labels, overlay)]
+        layers = [None if layer is None else on_grid(layer, checked.grid) for layer in layers_of(labels, overlay)]
         order, parts = upload_of(name, checked, *layers)
         reply = self._connection.upload(order, parts)
         return next(dataset_of(dataset) for dataset in reply.datasets if dataset.name == name)
@@ -199,19 +235,30 @@ class Service(contextlib.AbstractContextManager["Service"]):
         transfer = schema.TransferChoice(preset="auto", opacity_distance=1)
         return self._connection.ask("summary_query", schema.SummaryQuery(dataset=dataset, transfer=transfer), timeout)
 
-    def _add_keys(self, drafts: list[Draft]) -> None:
-        """What colour bar and legend say, to pictures of one dataset that have them."""
+    def _settle(self, drafts: list[Draft]) -> None:
+        """What pictures of one dataset need to know of it: the values that a colour map of matplotlib spans, and what colour bar and legend say."""
         draft = drafts[0]
-        if not draft.format.annotations.need_key():
-            return
+        if draft.colors is not None:
+            preset = self._transfer_of(draft).transfer
+            ends = preset.colors[0].value, preset.colors[-1].value
+            # Where nothing lies behind, colours are as they are (ResolveLook in the service).
+            opacities = TransferFunction(opacities=[(ends[0], 1)]).message().opacities if draft.frame.clipping.HasField("slab") else preset.opacities
+            for each in drafts:
+                each.frame.transfer.function.CopyFrom(mapped(draft.colors, *ends, opacities))
+                each.frame.transfer.ClearField("scalar_range")
+        if draft.format.annotations.need_key():
+            key = key_of(draft.frame, self._transfer_of(draft))
+            for each in drafts:
+                each.format = dataclasses.replace(each.format, key=key)
+
+    def _transfer_of(self, draft: Draft) -> Any:
+        """The dataset's summary under the transfer function of the draft."""
         query = schema.SummaryQuery(dataset=draft.frame.dataset, transfer=draft.frame.transfer)
         if query.transfer.WhichOneof("choice") is None:
             query.transfer.preset = "auto"
         if not query.transfer.HasField("opacity_distance"):
             query.transfer.opacity_distance = 1
-        key = key_of(draft.frame, self._connection.ask("summary_query", query, _QUESTION_SECONDS))
-        for each in drafts:
-            each.format = dataclasses.replace(each.format, key=key)
+        return self._connection.ask("summary_query", query, _QUESTION_SECONDS)
 
     def _order(self, action: int, items: Any, timeout: float) -> list[Dataset]:
         if len(items) > _MOST_ITEMS:

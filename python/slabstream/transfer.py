@@ -2,13 +2,18 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
+import importlib.util
 import json
 import os
 import pathlib
 from typing import Any, Mapping, Sequence
 
+import numpy
+
 from . import schema
 from .errors import InvalidArgument, NotFound
+from .presets import presets
 
 _NUMBERS_PER_POINT = 4
 _MOST_POINTS = 4096
@@ -175,6 +180,31 @@ def read_paraview(path: str | os.PathLike[str], name: str) -> TransferFunction:
     return from_paraview(document, f"{name} {path}")
 
 
+Colors = list[tuple[float, float, float]]  # at equal distances, from the least value to the greatest
+_MAP_COLORS = 256
+
+
+def color_map(value: object) -> Colors | None:
+    """A colour map of matplotlib, or the name of one that no preset has. None: it is none."""
+    if isinstance(value, str):
+        if value in presets() or not value.isidentifier() or importlib.util.find_spec("matplotlib") is None:
+            return None
+        matplotlib: Any = importlib.import_module("matplotlib")
+        value = matplotlib.colormaps[value] if value in matplotlib.colormaps else None
+    if not (callable(value) and hasattr(value, "N") and hasattr(value, "name")):
+        return None
+    return [(float(red), float(green), float(blue)) for red, green, blue, *_ in value(numpy.linspace(0, 1, _MAP_COLORS))]
+
+
+def mapped(colors: Colors, low: float, high: float, opacities: Sequence[Any]) -> Any:
+    """TransferFunction of the wire with these colours from `low` to `high`. `opacities`: messages."""
+    found = schema.TransferFunction(opacity_distance=1)
+    for value, (red, green, blue) in zip(numpy.linspace(low, high, len(colors)), colors):
+        found.colors.add(value=float(value), r=red, g=green, b=blue)
+    found.opacities.extend(opacities)
+    return found
+
+
 def choose(name: str, value: object, choice: Any) -> None:
     """Puts a preset's name, a ParaView colour map (a path, or its contents) or a TransferFunction into a TransferChoice. Whether there is
     such a preset is for the service to say."""
@@ -187,4 +217,4 @@ def choose(name: str, value: object, choice: Any) -> None:
     elif isinstance(value, str) and value:
         choice.preset = value
     else:
-        raise InvalidArgument(f"{name} {value!r} is neither the name of a preset nor a colour map")
+        raise InvalidArgument(f"{name} {value!r} is neither the name of a preset nor a colour map of ParaView or matplotlib")

@@ -42,7 +42,7 @@ def _place(volume: Volume) -> _Placed:
     order = max(itertools.permutations(range(3)), key=lambda p: float(numpy.prod([abs(units[p[axis], axis]) for axis in range(3)])))
     samples = volume.samples
     if order != (0, 1, 2):
-        samples = numpy.asarray(samples).transpose([2 - order[axis] for axis in (2, 1, 0)])
+        samples = numpy.asanyarray(samples).transpose([2 - order[axis] for axis in (2, 1, 0)])
         volume = dataclasses.replace(volume, samples=samples)
     units, lengths = units[list(order)], lengths[list(order)]
     sizes = samples.shape[::-1]
@@ -64,9 +64,27 @@ def _place(volume: Volume) -> _Placed:
     return _Placed(volume, (backwards[2], backwards[1], backwards[0]), about)
 
 
+def _sent_type(volume: Volume) -> str:
+    file_type = file_type_of(volume)
+    return file_type if file_type in _STORED else "float32"
+
+
+def _narrowed(volume: Volume) -> tuple[Volume, int]:
+    """Whole numbers of 32 and 64 bits in memory that lie near each other, as the service keeps those of files: uint16, and what is added to
+    them. It cannot be known of arrays that are computed as they are sent."""
+    samples = volume.samples
+    if file_type_of(volume) in _STORED or type(samples) is not numpy.ndarray:
+        return volume, 0
+    low, high = int(samples.min()), int(samples.max())
+    if high - low > 65535 or max(abs(low), abs(high)) >= 2**53:
+        return volume, 0
+    shift = 0 if low >= 0 and high <= 65535 else low
+    return dataclasses.replace(volume, samples=(samples - samples.dtype.type(shift)).astype(numpy.uint16)), shift
+
+
 def _bytes_of(placed: _Placed) -> Iterator[memoryview]:
     turn = tuple(slice(None, None, -1 if backwards else 1) for backwards in placed.backwards)
-    for slab in slabs_of(placed.volume, from_the_end=placed.backwards[0]):
+    for slab in slabs_of(placed.volume, from_the_end=placed.backwards[0], file_type=_sent_type(placed.volume)):
         if slab.dtype.kind == "i":  # the least value is 0
             unsigned = f"<u{slab.dtype.itemsize}"
             slab = slab.view(unsigned) ^ numpy.array(1 << (8 * slab.dtype.itemsize - 1), unsigned)
@@ -95,11 +113,12 @@ def _check_grid(what: str, layer: Volume, volume: Volume) -> None:
 
 def upload_of(name: str, volume: Volume, labels: Volume | None, overlay: Volume | None) -> tuple[Any, Iterator[memoryview]]:
     """An AddVolume and its bytes. Nothing is computed before the bytes are asked for, but the labels."""
-    placed = _place(volume)
+    narrowed, shift = _narrowed(volume)
+    placed = _place(narrowed)
     order = schema.AddVolume(name=name, description=placed.description)
-    kind, offset = _STORED[file_type_of(volume.samples.dtype)]
+    kind, offset = _STORED[_sent_type(narrowed)]
     order.description.type = getattr(schema, f"SCALAR_TYPE_{kind}")
-    order.description.scale, order.description.offset = 1, offset
+    order.description.scale, order.description.offset = 1, offset + shift
     layers = [placed]
     if labels is not None:
         _check_grid("labels", labels, volume)
@@ -114,6 +133,15 @@ def upload_of(name: str, volume: Volume, labels: Volume | None, overlay: Volume 
     return order, itertools.chain.from_iterable(map(_bytes_of, layers))
 
 
+def _plain(samples: Any) -> Any:
+    """Without a mask: what is masked is NaN."""
+    array: Any = numpy.asanyarray(samples)
+    if not isinstance(array, numpy.ma.MaskedArray):
+        return array
+    floats: Any = array.astype(numpy.float32)
+    return floats.filled(numpy.nan)
+
+
 class _Floats:
     """An array as float32, slab by slab."""
 
@@ -125,7 +153,7 @@ class _Floats:
         self.chunks = getattr(samples, "chunks", None)
 
     def __getitem__(self, index: Any) -> Any:
-        return numpy.asarray(self._samples[index]).astype(self.dtype)
+        return _plain(self._samples[index]).astype(self.dtype)
 
     def __array__(self, dtype: Any = None, copy: Any = None) -> Any:
-        return numpy.asarray(self._samples).astype(self.dtype)
+        return _plain(self._samples).astype(self.dtype)

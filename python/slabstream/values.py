@@ -18,7 +18,7 @@ from .errors import InvalidArgument
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the precision of a float32
 
-MOST_COORDINATE = 1e9  # of the world; a bound of a clip box that is left out
+MOST_COORDINATE = 1e300  # of the world: practically any; a bound of a clip box that is left out
 MOST_SCALAR = 1e300
 MOST_SIDE = 16384      # pixels
 MOST_LABEL = 1 << 24

@@ -1,9 +1,9 @@
 """Volumes as Python programs hold them, and how they get into a file that the service reads.
 
 Arrays are z, y, x: array[z, y, x], as numpy has volumes in C order, and so are spacing, origin and directions. Taken are numpy arrays and
-whatever has shape, dtype and slices like one (dask, zarr, h5py, memory maps), xarray.DataArray, images of nibabel, and datasets of pydicom.
-None of these packages is needed: an object is known by its attributes. Arrays are written slab by slab, so that one which is computed or
-read by chunks is never in memory as a whole.
+whatever has shape, dtype and slices like one (dask, zarr, h5py, memory maps), what numpy can view (torch, jax), xarray.DataArray, images of
+nibabel, and datasets of pydicom. None of these packages is needed: an object is known by its attributes. Arrays are written slab by slab, so
+that one which is computed or read by chunks is never in memory as a whole.
 """
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, Iterator, Sequence
 
 import numpy
 
-from .errors import InvalidArgument
+from .errors import InvalidArgument, warn
 
 Vector = tuple[float, float, float]
 
@@ -22,9 +22,13 @@ _MOST_SIDE = 65535
 _SLAB_BYTES = 16 << 20
 _EVEN = 1e-3  # part of a step by which steps may differ
 
-# Types that are written as they are, and how NRRD calls them. The service makes uint8, uint16 or float32 of them, exactly.
-_AS_THEY_ARE = {"uint8": "uint8", "int8": "int8", "uint16": "uint16", "int16": "int16", "float32": "float"}
-_AS_FLOAT32 = ("int32", "uint32", "int64", "uint64", "float16", "float64")
+# Types that are written as they are, and how NRRD calls them.
+_AS_THEY_ARE = {"uint8": "uint8", "int8": "int8", "uint16": "uint16", "int16": "int16", "float32": "float", "int32": "int32",
+                "uint32": "uint32", "int64": "int64", "uint64": "uint64"}
+# Of these, the service makes float32 too, and keeps whole numbers beside that which float32 rounds (docs/formats.md).
+_WIDE = ("int32", "uint32", "int64", "uint64")
+_MASKED: Any = numpy.ma  # which has no types
+_AS_FLOAT32 = ("float16", "float64", "bfloat16")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,7 +44,8 @@ class Grid:
 class Volume:
     samples: Any         # with shape (z, y, x), dtype and slices
     grid: Grid
-    rounds: bool = False  # samples were calculated from others: the nearest float32 will do
+    rounds: bool = False  # samples were calculated from others: the nearest float32 will do, without a word
+    masked: bool = False  # some samples may be masked, as numpy.ma has it
 
 
 def _is_xarray(volume: Any) -> bool:
@@ -114,18 +119,70 @@ def _even_step(what: str, positions: Any) -> float:
     return step
 
 
-def _from_xarray(array: Any) -> Volume:
-    """Axes named z, y, x come in that order; others stay as they are."""
-    if set(array.dims) == {"z", "y", "x"}:
-        array = array.transpose("z", "y", "x")
+# What axes of a DataArray are, by their names or by what CF conventions say of their coordinates.
+_AXIS_NAMES = {
+    "x": ("x", "lon", "long", "longitude", "easting", "col", "column"),
+    "y": ("y", "lat", "latitude", "northing", "row"),
+    "z": ("z", "depth", "height", "altitude", "elevation", "lev", "level", "plev", "pressure", "slice"),
+    "t": ("t", "time", "date", "datetime"),
+}
+
+
+def _role(array: Any, name: Any) -> str:
+    """x, y, z or t; "": not known."""
+    attributes = array.coords[name].attrs if name in array.coords else {}
+    if str(attributes.get("axis", "")).lower() in _AXIS_NAMES:
+        return str(attributes["axis"]).lower()
+    names = [str(name).lower(), str(attributes.get("standard_name", "")).lower()]
+    return next((role for role, known in _AXIS_NAMES.items() if any(each in known for each in names)), "")
+
+
+def _first_of_others(array: Any) -> Any:
+    """A DataArray of three axes: of times, channels and whatever else there is, the first, with a warning that says so."""
+    roles = {name: _role(array, name) for name in array.dims}
+    others = [name for name in array.dims if array.sizes[name] == 1 and roles[name] not in ("x", "y", "z")]
+    others += [name for name in array.dims if roles[name] in ("t", "") and name not in others]
+    for name in others:
+        if len(array.dims) <= 3 or not {"x", "y"} <= set(roles.values()):
+            break
+        if array.sizes[name] > 1:
+            warn(f"the DataArray has {array.sizes[name]} of '{name}': the first is taken; array.isel({name}=...) chooses another one")
+        array = array.isel({name: 0})
+    return array
+
+
+def _from_xarray(array: Any, places: bool) -> Volume:
+    """Axes that are known come in the order z, y, x; others stay as they are. `places`: coordinates give spacing and place."""
+    array = _first_of_others(array)
     if len(array.dims) != 3:
         raise InvalidArgument(f"the DataArray has the axes {', '.join(map(str, array.dims))}, must have 3: z, y, x")
+    roles = {name: _role(array, name) for name in array.dims}
+    if sorted(roles.values()) == ["t", "x", "y"]:  # a map over time: time is upwards
+        roles = {name: "z" if role == "t" else role for name, role in roles.items()}
+    by_role = {role: name for name, role in roles.items()}
+    known = set(by_role) == {"x", "y", "z"}
+    if known:
+        array = array.transpose(*(by_role[role] for role in "zyx"))
     given = [name in array.coords for name in array.dims]
-    steps = [_even_step(f"the coordinates of '{name}'", array.coords[name].values) if has else 1.0 for name, has in zip(array.dims, given)]
-    if not any(given):
+    if not places or not any(given):
         return Volume(array.data, grid_of())
-    dz, dy, dx = steps
-    z, y, x = (float(array.coords[name].values[0]) if has else 0.0 for name, has in zip(array.dims, given))
+    steps, begins = [1.0] * 3, [0.0] * 3
+    for axis in (2, 1, 0):
+        name = array.dims[axis]
+        if not given[axis]:
+            continue
+        coordinates = array.coords[name]
+        if coordinates.dtype.kind in "mM":  # instants have no length: they get that of the next axis
+            steps[axis] = abs(steps[min(axis + 1, 2)])
+            continue
+        try:
+            steps[axis] = _even_step(f"the coordinates of '{name}'", coordinates.values)
+        except InvalidArgument as error:
+            raise InvalidArgument(f"{error}: array.interp({name}=...) makes them even, spacing=... leaves them out of account") from None
+        begins[axis] = float(coordinates.values[0])
+        if known and axis == 0 and coordinates.attrs.get("positive", "down" if str(name).lower() == "depth" else "up") == "down":
+            steps[axis], begins[axis] = -steps[axis], 0.0 - begins[axis]  # z is upwards
+    (dz, dy, dx), (z, y, x) = steps, begins
     return Volume(array.data, Grid(((dx, 0.0, 0.0), (0.0, dy, 0.0), (0.0, 0.0, dz)), (x, y, z), "scene"))
 
 
@@ -134,6 +191,8 @@ def _from_nibabel(image: Any) -> Volume:
     array = numpy.asanyarray(image.dataobj)
     while array.ndim > 3 and array.shape[-1] == 1:
         array = array[..., 0]
+    if array.ndim == 2:
+        array = array[..., numpy.newaxis]
     if array.ndim != 3:
         raise InvalidArgument(f"the image has the shape {image.shape}, must have 3 axes: choose one of its volumes")
     affine = numpy.asarray(image.affine, numpy.float64)
@@ -184,29 +243,90 @@ def _from_dicom(slices: Sequence[Any]) -> Volume:
     return Volume(numpy.stack(frames), Grid((x, y, z), tuple(map(float, at[0])), "patient"), rounds)  # type: ignore[arg-type]
 
 
+def _as_numpy(volume: Any) -> Any:
+    """What numpy can view: tensors of torch and others whose types or slices are not numpy's."""
+    kind = f"{type(volume).__module__.partition('.')[0]}.{type(volume).__name__}"
+    for view in (numpy.asarray if hasattr(volume, "__array__") else None, numpy.from_dlpack if hasattr(volume, "__dlpack__") else None):
+        if view is None:
+            continue
+        try:
+            return view(volume)
+        except Exception as error:  # of any package: a device, a gradient, a type
+            why = str(error).splitlines()[0] if str(error) else type(error).__name__
+    raise InvalidArgument(f"numpy cannot view a {kind}: {why}")
+
+
+def _known_dtype(volume: Any) -> bool:
+    try:
+        numpy.dtype(volume.dtype)
+        return True
+    except TypeError:
+        return False
+
+
+def _is_masked(samples: Any) -> bool:
+    """Of numpy.ma, or of dask, whose chunks are."""
+    array = getattr(samples, "_meta", samples)
+    if not isinstance(array, numpy.ma.MaskedArray):
+        return False
+    return array is not samples or bool(_MASKED.getmaskarray(array).any())
+
+
+def _of_array(volume: Any) -> Volume:
+    like_an_array = hasattr(volume, "shape") and hasattr(volume, "dtype") and hasattr(volume, "__getitem__")
+    if not (like_an_array and _known_dtype(volume)) and (hasattr(volume, "__array__") or hasattr(volume, "__dlpack__")):
+        volume = _as_numpy(volume)
+    elif not like_an_array:
+        raise InvalidArgument(f"a {type(volume).__name__} is no volume: expected a path or an array of z, y, x")
+    elif not _known_dtype(volume):
+        raise InvalidArgument(f"the array has samples of type {volume.dtype!r}, which numpy does not know: give an array of numpy")
+    return Volume(volume, grid_of())
+
+
 def volume_of(volume: Any, spacing: Any = None, origin: Any = None, direction: Any = None, world: str | None = None) -> Volume:
     """Given arguments take precedence over what the object states. InvalidArgument names what is wrong with it."""
     if _is_xarray(volume):
-        found = _from_xarray(volume)
+        found = _from_xarray(volume, places=spacing is None)
     elif _is_nibabel(volume):
         found = _from_nibabel(volume)
     elif _is_dicom(volume):
         found = _from_dicom([volume])
     elif isinstance(volume, (list, tuple)) and volume and all(map(_is_dicom, volume)):
         found = _from_dicom(volume)
-    elif hasattr(volume, "shape") and hasattr(volume, "dtype") and hasattr(volume, "__getitem__"):
-        found = Volume(volume, grid_of())
     else:
-        raise InvalidArgument(f"a {type(volume).__name__} is no volume: expected a path or an array of z, y, x")
+        found = _of_array(volume)
     if any(value is not None for value in (spacing, origin, direction, world)):
         found = dataclasses.replace(found, grid=grid_of(spacing, origin, direction, world))
     shape = tuple(found.samples.shape)
+    if len(shape) == 2:  # a slice
+        found = dataclasses.replace(found, samples=numpy.asanyarray(found.samples)[numpy.newaxis])
+        shape = (1, *shape)
     if len(shape) != 3:
-        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x")
+        raise InvalidArgument(f"the array has the shape {shape}, must have 3 axes: z, y, x, or 2 of a slice: y, x")
     if not all(1 <= side <= _MOST_SIDE for side in shape):
         raise InvalidArgument(f"the array has the shape {shape}, each side must be in [1, {_MOST_SIDE}]")
-    file_type_of(found.samples.dtype)
+    found = dataclasses.replace(found, masked=_is_masked(found.samples))
+    file_type_of(found)
     return found
+
+
+def labels_of(labels: Any) -> Volume:
+    """A volume of the numbers of structures. What is masked has none."""
+    found = volume_of(labels)
+    if found.masked:
+        found = dataclasses.replace(found, samples=_MASKED.filled(numpy.asanyarray(found.samples), 0), masked=False)
+    if numpy.dtype(found.samples.dtype).name == "float64":  # float32 would make labels of what is none
+        array = numpy.asarray(found.samples)
+        with numpy.errstate(invalid="ignore"):
+            whole = array.astype(numpy.int64)
+        if (whole != array).any():
+            raise InvalidArgument(f"labels hold {array[whole != array].flat[0]}, must be whole numbers")
+        found = dataclasses.replace(found, samples=whole)
+    return found
+
+
+def layers_of(labels: Any, overlay: Any) -> tuple[Volume | None, Volume | None]:
+    return None if labels is None else labels_of(labels), None if overlay is None else volume_of(overlay)
 
 
 def on_grid(volume: Volume, grid: Grid | None) -> Volume:
@@ -214,16 +334,19 @@ def on_grid(volume: Volume, grid: Grid | None) -> Volume:
     return dataclasses.replace(volume, grid=grid) if grid is not None and volume.grid == grid_of() else volume
 
 
-def file_type_of(dtype: Any) -> str:
-    """That samples of this type are written as."""
-    name = numpy.dtype(dtype).newbyteorder("=").name
+def file_type_of(volume: Volume) -> str:
+    """That its samples are written as."""
+    dtype = numpy.dtype(volume.samples.dtype)
+    name = dtype.newbyteorder("=").name
+    if volume.masked and (name == "bool" or name in _AS_THEY_ARE):
+        return "float32"  # NaN is what is masked
     if name == "bool":
         return "uint8"
     if name in _AS_THEY_ARE:
         return name
     if name in _AS_FLOAT32:
         return "float32"
-    raise InvalidArgument(f"the array has samples of type {numpy.dtype(dtype)}, which no volume has: expected whole or real numbers")
+    raise InvalidArgument(f"the array has samples of type {dtype}, which no volume has: expected whole or real numbers")
 
 
 def _slab_ends(samples: Any) -> Iterator[int]:
@@ -246,39 +369,67 @@ def _slab_ends(samples: Any) -> Iterator[int]:
     yield depth
 
 
-def _converted(slab: Any, file_type: str, rounds: bool) -> Any:
-    """The slab as it is written: little endian. Refused by name, if a value does not fit exactly."""
-    if slab.dtype.name == file_type or slab.dtype.kind == "b":
-        return slab.astype(numpy.dtype(file_type).newbyteorder("<"), copy=False)
-    with numpy.errstate(over="ignore"):
+def _float32(slab: Any) -> tuple[Any, bool]:
+    """The nearest float32 of each sample, and whether any was rounded."""
+    with numpy.errstate(over="ignore", invalid="ignore"):
         converted = slab.astype("<f4")
-    if not rounds:
-        exact = converted.astype(slab.dtype) == slab if slab.dtype.kind == "f" else converted.astype(numpy.float64) == slab.astype(numpy.float64)
-        if slab.dtype.itemsize == 8 and slab.dtype.kind != "f":
-            exact &= numpy.abs(slab.astype(numpy.float64)) <= 2.0**53  # else float64 is not exact either
         if slab.dtype.kind == "f":
-            exact |= numpy.isnan(slab)
-        if not exact.all():
-            value = slab[~exact].flat[0]
-            raise InvalidArgument(
-                f"the array has samples of type {slab.dtype.name}, and {value} is no float32; array.astype(numpy.float32) takes the nearest one"
-            )
-    return converted
+            exact = bool(((converted.astype(slab.dtype) == slab) | numpy.isnan(slab)).all())
+        elif slab.dtype.kind in "iu" and slab.dtype.itemsize > 2:
+            whole = numpy.float64(converted)  # every whole float32 is one of float64
+            exact = bool((numpy.abs(whole) <= 2.0**53).all() and (whole == slab.astype(numpy.float64)).all())
+        else:
+            exact = True  # bool, few bits, and bfloat16, which float32 holds
+    return converted, not exact
 
 
-def slabs_of(volume: Volume, from_the_end: bool = False) -> Iterator[Any]:
-    """Its samples as they are written, slab by slab along z; or from the last one to the first."""
-    file_type = file_type_of(volume.samples.dtype)
-    ends = list(_slab_ends(volume.samples))
+def slabs_of(volume: Volume, from_the_end: bool = False, file_type: str | None = None) -> Iterator[Any]:
+    """Its samples as they are written, slab by slab along z, little endian; or from the last slab to the first. `file_type`: in place of
+    file_type_of(volume). A warning says if pictures show them rounded, as they do those of files."""
+    file_type = file_type or file_type_of(volume)
+    samples, wide = volume.samples, file_type in _WIDE
+    ends = list(_slab_ends(samples))
     pairs = list(zip([0, *ends], ends))
+    rounded, infinite = False, 0
+    ends_of_values: list[int] = []
     for begin, end in reversed(pairs) if from_the_end else pairs:
-        yield _converted(numpy.asarray(volume.samples[begin:end]), file_type, volume.rounds)
+        slab = numpy.asanyarray(samples[begin:end])
+        values = _MASKED.getdata(slab)
+        if wide:
+            ends_of_values += [int(values.min()), int(values.max())]
+        if file_type == "float32" or (wide and not rounded):
+            floats, rounds = _float32(values)
+            if values.dtype.kind == "f" and values.dtype.itemsize > 4 and rounds:
+                infinite += int((numpy.isinf(floats) & ~numpy.isinf(values) & ~_MASKED.getmaskarray(slab)).sum())
+            rounded = rounded or rounds
+        if file_type == "float32":
+            if volume.masked:
+                floats[_MASKED.getmaskarray(slab)] = numpy.nan
+            yield floats
+        else:
+            yield values.astype(numpy.dtype(file_type).newbyteorder("<"), copy=False)
+    if infinite > 0:
+        warn(f"{infinite} values of the array are beyond those of float32 (3.4e38) and are not shown: divide the array by some number")
+    elif rounded and not volume.rounds and not _fits_uint16(ends_of_values):
+        warn(_rounding_text(numpy.dtype(samples.dtype).name, wide))
+
+
+def _fits_uint16(ends: list[int]) -> bool:
+    """The service keeps whole numbers that lie so near each other as they are."""
+    return bool(ends) and max(ends) - min(ends) <= 65535 and max(abs(end) for end in ends) < 2**53
+
+
+def _rounding_text(dtype: str, wide: bool) -> str:
+    text = f"pictures show the array's values of type {dtype} rounded to float32"
+    if wide:
+        return text + "; values at points and labels are exact"
+    return text + "; array.astype(numpy.float32) does so without this warning"
 
 
 def write_nrrd(volume: Volume, path: str | os.PathLike[str]) -> None:
     """NRRD with raw samples: it keeps type, spacing and orientation, and is written from the front to the back."""
     samples, grid = volume.samples, volume.grid
-    file_type = file_type_of(samples.dtype)
+    file_type = file_type_of(volume)
     depth, height, width = samples.shape
 
     def vector(parts: Vector) -> str:

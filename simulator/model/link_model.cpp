@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "common/base/did_you_mean.h"
 #include "common/base/find_named.h"
 #include "common/base/parse_number.h"
 
@@ -45,7 +46,8 @@ Result<LinkModel> ParseLink(std::string_view option, std::string_view text) {
   const std::string_view name = text.substr(0, colon);
   const LinkPreset* preset = FindNamed(LinkPresets(), name);
   if (preset == nullptr) {
-    return Status::InvalidArgument(fmt::format("{}: '{}' is no link, but must be one of: {}", option, name, NamesOf(LinkPresets())));
+    return Status::InvalidArgument(fmt::format("{}: '{}' is no link, but must be one of: {}{}", option, name, NamesOf(LinkPresets()),
+                                               DidYouMean(name, LinkPresets())));
   }
   LinkModel link = preset->link;
   if (colon == std::string_view::npos) return link;

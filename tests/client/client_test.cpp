@@ -27,6 +27,27 @@ TEST_F(ClientTest, NobodyAnswers) {
   EXPECT_THAT(client.status().message(), testing::AllOf(HasSubstr(endpoint), HasSubstr("200 ms")));
 }
 
+// A service of another release answers with its version alone.
+TEST_F(ClientTest, AServiceOfAnotherVersionIsNamed) {
+  FakeService service(context_, "inproc://client-test", [](const AnyMessage&) -> std::vector<Answer> { return {}; });
+  service.SpeakAnotherVersion();
+  const Result<Client> client = Client::Connect(context_, service.endpoint(), seconds(30));
+  EXPECT_EQ(client.status().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(client.status().message(),
+              testing::AllOf(HasSubstr(service.endpoint()), HasSubstr(TextOfOtherVersion(FakeService::kAnotherVersion))));
+}
+
+TEST_F(ClientTest, AServiceThatIsReplacedByAnotherVersionEndsWhatIsOpen) {
+  FakeService service(context_, "tcp://127.0.0.1:*", Answering([](const AnyMessage&) -> std::vector<Answer> { return {}; }));
+  Client client = Client::Connect(context_, service.endpoint(), seconds(30)).value();
+  service.SpeakAnotherVersion();
+  const RequestId request = client.Submit(SmallRequest());
+  const std::optional<ClientEvent> event = client.Next(seconds(30));
+  ASSERT_TRUE(event && std::holds_alternative<Status>(event->what));
+  EXPECT_EQ(event->request, request);
+  EXPECT_THAT(std::get<Status>(event->what).message(), HasSubstr(TextOfOtherVersion(FakeService::kAnotherVersion)));
+}
+
 TEST_F(ClientTest, BadEndpointIsRefusedAtOnce) {
   EXPECT_EQ(Client::Connect(context_, "tcp://8.8.8.8:7420").status().code(), StatusCode::kInvalidArgument);
   EXPECT_EQ(Client::Connect(context_, "here").status().code(), StatusCode::kInvalidArgument);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "client/client.h"
 #include "common/transport/socket.h"
 #include "common/wire/any_message.h"
+#include "common/wire/other_version.h"
 #include "common/wire/payload.h"
 
 namespace slabstream {
@@ -42,6 +44,9 @@ class FakeService {
     wakeup_.Notify();
   }
   const std::string& endpoint() const { return endpoint_; }
+  // From now on it answers as a service of another release does.
+  void SpeakAnotherVersion() { speaks_another_version_ = true; }
+  static constexpr std::uint32_t kAnotherVersion = kWireVersion + 1;
 
  private:
   void Run(const std::stop_token& stop) {
@@ -49,6 +54,12 @@ class FakeService {
     while (!stop.stop_requested()) {
       Wait(sockets, &wakeup_, seconds(60));
       while (const std::optional<Incoming> incoming = socket_.TryReceive()) {
+        if (speaks_another_version_) {
+          std::vector<std::byte> notice = VersionNotice();
+          notice.back() = std::byte{kAnotherVersion};
+          (void)socket_.Send(incoming->identity, std::move(notice));
+          continue;
+        }
         const Result<AnyMessage> message = Decode(incoming->header());
         ASSERT_TRUE(message.ok()) << message.status().message();
         for (const Answer& answer : handler_(*message)) (void)socket_.Send(incoming->identity, Encode(answer.message), answer.payload);
@@ -57,6 +68,7 @@ class FakeService {
   }
 
   Handler handler_;
+  std::atomic<bool> speaks_another_version_ = false;
   Wakeup wakeup_;
   Socket socket_;
   std::string endpoint_;

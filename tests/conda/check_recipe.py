@@ -20,6 +20,7 @@ PACKAGES = {
     "JPEG": "libjpeg-turbo", "EXPAT": "libexpat", "Freetype": "freetype", "ZLIB": "zlib", "BZip2": "bzip2",
     "LibLZMA": "liblzma-devel", "BROTLI": "brotli", "OPENJPEG": "openjpeg", "CURL": "libcurl", "BLOSC": "blosc",
     "LZ4": "lz4-c", "LZF": "liblzf", "ZIP": "libzip", "HDF5": "hdf5", "XXHASH": "xxhash", "OIIO": "openimageio",
+    "WEBP": "libwebp-base", "CAIRO": "cairo",
     "GDCM_INCLUDE_DIR": "gdcm", "GDCM_${part}": "gdcm",
 }  # fmt: skip
 

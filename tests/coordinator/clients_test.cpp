@@ -25,6 +25,18 @@ TEST(ClientTable, WhoeverReadsNothingIsBehind) {
   EXPECT_FALSE(clients.IsBehind(2)) << "nobody knows it";
 }
 
+// Whatever it says.
+TEST(ClientTable, NobodyHasReadWhatHasNotLeft) {
+  ClientTable clients(std::chrono::seconds(10));
+  clients.Meet(1, {});
+  clients.Read(1, 0);
+  clients.Sent(1, kMaxUnreadBytes + kUnit);
+  clients.Read(1, kMaxUnreadBytes + kUnit, kMaxUnreadBytes);
+  EXPECT_TRUE(clients.IsBehind(1));
+  clients.Read(1, kMaxUnreadBytes + kUnit, kMaxUnreadBytes - 1);
+  EXPECT_FALSE(clients.IsBehind(1));
+}
+
 TEST(ClientTable, WhatManyLeaveUnreadCountsTogether) {
   constexpr std::uint64_t kMost = 100 * kUnit;
   ClientTable clients(std::chrono::seconds(10), kMost);

@@ -28,6 +28,7 @@ using Actions = std::vector<CoordinatorAction>;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
+inline constexpr std::uint64_t kMebi = 1 << 20;
 inline constexpr PeerToken kClient = 21, kOther = 22;  // connections of two clients
 
 struct ScriptConfig : CoordinatorConfig {

@@ -1,6 +1,7 @@
 // What the coordinator does about datasets with several levels, told as scripts.
 #include "common/planning/levels.h"
 
+#include "common/view/default_view.h"
 #include "common/volume/memory_budget.h"
 #include "tests/coordinator/coordinator_script.h"
 
@@ -561,7 +562,6 @@ TEST_F(LevelRules, ADatasetThatCannotBeOpenedFailsAllThatWaitForIt) {
 
 class LevelMemoryRules : public LevelRules {
  protected:
-  static constexpr std::uint64_t kMebi = 1 << 20;
   LevelMemoryRules() : LevelRules(400 * kMebi) {}  // 300 for datasets
 };
 
@@ -614,6 +614,34 @@ TEST_F(LevelRules, ASummaryNeedsNoLevel) {
   ASSERT_THAT(asked, SizeIs(1));
   EXPECT_EQ(asked[0].dataset, 0U);
   EXPECT_EQ(*asked[0].summary, StatisticsOf(*Levels()));
+}
+
+TEST_F(LevelRules, AViewNeedsNoLevel) {
+  script.Client(kClient, ViewQuery{.nonce = 3, .frame = AtLevelFrame(1, "0").frame});
+  const auto asked = Of<AnswerQuestion>(NothingChanged(Opened()));
+  EXPECT_THAT(LoadedNames(), ElementsAre("block"));
+  ASSERT_THAT(asked, SizeIs(1));
+  EXPECT_EQ(asked[0].summary, asked[0].levels->overview);
+  EXPECT_EQ(asked[0].levels->levels.front().geometry, GeometryOfLevel(0));
+}
+
+// Whichever level it is drawn from.
+TEST_F(LevelRules, APictureTellsItsViewInTermsOfTheFinestLevel) {
+  SubmitFrame submit = AtLevelFrame(1, "0");
+  submit.frame.view = kUnstatedView;
+  std::optional<ViewParameters> first;
+  for (const char* level : {"0", "2"}) {
+    submit.frame.level = level;
+    ++submit.request;
+    const auto replies = ToClients<FrameReply>(Visit(submit));
+    ASSERT_THAT(replies, SizeIs(1));
+    const std::optional<ViewParameters>& view = replies[0].message.statistics.view;
+    ASSERT_TRUE(view);
+    EXPECT_EQ(view->fit, false);
+    EXPECT_TRUE(view->look_at && view->azimuth_degrees && view->elevation_degrees);
+    EXPECT_EQ(*view, first.value_or(*view));
+    first = view;
+  }
 }
 
 TEST_F(LevelRules, QuestionsAboutVoxelsAreAnsweredFromTheFinestLevel) {

@@ -12,7 +12,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr std::uint64_t kMebi = 1 << 20;
 constexpr DatasetId kBlock = 1;
 
 class MemoryRules : public testing::Test {

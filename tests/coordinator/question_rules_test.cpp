@@ -9,8 +9,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-constexpr std::uint64_t kMebi = 1 << 20;
-
 SampleQuery Question(std::uint64_t nonce, const std::string& dataset = "block") {
   return {.nonce = nonce, .dataset = dataset, .points = {{1, 2, 3}}};
 }
@@ -233,6 +231,57 @@ TEST_F(UploadRules, MemoryAdmitsThem) {
   EXPECT_EQ(Refusals(third).at(0).code(), StatusCode::kResourceExhausted);
   EXPECT_THAT(Refusals(third).at(0).message(), HasSubstr("--memory"));
   EXPECT_EQ(tight.QueryStatus().refused.too_large, 1U);
+}
+
+// A file of 1 MiB that is a dataset.
+class FileRules : public UploadRules {
+ protected:
+  static AddVolume File(std::uint64_t nonce, const std::string& name) {
+    return {.nonce = nonce, .name = name, .description = {}, .layers = {}, .labels = {}, .file = SentFile{name + ".nii", kMebi}};
+  }
+  Actions Arrive(PeerToken from, std::uint64_t nonce, const std::string& name) {
+    const UploadId upload = Begin(from, File(nonce, name));
+    EXPECT_EQ(Admit(upload).allowed, kMebi);
+    Send(Part(0, kMaxVolumePartBytes, nonce), from);
+    EXPECT_THAT(Of<FinishUpload>(Send(Part(kMaxVolumePartBytes, kMaxVolumePartBytes, nonce), from)), SizeIs(1));
+    return script.Step(UploadFinished{upload, DataSource("/somewhere/" + name + ".nii", "")});
+  }
+};
+
+TEST_F(FileRules, TheClientThatHasSentAFileRemovesIt) {
+  EXPECT_THAT(ToClients<DataReply>(Arrive(kClient, 1, "one")), SizeIs(1));
+  Arrive(kClient, 2, "two");
+  EXPECT_EQ(script.QueryStatus().datasets.size(), 4U);
+  EXPECT_THAT(script.Client(kOther, DropVolume{1}), IsEmpty()) << "it is not its own";
+  EXPECT_EQ(Refusals(script.Client(kClient, DropVolume{1})).at(0).code(), StatusCode::kCancelled);
+  EXPECT_EQ(script.QueryStatus().datasets.size(), 3U);
+  EXPECT_THAT(script.Client(kClient, DropVolume{1}), IsEmpty()) << "it is gone already";
+  EXPECT_THAT(Of<BeginUpload>(script.Client(kClient, File(3, "one"))), SizeIs(1)) << "its name is free";
+}
+
+TEST_F(FileRules, FilesGoWithTheirClient) {
+  Arrive(kClient, 1, "one");
+  Arrive(kOther, 1, "two");
+  script.clients.push_back(kOther);  // pings
+  script.Pass(seconds(11));
+  const auto datasets = script.QueryStatus().datasets;
+  EXPECT_EQ(std::ranges::count(datasets, "one", &DatasetStatus::name), 0);
+  EXPECT_EQ(std::ranges::count(datasets, "two", &DatasetStatus::name), 1);
+}
+
+TEST_F(FileRules, FilesTakeMemoryAsLongAsTheyAreThere) {
+  ScriptConfig config = TestConfig();
+  config.memory_bytes = 2 * kMebi;  // 1.5 of them for datasets
+  CoordinatorScript tight(config);
+  const UploadId upload = Of<BeginUpload>(tight.Client(kClient, File(1, "one"))).at(0).upload;
+  tight.Step(UploadBegun{upload, Status::Ok()});
+  tight.Client(kClient, Part(0), Bytes(std::vector<std::byte>(kMaxVolumePartBytes)));
+  tight.Client(kClient, Part(kMaxVolumePartBytes), Bytes(std::vector<std::byte>(kMaxVolumePartBytes)));
+  tight.Step(UploadFinished{upload, DataSource("/somewhere/one.nii", "")});
+  EXPECT_EQ(Refusals(tight.Client(kOther, File(1, "two"))).at(0).code(), StatusCode::kResourceExhausted);
+  // An admin may remove it, too.
+  EXPECT_THAT(Refusals(tight.Client(kOther, DataOrder{.action = DataAction::kRemove, .items = {"one"}})), IsEmpty());
+  EXPECT_THAT(Of<BeginUpload>(tight.Client(kOther, File(2, "two"))), SizeIs(1));
 }
 
 TEST_F(UploadRules, AnUndecodablePartEndsIt) {

@@ -36,6 +36,7 @@ installed="$(date +%s.%N)"
 cp "$brain" "$root/var/lib/brain.nii.gz"
 in_root slabstream render /var/lib/brain.nii.gz --local -o /tmp/brain.png
 awk -v a="$begin" -v b="$installed" -v c="$(date +%s.%N)" 'BEGIN { printf "%.1f s, of which the installation %.1f s\n", c - a, b - a }'
+in_root slabstream render /var/lib/brain.nii.gz --local --title Brain -o /tmp/brain.pdf
 
 say "The other packages"
 in_root bash -c "${install[*]} /dist/*.deb" >> build-debian/apt.log 2>&1

@@ -57,7 +57,7 @@ TEST_F(ExperimentTest, EveryListedExperimentLeavesResultsAndAPage) {
   const std::string list = MustRun({"experiment", "--list"}).out;
   for (const std::string name : {"paper", "partitions", "balance", "combining", "streaming", "scaling"}) {
     EXPECT_THAT(list, HasSubstr(name));
-    MustRun({"experiment", name, "-o", name, "--quick", "--scale", "0.15"});
+    MustRun({"experiment", name, "-o", name, "--quick", "--repeats", "1", "--scale", "0.15"});
     ExpectResults(name, name);
     ExpectPage(name);
   }
@@ -86,7 +86,7 @@ TEST_F(ExperimentTest, VolumesOfSourcesAreMeasuredAtTheirFinestLevel) {
   MustRun({"convert", "ball.nrrd", "ball.ome.zarr"});
   std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.ome.zarr", "transfer": "opaque"}], "size": 48,
     "policies": [{}], "workers": [2]})";
-  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick"});
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick", "--repeats", "1"});
   ExpectResults("out", "sweep");
   for (const json& row : RowsOf("out")) EXPECT_EQ(row.value("volume", "ball-opaque"), "ball-opaque");
 
@@ -106,7 +106,7 @@ TEST_F(ExperimentTest, SweepAtARunningService) {
   std::ofstream(Path("sweep.json"))
       << R"({"volumes": [{"dataset": "ball", "transfer": "opaque"}], "size": 48, "renderers": ["splat", "mip"],
     "policies": [{}, {"decomposition": "kd-tree", "balance": "dynamic"}]})";
-  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick", "--endpoint", endpoint});
+  MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--quick", "--repeats", "1", "--endpoint", endpoint});
   ExpectResults("out", "sweep");
   ExpectPage("out");
   int periods = 0;
@@ -158,8 +158,26 @@ TEST_F(ExperimentTest, ContinuesWhereCtrlCStoppedIt) {
 
 TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
   MakeSphere("ball.nrrd", 2, 24);
-  MustRun({"experiment", "balance", "ball.nrrd:auto", "-o", "out", "--quick", "--scale", "0.1", "--workers", "3", "--renderer",
-           "mip,raycast", "--paths", "fly-through,transfer", "--methods", "rebuilt,dynamic", "--transfer", "opaque,gray-ramp"});
+  MustRun({"experiment",
+           "balance",
+           "ball.nrrd:auto",
+           "-o",
+           "out",
+           "--quick",
+           "--repeats",
+           "1",
+           "--scale",
+           "0.1",
+           "--workers",
+           "3",
+           "--renderer",
+           "mip,raycast",
+           "--paths",
+           "fly-through,transfer",
+           "--methods",
+           "rebuilt,dynamic",
+           "--transfer",
+           "opaque,gray-ramp"});
   ExpectResults("out", "balance");
   const std::string results = ReadFile("out/results.csv");
   for (const char* word : {"ball", "mip", "raycast", "fly-through"}) EXPECT_THAT(results, HasSubstr(word));
@@ -171,7 +189,7 @@ TEST_F(ExperimentTest, BalanceOfAUsersOwnVolume) {
 TEST_F(ExperimentTest, OptionsBelongToTheirExperiment) {
   EXPECT_THAT(MustRun({"experiment", "balance", "--help"}).out, HasSubstr("--paths"));
   EXPECT_THAT(MustRun({"experiment", "paper", "--help"}).out, Not(HasSubstr("--paths")));
-  MustRun({"experiment", "--quick", "--scale", "0.15", "-o", "out", "streaming"});  // options may stand before the name
+  MustRun({"experiment", "--quick", "--repeats", "1", "--scale", "0.15", "-o", "out", "streaming"});  // options may stand before the name
 }
 
 TEST_F(ExperimentTest, WhatIsWrongIsToldInALine) {

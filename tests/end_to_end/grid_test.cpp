@@ -109,12 +109,15 @@ TEST_F(GridTest, ItsCellsAreDrawnUnlessARequestNamesARenderer) {
   EXPECT_EQ(json::parse(ReadFile("cells.json"))["renderer"], "slice");
   EXPECT_EQ(json::parse(ReadFile("trace.json"))["slabstream"]["frames"][0]["renderer"], "slice");
   EXPECT_THAT(MustRun({"info", "cells.png"}).out, HasSubstr("--renderer slice"));
+  EXPECT_EQ(render("ball.nrrd", "surface.png", {"--isovalue", "128"}),
+            render("ball.nrrd", "raycast.png", {"--isovalue", "128", "--renderer", "raycast"}));
+  EXPECT_EQ(render("grid.vtu", "lattice.png", {"--kernel", "linear"}),
+            render("grid.vtu", "shear.png", {"--kernel", "linear", "--renderer", "shear"}));
   EXPECT_EQ(render("ball.nrrd", "ball.png", {"--renderer", "auto"}), render("ball.nrrd", "splat.png", {"--renderer", "splat"}));
   ExpectEachRefused({"render", "-o", "x.png", "--local=1"},
-                    {{{"ball.nrrd", "--sampling-rate", "2"}, "sampling-rate is '2', but the renderer 'splat' has no such parameter"},
-                     {{"grid.vtu", "--sampling-rate", "17"}, "sampling-rate"},
-                     {{"grid.vtu", "--kernel", "linear"}, "kernel is 'linear', but the renderer 'auto' has no such parameter"},
-                     {{"grid.vtu", "--isovalue", "1"}, "renderer is 'auto', but isovalue needs one of: zbuffer, raycast"}});
+                    {{{"grid.vtu", "--sampling-rate", "17"}, "sampling-rate"},
+                     {{"grid.vtu", "--kernel", "linear", "--isovalue", "1"},
+                      "no renderer does all that is asked: isovalue needs one of: raycast, zbuffer; kernel needs one of: shear"}});
 }
 
 TEST_F(GridTest, WhatCannotBeDrawnIsRefused) {

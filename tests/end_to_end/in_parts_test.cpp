@@ -120,8 +120,8 @@ TEST_F(InPartsTest, StatisticsAndRecordsTellLevelsAndBytes) {
   EXPECT_THAT(MustRun({"info", "f_0000.png"}).out, HasSubstr("drawn from"));
 
   MakeLarge("large.nrrd");
-  MustRun({"render", "large.nrrd", "--local=1", "--memory", "768M", "--renderer", "mip", "--zoom", "8", "--size", "64", "-o", "l.png",
-           "--stats", "stats.json"});
+  MustRun({"render", "large.nrrd", "--local=1", "--memory", "768M",   "--renderer", "mip", "--azimuth", "0",       "--elevation",
+           "0",      "--no-fit",   "--zoom",    "8",        "--size", "64",         "-o",  "l.png",     "--stats", "stats.json"});
   const json in_parts = json::parse(ReadFile("stats.json"));
   EXPECT_EQ(in_parts["frames"][0]["levels"][0]["level"], 0);
   EXPECT_GT(in_parts["bytes"]["stored"], 0) << "a worker reads it";
@@ -152,8 +152,9 @@ TEST_F(InPartsTest, WhatDoesNotFitNamesTheLevelThatWouldAndDetailAutoDrawsIt) {
   std::ofstream(Path("rod.nrrd"), std::ios::binary)
       << ("NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8000 8 8\nencoding: raw\n\n" + std::string(8000 * 8 * 8, char(200)));
   MustRun({"convert", "rod.nrrd", "rod.ome.zarr"});
-  const std::vector<std::string> view = {"--local=1",   "--memory", "768M", "--renderer", "zbuffer", "--size",    "2000", "--projection",
-                                         "perspective", "--fov",    "60",   "--distance", "4100",    "--azimuth", "90"};
+  const std::vector<std::string> view = {"--local=1", "--memory",     "768M",        "--renderer",  "zbuffer", "--size",
+                                         "2000",      "--projection", "perspective", "--fov",       "60",      "--distance",
+                                         "4100",      "--azimuth",    "90",          "--elevation", "0",       "--no-fit"};
   std::vector<std::string> command = {"render", "rod.ome.zarr", "-o", "rod.png"};
   command.insert(command.end(), view.begin(), view.end());
   const ProgramResult refused = Slabstream(command);
@@ -203,7 +204,7 @@ TEST_F(InPartsTest, AServiceReadsInPartsWhatItCannotHold) {
   };
   for (std::vector<std::string> view : views) {
     SCOPED_TRACE(view[1]);
-    view.insert(view.end(), {"--zoom", "8"});
+    view.insert(view.end(), {"--no-fit", "--zoom", "8"});
     const PictureFile in_parts = Render("large", view);
     view.push_back("--local=1");
     EXPECT_LE(LargestDifference(in_parts, Render("large.nrrd", view)), kSame);

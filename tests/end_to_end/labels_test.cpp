@@ -26,6 +26,7 @@ class LabelsTest : public EndToEndTest {
 
   PictureFile Picture(const std::string& command, const std::vector<std::string>& more) {
     std::vector<std::string> arguments = {command, "ramp.nrrd", "--local=1", "--size", "64", "-o", Path("picture.png")};
+    if (command == "render") arguments.insert(arguments.end(), {"--azimuth", "0", "--elevation", "0", "--no-fit"});
     arguments.insert(arguments.end(), more.begin(), more.end());
     MustRun(arguments);
     return ReadPicture(Path("picture.png"));

@@ -73,13 +73,30 @@ TEST_F(MeasureTest, BoxesHaveTheMeanAndDeviationOfTheirVoxels) {
   EXPECT_TRUE(none["mean"].is_null());
 }
 
+// The ramp is its own labels: each value but 0 is one.
+TEST_F(MeasureTest, EachLabelHasItsVolumeAndValues) {
+  const json found = Measure({"--labels", "ramp.nrrd"})[0];
+  EXPECT_EQ(found["unit"], "ml");
+  ASSERT_EQ(found["labels"].size(), 23U);
+  for (const json& label : found["labels"]) {
+    EXPECT_EQ(label["voxels"], 1);
+    EXPECT_DOUBLE_EQ(label["volume"].get<double>(), 2 * 3 * 5 / 1000.0);
+    for (const char* field : {"mean", "least", "largest"}) EXPECT_EQ(label[field], label["value"]) << field;
+  }
+  const std::string table = MustRun({"measure", "ramp.nrrd", "--local=1", "--labels", "ramp.nrrd", "--csv"}).out;
+  EXPECT_THAT(table, HasSubstr("value,name,volume (ml),voxels,non_finite,mean,deviation,least,largest\r\n1,,0.03,1,0,1,0,1,1\r\n"));
+}
+
 TEST_F(MeasureTest, RefusesWhatIsNoMeasure) {
-  ExpectEachRefused({"measure", "ramp.nrrd", "--local=1"}, {{{}, "--distance, --angle, --profile or --box must say what to measure"},
-                                                            {{"--distance", "1,2,3"}, "--distance '1,2,3' is not X,Y,Z:X,Y,Z"},
-                                                            {{"--angle", "1,2,3:1,2,3"}, "is not X,Y,Z:X,Y,Z:X,Y,Z"},
-                                                            {{"--angle", "1,2,3:1,2,3:4,5,6"}, "two of its points are the same"},
-                                                            {{"--profile", "1,2:3,4,5"}, "--profile '1,2' is not X,Y,Z"},
-                                                            {{"--box", "1:2,3:4"}, "--box '1:2,3:4' is not X0:X1,Y0:Y1,Z0:Z1"}});
+  ExpectEachRefused({"measure", "ramp.nrrd", "--local=1"},
+                    {{{}, "--distance, --angle, --profile, --box or --labels must say what to measure"},
+                     {{"--labels"}, "--labels needs a FILE of labels with --local"},
+                     {{"--csv", "--box", ":,:,:"}, "--csv is the table of --labels"},
+                     {{"--distance", "1,2,3"}, "--distance '1,2,3' is not X,Y,Z:X,Y,Z"},
+                     {{"--angle", "1,2,3:1,2,3"}, "is not X,Y,Z:X,Y,Z:X,Y,Z"},
+                     {{"--angle", "1,2,3:1,2,3:4,5,6"}, "two of its points are the same"},
+                     {{"--profile", "1,2:3,4,5"}, "--profile '1,2' is not X,Y,Z"},
+                     {{"--box", "1:2,3:4"}, "--box '1:2,3:4' is not X0:X1,Y0:Y1,Z0:Z1"}});
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/picture_file.h"
 #include "tests/end_to_end/program.h"
@@ -250,7 +251,7 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   const std::string movie = ReadFile("movie.mp4");
   ASSERT_EQ(movie.size(), 3 * kFrameBytes);
   for (int i = 0; i < 3; ++i) {
-    run({"render", series, "--time", std::to_string(i), "--azimuth", std::to_string(120 * i), "-o", "single.png"});
+    run({"render", series, "--time", std::to_string(i), "--azimuth", std::to_string(30 + 120 * i), "-o", "single.png"});
     ExpectFrame(movie, std::size_t(i), ReadPicture(Path("single.png")));
   }
   // It stands still, and five frames show two times.
@@ -273,6 +274,71 @@ TEST_F(MovieTest, OverTimeEachFrameShowsItsVolume) {
   run({"turntable", series + "?time=1", "--frames", "1", "-o", "q%d.png"});
   run({"turntable", series, "--time", "1", "--frames", "1", "-o", "r%d.png"});
   EXPECT_EQ(ReadFile("q0.png"), ReadFile("r0.png"));
+}
+
+// A cube that grows: no frame cuts it off, and it does not jump.
+TEST_F(MovieTest, FramesFrameWhatShowsInAnyOfThem) {
+  constexpr int kSide = 64;
+  std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 64, 64, 64), }";
+  header.resize(118, ' ');
+  std::ofstream file(Path("growing.npy"), std::ios::binary);
+  file << std::string("\x93NUMPY\x01\0\x76\0", 10) << header;
+  for (const int end : {16, 48}) {
+    for (int i = 0; i < kSide * kSide * kSide; ++i) {
+      file.put(i % kSide < end && i / kSide % kSide < end && i / kSide / kSide < end ? char(200) : '\0');
+    }
+  }
+  file.close();
+  const auto camera = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(),
+                     {"--local=1", "--size", "32", "--renderer", "raycast", "--transfer", "opaque", "--save-camera", "camera.json"});
+    MustRun(arguments);
+    return nlohmann::json::parse(ReadFile("camera.json"));
+  };
+  const auto first = camera({"render", "growing.npy", "--time", "0", "-o", "a.png"});
+  const auto second = camera({"render", "growing.npy", "--time", "1", "-o", "b.png"});
+  const auto both = camera({"turntable", "growing.npy", "--time", "0:1", "--turns", "0", "-o", "t%d.png"});
+  EXPECT_GT(first["zoom"], 2 * second["zoom"].get<double>());
+  EXPECT_EQ(both, second) << "the larger cube holds the smaller one";
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("t1.png")), ReadPicture(Path("b.png"))), 0);
+}
+
+TEST_F(MovieTest, APathMovesThroughItsCameras) {
+  const std::vector<std::string> look = {"--local=1", "--size", "32", "--renderer", "zbuffer"};
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), look.begin(), look.end());
+    return MustRun(arguments);
+  };
+  run({"render", ball_, "--azimuth", "10", "--save-camera", "a.json", "-o", "a.png"});
+  run({"render", ball_, "--azimuth", "70", "--elevation", "40", "--zoom", "2", "--save-camera", "b.json", "-o", "b.png"});
+  run({"render", ball_, "-o", "c.png"});
+  const std::string a = ReadFile("a.json"), b = ReadFile("b.json");
+  std::ofstream(Path("path.json")) << "[" << a << "," << b << ", {}]";
+  run({"turntable", ball_, "--path", "path.json", "--frames", "5", "-o", "p%d.png"});
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p0.png")), ReadPicture(Path("a.png"))), 0);
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p2.png")), ReadPicture(Path("b.png"))), 0);
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("p4.png")), ReadPicture(Path("c.png"))), 0)
+      << "what a camera leaves out is the default view's";
+  EXPECT_GT(LargestDifference(ReadPicture(Path("p1.png")), ReadPicture(Path("a.png"))), 0.1);
+  // Times say how many frames there are.
+  std::ofstream(Path("timed.json")) << R"([{"time": 1, "azimuth": 10}, {"time": 1.5, "azimuth": 50}])";
+  KeepFrames();
+  EXPECT_THAT(run({"turntable", ball_, "--path", "timed.json", "--fps", "10", "-o", "m.mp4"}).out, HasSubstr("rendered 6 frames"));
+
+  std::ofstream(Path("one.json")) << "[{}]";
+  std::ofstream(Path("mixed.json")) << R"([{"projection": "perspective"}, {}])";
+  std::ofstream(Path("wrong.json")) << R"([{}, {"zoom": -1}])";
+  const std::vector<Refusal> cases = {
+      {{"--path", "path.json"}, "--frames is required: the cameras of --path have no times"},
+      {{"--path", "none.json", "--frames", "2"}, "--path"},
+      {{"--path", "one.json", "--frames", "2"}, "--path one.json: a path is a list of 2 to 1000 cameras"},
+      {{"--path", "wrong.json", "--frames", "2"}, "--path wrong.json: camera 2 of the path: zoom"},
+      {{"--path", "mixed.json", "--frames", "2"}, "camera 2 of the path is orthographic, but the first one is perspective"},
+      {{"--path", "path.json", "--frames", "2", "--turns", "2"}, "--turns"},
+      {{"--path", "path.json", "--frames", "2", "--azimuth", "2"}, "--azimuth"},
+      {{"--path", "path.json", "--frames", "2", "--no-fit"}, "--fit"},
+  };
+  ExpectEachRefused({"turntable", ball_, "--local=1", "-o", "p%d.png"}, cases);
 }
 
 TEST_F(MovieTest, AFrameThatFailsIsToldAndTheOthersAreRendered) {
@@ -356,7 +422,6 @@ TEST_F(MovieTest, TimesThatAreNotThereAreRefused) {
       {{series, "--local=1", "--time", "0:x"}, "--time '0:x'"},
       {{series, "--local=1", "--time", ":2"}, "--time ':2'"},
       {{series, "--local=1", "--time", "0:100000"}, "--time 0:100000 has 100001 times, but at most 100000 --frames are possible"},
-      {{series, "--local=1", "--frames", "3"}, "holds 3 volumes, of which --time takes one: 0 to 2"},
       {{series + "?time=1", "--local=1", "--time", "0:2"}, "time is given twice"},
       {{ball_, "--local=1", "--time", "0:2"}, "ball.nrrd: time is 2, must be in [0, 0]"},
       {{ball_, "--local=1"}, "--frames is required"},

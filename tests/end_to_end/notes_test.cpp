@@ -93,6 +93,43 @@ TEST_F(NotesTest, WhoDidNotChooseAChannelIsToldWhichOneIsShown) {
   EXPECT_THAT(MustRun({"convert", "em", "em.ome.zarr"}).err_lines(), ElementsAre(HasSubstr(note)));
 }
 
+TEST_F(NotesTest, OfSeveralTimesTheFirstIsShownAndToldOf) {
+  const std::string header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 2, 2, 2), }\n";
+  std::ofstream(Path("beat.npy"), std::ios::binary)
+      << "\x93NUMPY\x01" << '\0' << char(header.size()) << '\0' << header << "abcdefghijklmnopqrstuvwx";
+  const std::string note = "beat.npy: shows time 0 of 3; --time takes another one: 0 to 2";
+  const std::vector<std::string> render = {"render", "beat.npy", "--local=1", "--size", "16", "--transfer", "opaque", "-o"};
+  const auto picture = [&](const std::string& name, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = render;
+    arguments.push_back(name);
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return MustRun(arguments).err_lines();
+  };
+  EXPECT_THAT(picture("any.png", {}), ElementsAre(HasSubstr(note)));
+  EXPECT_THAT(picture("first.png", {"--time", "0"}), IsEmpty());
+  EXPECT_EQ(LargestDifference(ReadPicture(Path("any.png")), ReadPicture(Path("first.png"))), 0);
+  EXPECT_THAT(MustRun({"info", "beat.npy"}).out,
+              AllOf(HasSubstr("times        3; this is number 0\n"), HasSubstr("values       97 ... 104")));
+  ExpectRefused({"convert", "beat.npy", "beat.nrrd"}, "holds 3 volumes, of which --time takes one: 0 to 2");
+}
+
+TEST_F(NotesTest, OfSeveralComponentsTheFirstIsShownAndToldOf) {
+  std::ofstream(Path("rgb.nrrd"), std::ios::binary) << "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\nsizes: 3 2 2 2\n"
+                                                    << "kinds: RGB-color domain domain domain\n\n"
+                                                    << "a..b..c..d..e..f..g..h..";
+  EXPECT_THAT(MustRun({"render", "rgb.nrrd", "--local=1", "--size", "16", "--transfer", "opaque", "-o", "x.png"}).err_lines(),
+              ElementsAre(HasSubstr("rgb.nrrd: shows component 0 of 3; --channel takes another one: 0 to 2, or luminance")));
+  EXPECT_THAT(MustRun({"info", "rgb.nrrd"}).out, HasSubstr("values       97 ... 104"));
+  ExpectRefused({"convert", "rgb.nrrd", "grey.nrrd"}, "has 3 components a voxel, of which --channel takes one");
+}
+
+TEST_F(NotesTest, AVolumeOfOneValueHasNothingToShow) {
+  std::ofstream(Path("empty.nrrd")) << "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 9 9 9\nencoding: raw\n\n" << std::string(729, '\3');
+  const ProgramResult result = MustRun({"render", "empty.nrrd", "--local=1", "--size", "32", "-o", "x.png"});
+  EXPECT_THAT(result.err_lines(), ElementsAre("slabstream: warning: the picture is empty: all values of the volume are 3"));
+  EXPECT_EQ(ReadPicture(Path("x.png")).At(16, 16, 3), 0);
+}
+
 TEST_F(NotesTest, PresetsAreListed) {
   const std::string list = MustRun({"transfer", "--list", "--preview", "maps.png"}).out;
   for (const char* name : {"auto  ", "ct-bone  ", "viridis  ", "magma  ", "cividis  ", "turbo  ", "coolwarm  ", "grey  "}) {

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "tests/data/volume_io/stored_object.h"
@@ -180,6 +182,32 @@ TEST_F(OrientationTest, ACameraIsSavedAndReadBack) {
   EXPECT_THAT(turning.err, HasSubstr("--eye fixes the viewpoint"));
 }
 
+// Of a patient and of a volume without orientation: what the default view is, and that the saved camera makes the same picture.
+TEST_F(OrientationTest, TheDefaultViewIsThatOfItsVolumeAndIsSavedAsItWasUsed) {
+  const std::string patient = Store(AllStorages()[5]), ball = MakeSphere("ball.nrrd", 2, 16);
+  for (const auto& [volume, azimuth, elevation] : {std::tuple(patient, 180, 0), std::tuple(ball, 30, 20)}) {
+    for (const char* projection : {"orthographic", "perspective"}) {
+      const std::vector<std::string> options = {"--projection", projection, "--renderer", "raycast"};
+      const auto with = [&](std::vector<std::string> more) {
+        more.insert(more.end(), options.begin(), options.end());
+        return Render(volume, more);
+      };
+      const PictureFile picture = with({"--save-camera", Path("camera.json")});
+      const nlohmann::json camera = nlohmann::json::parse(ReadFile("camera.json"));
+      EXPECT_EQ(camera["azimuth"], azimuth);
+      EXPECT_EQ(camera["elevation"], elevation);
+      EXPECT_EQ(camera["fit"], false);
+      EXPECT_TRUE(camera.contains("look-at")) << camera;
+      EXPECT_EQ(LargestDifference(Render(volume, {"--renderer", "raycast", "--camera", Path("camera.json")}), picture), 0);
+      EXPECT_EQ(LargestDifference(with({"--azimuth", std::to_string(azimuth), "--elevation", std::to_string(elevation), "--fit"}), picture),
+                0);
+      with({"--no-fit", "--azimuth", "0", "--save-camera", Path("whole.json")});
+      EXPECT_EQ(nlohmann::json::parse(ReadFile("whole.json"))["elevation"], elevation) << "an angle that is not given keeps its default";
+      EXPECT_FALSE(nlohmann::json::parse(ReadFile("whole.json")).contains("look-at"));
+    }
+  }
+}
+
 // A small object in a corner of a large volume.
 TEST_F(OrientationTest, FitFramesWhatIsVisible) {
   Object corner = Body();
@@ -192,10 +220,10 @@ TEST_F(OrientationTest, FitFramesWhatIsVisible) {
   };
   for (const char* renderer : {"zbuffer", "raycast", "splat"}) {
     for (const char* projection : {"orthographic", "perspective"}) {
-      const std::vector<std::string> plain = {"--renderer", renderer, "--projection", projection,
-                                              "--azimuth",  "30",     "--transfer",   "opaque"};
-      std::vector<std::string> fitted = plain;
-      fitted.emplace_back("--fit");
+      const std::vector<std::string> fitted = {"--renderer",  renderer, "--projection", projection, "--azimuth", "30",
+                                               "--elevation", "0",      "--transfer",   "opaque"};
+      std::vector<std::string> plain = fitted;
+      plain.emplace_back("--no-fit");
       EXPECT_LT(covered(plain), 64 * 64 / 20) << renderer << " " << projection;
       EXPECT_GT(covered(fitted), 64 * 64 / 6) << renderer << " " << projection;
     }

@@ -35,12 +35,16 @@ class RenderTest : public EndToEndTest {
  protected:
   RenderTest() : ball_(MakeSphere("ball.nrrd", 2, kVoxels)) {}
 
-  // Renders the ball, opaque and unshaded.
+  // Renders the ball, opaque and unshaded. The view is along y unless `more` says something else, and shows the whole volume.
   PictureFile Render(const std::string& output, std::vector<std::string> more = {}) {
     std::vector<std::string> arguments = {"render",     ball_,    "-o",        output, "--size", std::to_string(kPixels),
                                           "--transfer", "opaque", "--shading", "none"};
     if (std::none_of(more.begin(), more.end(), [](const std::string& s) { return s.rfind("--local", 0) == 0; }))
       more.push_back("--local=2");
+    for (const char* angle : {"--azimuth", "--elevation"}) {
+      if (std::ranges::find(more, angle) == more.end()) arguments.insert(arguments.end(), {angle, "0"});
+    }
+    arguments.emplace_back("--no-fit");
     arguments.insert(arguments.end(), more.begin(), more.end());
     MustRun(arguments);
     return ReadPicture(Path(output));
@@ -158,7 +162,8 @@ TEST_F(RenderTest, AnOptionHasTheSameMeaningInEachOfItsSpellings) {
   };
   for (std::vector<std::string> arguments : spellings) {
     arguments.insert(arguments.begin(), "render");
-    const std::vector<std::string> rest = {"-o", "b.png", "--size", std::to_string(kPixels), "--shading", "none", "--no-record"};
+    const std::vector<std::string> rest = {"-o",          "b.png",     "--size", std::to_string(kPixels), "--shading", "none",
+                                           "--no-record", "--azimuth", "0",      "--elevation",           "0",         "--no-fit"};
     arguments.insert(arguments.end(), rest.begin(), rest.end());
     MustRun(arguments);
     EXPECT_EQ(ReadFile("b.png"), picture) << arguments[1] << " " << arguments[2];
@@ -232,20 +237,72 @@ TEST_F(RenderTest, AFontBesideTheProgramComesFirst) {
   EXPECT_EQ(result.err, "slabstream annotate: the font '" + Path("DejaVuSans-Bold.ttf") + "' cannot be read\n");
 }
 
-// Copied without libslabstream-pictures.so, the program says so before it looks for the service.
+// Copied without libslabstream-pictures.so, the program writes what it encodes itself. Of other files it says so before it makes a picture,
+// but after it has looked at its arguments and files.
 TEST_F(RenderTest, AnEncoderThatIsNotThereIsToldBeforeTheWorkBegins) {
   std::filesystem::copy_file(Command({}).front(), Path("slabstream"));
-  const std::string endpoint = "ipc://" + Path("none");
-  for (const std::vector<std::string>& arguments :
-       {std::vector<std::string>{"render", "-o", "a.png"}, {"turntable", "--frames", "2", "-o", "a%d.png"}, {"slice", "-o", "a.png"}}) {
-    std::vector<std::string> command = {Path("slabstream")};
-    command.insert(command.end(), arguments.begin(), arguments.end());
-    command.insert(command.end(), {"ball", "--endpoint", endpoint});
-    const ProgramResult result = RunningProgram(command, directory_).Wait();
+  const auto run = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), Path("slabstream"));
+    arguments.insert(arguments.end(), {"--local=1", "--size", "16"});
+    return RunningProgram(arguments, directory_).Wait();
+  };
+  for (const std::string name : {"a.png", "a.jpg", "a.webp"}) EXPECT_EQ(run({"render", ball_, "-o", name}).exit_status, 0) << name;
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"render", ball_, "-o", "a.exr"},
+                                                    {"turntable", ball_, "--frames", "2", "-o", "a%d.tif"},
+                                                    {"slice", ball_, "-o", "a.pdf"}}) {
+    const ProgramResult result = run(arguments);
     EXPECT_EQ(result.exit_status, 1) << arguments[0];
     ASSERT_EQ(result.err_lines().size(), 1U) << result.err;
-    EXPECT_THAT(result.err, HasSubstr("pictures cannot be written: libslabstream-pictures.so: ")) << arguments[0];
+    EXPECT_THAT(result.err, HasSubstr("only .png, .jpg and .webp can be written: libslabstream-pictures.so: ")) << arguments[0];
   }
+  const ProgramResult missing = run({"render", "missing.nrrd", "-o", "a.exr"});
+  EXPECT_EQ(missing.exit_status, 2);
+  EXPECT_THAT(missing.err, HasSubstr("missing.nrrd"));
+}
+
+TEST_F(RenderTest, SeveralSourcesMakeAPictureEach) {
+  std::filesystem::copy_file(ball_, Path("other.nrrd"));
+  std::filesystem::copy_file(ball_, Path("ball two.nrrd"));
+  MustRun({"render", ball_, "other.nrrd:opaque", "ball two.nrrd", "--local=1", "--size", "20", "-o", "{name}.png", "--stats", "{name}.json",
+           "--no-record"});
+  for (const std::string name : {"ball", "other", "ball_two"}) {
+    EXPECT_THAT(Files(), Contains(name + ".png"));
+    EXPECT_THAT(Files(), Contains(name + ".json"));
+  }
+  EXPECT_EQ(ReadFile("ball.png"), ReadFile("ball_two.png"));
+  EXPECT_NE(ReadFile("ball.png"), ReadFile("other.png")) << "another transfer function";
+
+  // One that fails does not stop the others, and is named.
+  std::filesystem::remove(Path("other.png"));
+  std::ofstream(Path("broken.nrrd")) << "NRRD0004\nno header\n";
+  const ProgramResult some =
+      Slabstream({"render", "missing.nrrd", "broken.nrrd", "other.nrrd", "--local=1", "--size", "20", "-o", "{name}.png", "--progress"});
+  EXPECT_EQ(some.exit_status, 2);
+  EXPECT_THAT(some.out, HasSubstr("rendered other.png"));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("slabstream render: SOURCE missing.nrrd: no such file")));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("broken.nrrd")));
+  EXPECT_THAT(some.err_lines(), Contains(HasSubstr("other.nrrd: frame 1 of 1: done")));
+}
+
+TEST_F(RenderTest, FilesOfSeveralSourcesNeedDifferentNames) {
+  std::filesystem::create_directory(Path("more"));
+  std::filesystem::copy_file(ball_, Path("more/ball.nrrd"));
+  std::filesystem::copy_file(ball_, Path("other.nrrd"));
+  const auto expect = [&](std::vector<std::string> arguments, const std::string& complaint) {
+    arguments.insert(arguments.begin(), "render");
+    arguments.insert(arguments.end(), {"--local=1", "--size", "20"});
+    const ProgramResult result = Slabstream(arguments);
+    EXPECT_EQ(result.exit_status, 2);
+    EXPECT_THAT(result.err, HasSubstr(complaint));
+    EXPECT_EQ(result.err_lines().size(), 1U);
+  };
+  const std::vector<std::string> before = Files();
+  expect({ball_, "other.nrrd", "-o", "a.png"}, "--output 'a.png' has no place for {name}, which 2 SOURCEs need");
+  expect({ball_, "other.nrrd", "-o", "{name}.png", "--trace", "t.json"}, "--trace 't.json' has no place for {name}");
+  expect({ball_, "more/ball.nrrd", "-o", "{name}.png"}, "have the same name, ball, so their pictures would be one file");
+  EXPECT_EQ(Files(), before) << "nothing was done";
+  MustRun({"render", ball_, "--local=1", "--size", "20", "-o", "one-{name}.png"});
+  EXPECT_THAT(Files(), Contains("one-ball.png"));
 }
 
 TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
@@ -257,13 +314,14 @@ TEST_F(RenderTest, APictureWithoutAnythingToSeeIsEmpty) {
 TEST_F(RenderTest, SaysWhatItDidAndHowFarItIs) {
   const ProgramResult result = MustRun({"render", ball_, "--local=2", "--groups", "2", "-o", "ball.png", "--size", "40x30", "--progress"});
   EXPECT_THAT(result.out, HasSubstr("rendered ball.png 40x30 in "));
+  EXPECT_THAT(result.out, HasSubstr(" ms (splat, frame ")) << "which renderer was chosen";
   EXPECT_THAT(result.err_lines(), Contains(HasSubstr("frame 1 of 1: done")));
   EXPECT_EQ(result.err.find('\r'), std::string::npos);  // no terminal, no bar
 }
 
 TEST_F(RenderTest, TurntableFramesAreTheRendersOfTheirAngles) {
-  MustRun({"turntable", ball_, "--local=2", "-o", "t_%02d.exr", "--frames", "3", "--azimuth", "10", "--size", std::to_string(kPixels),
-           "--transfer", "opaque", "--shading", "none"});
+  MustRun({"turntable", ball_, "--local=2", "-o", "t_%02d.exr", "--frames", "3", "--azimuth", "10", "--elevation", "0", "--no-fit",
+           "--size", std::to_string(kPixels), "--transfer", "opaque", "--shading", "none"});
   const std::vector<std::string> angles = {"10", "130", "250"};
   for (std::size_t i = 0; i < 3; ++i) {
     const PictureFile frame = ReadPicture(Path("t_0" + std::to_string(i) + ".exr"));

@@ -87,6 +87,8 @@ std::vector<std::vector<std::byte>> RecordedHeaders() {
   client.Await<SampleReply>();
   client.Send(PickQuery{.nonce = 7, .frame = request, .x = 16, .y = 12});
   client.Await<PickReply>();
+  client.Send(ViewQuery{.nonce = 12, .frame = request});
+  client.Await<ViewReply>();
   client.Send(PrefetchQuery{.nonce = 11, .frame = request});
   client.Await<PrefetchReply>();
   AddVolume add{.nonce = 8, .name = "sent"};

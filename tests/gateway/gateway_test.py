@@ -3,8 +3,10 @@
 
     gateway_test.py FOLDER_OF_PROGRAMS [unittest arguments]
 """
+import csv
 import gzip
 import http.client
+import io
 import json
 import os
 import random
@@ -120,6 +122,97 @@ class WithService(unittest.TestCase):
         return self.gateway.request(path + "?" + urllib.parse.urlencode(fields, doseq=True))
 
 
+class UploadTest(WithService):
+    """Files that pages send."""
+
+    def post(self, body=b"", **fields):
+        status, _, answer = self.gateway.request("/api/v1/upload?" + urllib.parse.urlencode(fields), method="POST", body=body)
+        return status, json.loads(answer)
+
+    def send(self, name, data, part=1 << 20):
+        status, begun = self.post(file=name, bytes=len(data))
+        self.assertEqual(status, 200, begun)
+        for begin in range(0, len(data), part):
+            status, answer = self.post(data[begin:begin + part], upload=begun["upload"], begin=begin)
+            if status != 200:
+                return status, answer
+            self.assertEqual(answer["received"], min(begin + part, len(data)))
+        self.assertEqual(answer["dataset"], begun["dataset"])
+        return begun["upload"], begun["dataset"]
+
+    def read(self, name):
+        return (self.programs.folder / name).read_bytes()
+
+    def names(self):
+        return {dataset["name"] for dataset in self.gateway.json("/api/v1/datasets")[1]["datasets"]}
+
+    def test_a_file_is_a_dataset_until_it_is_dropped(self):
+        noise = random.Random(3).randbytes(128 ** 3)  # more than what may be under way at a time
+        (self.programs.folder / "noise.nrrd").write_bytes(b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 128 128 128\nencoding: raw\n\n" + noise)
+        upload, name = self.send("my noise (1).nrrd", self.read("noise.nrrd"), 300_000)
+        self.assertEqual(name, "my_noise_1_")
+        self.assertEqual(self.gateway.json(f"/api/v1/value?dataset={name}&at=3,4,5")[1]["value"], noise[3 + 128 * (4 + 128 * 5)])
+        second, other = self.send("../../my noise (1).nrrd", self.read("a.nrrd"))
+        self.assertEqual(other, "_")
+        again, third = self.send("a.nrrd", self.read("a.nrrd"))
+        self.assertEqual(third, "a-2")
+        one, same = (png_pixels(self.get("/api/v1/render.png", dataset=each, size=32)[2]) for each in ("a", third))
+        self.assertEqual(one, same)
+        for each in (upload, second, again):
+            self.assertEqual(self.post(upload=each, drop="true"), (200, {}))
+        wait_until(lambda: self.names() <= {"a", "b", "c", "levels"}, "they are gone")
+        self.assertEqual(self.get("/api/v1/render.png", dataset=name, size=16)[0], 404)
+        status, answer = self.post(b"x", upload=upload, begin=0)
+        self.assertEqual((status, "no such upload" in answer["error"]), (404, True))
+
+    def test_what_is_no_volume_is_refused_without_paths(self):
+        upload, name = self.send("notes.nrrd", b"NRRD0004\nnonsense\n")
+        status, body = self.gateway.json(f"/api/v1/histogram?dataset={name}")
+        self.assertNotEqual(status, 200)
+        self.assertIn("notes.nrrd", body["error"])
+        self.assertNotIn("/tmp", body["error"])
+        self.post(upload=upload, drop="true")
+
+    def test_a_header_cannot_name_other_files(self):
+        secret = self.programs.folder / "secret"
+        secret.write_bytes(bytes(range(64)))
+        for named in (str(secret), "../" + self.programs.folder.name + "/secret"):
+            header = f"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 4 4\nencoding: raw\ndata file: {named}\n".encode()
+            upload, name = self.send("header.nhdr", header)
+            status, body = self.gateway.json(f"/api/v1/histogram?dataset={name}")
+            self.assertNotEqual(status, 200)
+            self.assertRegex(body["error"], "another file, 'secret'")
+            self.post(upload=upload, drop="true")
+
+    def test_limits(self):
+        self.assertEqual(self.post(file="a.nii", bytes=0)[0], 400)
+        self.assertEqual(self.post(file="a.nii", bytes="x")[0], 400)
+        status, answer = self.post(file="a.nii", bytes=(1 << 30) + 1)
+        self.assertEqual((status, "--max-upload" in answer["error"]), (413, True))
+        self.assertEqual(self.gateway.request("/api/v1/upload?file=a&bytes=1", method="POST", body=b"", token=False)[0], 401)
+        self.assertEqual(self.gateway.request("/api/v1/upload?file=a&bytes=1")[0], 405)
+        _, begun = self.post(file="a.nii", bytes=10)
+        for begin, body in ((1, b"a"), (0, b"a" * 11), (11, b"")):
+            self.assertEqual(self.post(body, upload=begun["upload"], begin=begin)[0], 400, begin)
+        self.assertEqual(self.post(b"abc", upload=begun["upload"], begin=0), (200, {"received": 3}))
+        self.assertEqual(self.post(b"abc", upload=begun["upload"], begin=0), (200, {"received": 3}), "its answer was lost")
+        self.post(upload=begun["upload"], drop="true")
+        _, none = self.programs.gateway("--endpoint", self.endpoint, "--max-upload", "0")
+        self.assertEqual(none.request("/api/v1/upload?file=a&bytes=1", method="POST", body=b"")[0], 403)
+
+    def test_files_go_with_their_gateway(self):
+        child, gateway = self.programs.gateway("--endpoint", self.endpoint)
+        data = self.read("a.nrrd")
+        wait_until(lambda: gateway.request("/readyz")[0] == 200, "ready")
+        begun = gateway.json(f"/api/v1/upload?file=gone.nrrd&bytes={len(data)}", method="POST", body=b"")[1]
+        self.assertEqual(gateway.json(f"/api/v1/upload?upload={begun['upload']}&begin=0", method="POST", body=data)[1]["dataset"], "gone")
+        wait_until(lambda: "gone" in self.names(), "it is there")
+        child.kill()
+        child.wait()
+        self.programs.end(child)
+        wait_until(lambda: "gone" not in self.names(), "it is gone")
+
+
 class HttpTest(WithService):
     def test_pictures_are_the_files_of_the_command_line(self):
         cases = [
@@ -150,6 +243,22 @@ class HttpTest(WithService):
                 self.assertEqual(body, file)
                 posted = self.gateway.request(f"/api/v1/{kind}.png", method="POST", body=json.dumps(options))
                 self.assertEqual(posted[2], file)
+
+    def test_other_endings_make_other_files(self):
+        options = {"dataset": "a", "size": 60, "dpi": 200, "font-size": 9.5, "title": "A", "quality": 70, "background": "white"}
+        arguments = [f"--{name}={value}" for name, value in options.items() if name != "dataset"]
+        for ending, media in (("jpg", "image/jpeg"), ("webp", "image/webp"), ("tif", "image/tiff"), ("exr", "image/x-exr"),
+                              ("pdf", "application/pdf"), ("svg", "image/svg+xml")):
+            with self.subTest(ending=ending):
+                self.programs.run("render", "a", "--endpoint", self.endpoint, "-o", f"file.{ending}", *arguments)
+                status, headers, body = self.get(f"/api/v1/render.{ending}", **options)
+                self.assertEqual((status, headers["Content-Type"]), (200, media))
+                if ending != "svg":  # cairo counts the parts of its pictures in a process, and names them by their numbers
+                    self.assertEqual(body, (self.programs.folder / f"file.{ending}").read_bytes())
+        self.assertTrue(self.get("/api/v1/slice.pdf", dataset="a", size=40, plane="zyx")[2].startswith(b"%PDF"))
+        self.assertEqual(self.get("/api/v1/render.gif", dataset="a")[0], 404)
+        status, body = self.gateway.json("/api/v1/render.webp?dataset=a&size=16384x10")
+        self.assertEqual((status, body["error"]), (400, "--size 16384x10 is too large for .webp, which has at most 16383 pixels a side"))
 
     def test_a_colour_bar_has_a_caption_or_none(self):
         options = {"dataset": "a", "size": 200}
@@ -295,12 +404,31 @@ class HttpTest(WithService):
         self.assertEqual((box["voxels"], box["non_finite"], box["least"], box["largest"]), (8, 0, min(values), max(values)))
         self.assertAlmostEqual(box["mean"], mean, 9)
         self.assertAlmostEqual(box["deviation"], (sum((value - mean) ** 2 for value in values) / len(values)) ** 0.5, 9)
+        self.assertEqual(self.ask("statistics", dataset="b")["voxels"], 20 ** 3, "without a box: all")
         empty = self.ask("statistics", dataset="b", box="100:101,0:1,0:1")
         self.assertEqual(empty, {"voxels": 0, "non_finite": 0, "mean": None, "deviation": None, "least": None, "largest": None})
 
+    def test_labels_are_measured(self):
+        found = self.ask("statistics", dataset="c", labels="true")
+        self.assertEqual((found["unit"], [(each["value"], each["voxels"], each["volume"]) for each in found["labels"]]),
+                         ("voxels^3", [(3, 64, 64), (70, 64, 64)]))
+        corner = self.ask("statistics", dataset="c", box="0:3,0:3,0:3")
+        self.assertEqual({name: found["labels"][0][name] for name in corner}, corner)
+        self.assertEqual(found["labels"][0]["name"], 'Corner "low"')
+        boxed = self.ask("statistics", dataset="c", labels="true", box="0:3,0:3,-0.5:0.5")
+        self.assertEqual([each["voxels"] for each in boxed["labels"]], [16, 0])
+        self.assertIsNone(boxed["labels"][1]["mean"])
+        status, headers, body = self.get("/api/v1/statistics", dataset="c", labels="true", format="csv")
+        self.assertEqual((status, headers["Content-Type"]), (200, "text/csv; charset=utf-8"))
+        lines = list(csv.DictReader(io.StringIO(body.decode(), newline="")))
+        self.assertEqual([(line["value"], line["name"], line["voxels"]) for line in lines],
+                         [("3", 'Corner "low"', "64"), ("70", "Größte Ecke", "64")])
+        self.assertEqual(float(lines[0]["mean"]), corner["mean"])
+
     def test_pixels_show_points(self):
         # The ball's surface, seen along +y: from its geometry by hand.
-        options = {"dataset": "b", "renderer": "zbuffer", "size": 100}
+        from_above = {"dataset": "b", "renderer": "zbuffer", "size": 100, "fit": "false"}
+        options = {**from_above, "azimuth": 0, "elevation": 0}
         hit = self.ask("pick", x=50, y=50, **options)
         self.assertTrue(hit["hit"] and hit["inside"])
         self.assertAlmostEqual(hit["at"][0], 9.5, 6)
@@ -316,7 +444,7 @@ class HttpTest(WithService):
             other = self.ask("pick", x=50, y=50, transfer="opaque", **(options | {"renderer": renderer}))
             self.assertAlmostEqual(other["depth"], hit["depth"], delta=1, msg=renderer)
         # A view from above picks by the same camera as the picture.
-        above = self.ask("pick", x=50, y=50, view="top", **options)
+        above = self.ask("pick", x=50, y=50, view="top", **from_above)
         self.assertAlmostEqual(above["at"][0], 9.5, 6)
         self.assertGreater(above["at"][2], 14)
 
@@ -341,7 +469,9 @@ class HttpTest(WithService):
             ("profile", {"dataset": "a", "from": "0,0,0"}, 400, "to is missing"),
             ("profile", {"dataset": "a", "from": "0,0,0", "to": "1,1,1", "samples": 1}, 400, "samples"),
             ("joint-histogram", {"dataset": "nonesuch"}, 404, "nonesuch"),
-            ("statistics", {"dataset": "a"}, 400, "box is missing"),
+            ("statistics", {"dataset": "a", "labels": "maybe"}, 400, "labels 'maybe' is neither true nor false"),
+            ("statistics", {"dataset": "a", "format": "csv"}, 400, "format 'csv' is the table of labels"),
+            ("statistics", {"dataset": "a", "labels": "true"}, 400, "has no labels"),
             ("statistics", {"dataset": "a", "box": "1:0,0:1,0:1"}, 400, "box"),
             ("statistics", {"dataset": "nonesuch", "box": "0:1,0:1,0:1"}, 404, "nonesuch"),
             ("pick", {"dataset": "a", "x": 1}, 400, "y is missing"),
@@ -355,6 +485,12 @@ class HttpTest(WithService):
             self.assertIn(why, body["error"])
             self.assertNotIn("\n", body["error"])
         self.assertEqual(self.gateway.request("/api/v1/histogram", method="POST", body="{}")[0], 405)
+
+    def test_an_option_is_given_once(self):
+        for target, body in (("/api/v1/command?dataset=a&size=20&size=30", None), ("/api/v1/command", '{"dataset": "a", "size": 20, "size": 30}'),
+                             ("/api/v1/command?size=20", '{"dataset": "a", "size": 30}'), ("/api/v1/pick?dataset=a&x=1&x=2&y=3", None)):
+            status, answer = self.gateway.json(target, **({} if body is None else {"method": "POST", "body": body}))
+            self.assertEqual(status, 400, (target, body, answer))
 
     def test_a_render_that_nobody_waits_for_is_cancelled(self):
         heavy = {"dataset": "a", "renderer": "raycast", "sampling-rate": 16, "size": 4000, "opacity-distance": 1000, "termination": 0}
@@ -424,6 +560,8 @@ class HttpTest(WithService):
                 with self.assertRaisesRegex(Refused, "403"):
                     Page(self.gateway, headers=headers)
         self.assertIn(b" 403 ", self.gateway.raw(b"GET / HTTP/1.1\r\nConnection: close\r\n\r\n"))  # no Host
+        for twice in (f"Host: {own}\r\nHost: evil.example", f"Host: {own}\r\nHost: {own}", f"Host: {own}\r\nOrigin: http://{own}\r\nOrigin: http://evil.example"):
+            self.assertIn(b" 400 ", self.gateway.raw(f"GET /livez HTTP/1.1\r\n{twice}\r\nConnection: close\r\n\r\n".encode()), twice)
         with self.assertRaisesRegex(Refused, "401"):
             Page(self.gateway, protocols=["slabstream.view.v1"])
         with self.assertRaisesRegex(Refused, "400"):
@@ -676,6 +814,16 @@ class TurntableTest(unittest.TestCase):
         frames = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**marked, "azimuth": azimuth}))[2]))
                   for azimuth in (350, 170)]
         self.assertEqual(movie, b"".join(frames))
+        # Through cameras: the first one is the first frame, the last one the last.
+        path = [{"azimuth": 10, "elevation": 30}, {"azimuth": 50, "zoom": 2}]
+        look = {"dataset": "a", "size": "24x16", "background": "#204060", "renderer": "mip"}
+        moved = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**look, "frames": 3, "path": path}))[2]
+        ends = [movie_pixels(png_pixels(gateway.request("/api/v1/render.png?" + urllib.parse.urlencode({**look, **camera}))[2])) for camera in path]
+        self.assertEqual((moved[:len(ends[0])], moved[-len(ends[1]):]), tuple(ends))
+        self.assertEqual(len(moved), 3 * len(ends[0]))
+        timed = [{"time": 2, **path[0]}, {"time": 2.5, **path[1]}]
+        moved = gateway.request("/api/v1/turntable.mp4", method="POST", body=json.dumps({**look, "fps": 8, "path": timed}))[2]
+        self.assertEqual(len(moved), 5 * len(ends[0]), "as many frames as half a second has")
         # To clients of HTTP/1.0 the end of the connection is the movie's.
         old = gateway.raw(f"GET /api/v1/turntable.mp4?dataset=a&size=16&frames=2&token={gateway.token} HTTP/1.0\r\nHost: {gateway.authority}\r\n\r\n".encode())
         self.assertEqual(len(old.split(b"\r\n\r\n", 1)[1]), 2 * 16 * 16 * 3)
@@ -688,7 +836,9 @@ class TurntableTest(unittest.TestCase):
             ({}, 400, "dataset is missing"), ({"dataset": "none"}, 404, "none"), ({"dataset": "a", "frames": 0}, 400, "[1, 1000]"),
             ({"dataset": "a", "frames": 1001}, 400, "[1, 1000]"), ({"dataset": "a", "turns": -1}, 400, "turns"), ({"dataset": "a", "fps": "nan"}, 400, "fps"),
             ({"dataset": "a", "size": "33x32"}, 400, "must be even"), ({"dataset": "a", "size": "4096x2048"}, 400, "at most 4194304"),
-            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
+            ({"dataset": "a", "eye": "1,2,3"}, 400, "--eye"),
+            ({"dataset": "a", "path": "[{}, {}]", "azimuth": 3}, 400, "path excludes azimuth"), ({"dataset": "a", "path": "[{}]"}, 400, "2 to 1000 cameras"),
+            ({"dataset": "a", "path": '[{}, {"zoom": 0}]'}, 400, "camera 2 of the path: zoom"), ({"dataset": "a", "what": 1}, 400, "no option 'what'")]:
             got, body = gateway.json("/api/v1/turntable.mp4?" + urllib.parse.urlencode(fields))
             self.assertEqual((got, list(body)), (status, ["error"]), fields)
             self.assertIn(why, body["error"])
@@ -857,9 +1007,42 @@ class StartTest(unittest.TestCase):
             self.assertEqual(self.refused(*arguments)[0], 2, arguments)
 
     def test_behind_a_proxy(self):
-        (self.programs.folder / "token").write_text("0123456789abcdef\n")
-        _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--token-file", "token", "--listen", "127.0.0.1")
-        self.assertEqual((gateway.authority, gateway.token), ("viewer.example.org:8443", "0123456789abcdef"))
+        _, gateway = self.programs.gateway("--behind-proxy", "https://viewer.example.org:8443", "--listen", "127.0.0.1")
+        self.assertEqual(gateway.authority, "viewer.example.org:8443")
+
+    def test_a_token_of_a_file(self):
+        file = self.programs.folder / "token"
+        file.write_text("0123456789abcdef\n")
+        file.chmod(0o644)
+        code, why = self.refused("--token-file", "token")
+        self.assertEqual(code, 2)
+        self.assertIn("others can use 'token', which holds a secret", why)
+        file.chmod(0o600)
+        child = self.programs.start("slabstream-gateway", "--token-file", "token", "--listen", "127.0.0.1")
+        word, address = child.stdout.readline().split()
+        self.assertEqual(word, "ready")
+        self.assertNotIn("0123456789abcdef", address)  # standard output is kept by whoever collects logs
+        self.assertEqual(Gateway(address + "#token=0123456789abcdef").request("/metrics")[0], 200)
+
+    def test_frames_of_other_pages(self):
+        _, gateway = self.programs.gateway("--frame-in", "vscode-webview:", "--frame-in", "https://Hub.example.org")
+        policy = gateway.request("/")[1]["Content-Security-Policy"]
+        self.assertTrue(policy.endswith("frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview: https://hub.example.org"), policy)
+        for wrong in ("*", "x", "https://a;b", "https://a b", "a:b", "'none'"):
+            self.assertEqual(self.refused("--frame-in", wrong)[0], 2, wrong)
+
+    def test_view_with_a_port_and_a_token_that_stay(self):
+        self.programs.run("sphere", "--class", 1, "--size", 16, "--occupancy", 0.2, "-o", "a.nrrd")
+        addresses = []
+        for _ in range(2):
+            child = self.programs.start("slabstream", "view", "a.nrrd", "--no-browser", "--port", "0", "--token-file", "kept")
+            addresses.append(child.stdout.readline().split()[-1])
+            self.assertEqual(Gateway(addresses[-1]).request("/api/v1/render.png?dataset=a&size=16")[0], 200)
+            self.assertEqual(self.programs.end(child), 0)
+        tokens = [Gateway(address).token for address in addresses]
+        self.assertEqual(tokens, 2 * [(self.programs.folder / "kept").read_text().strip()])
+        self.assertEqual((self.programs.folder / "kept").stat().st_mode & 0o777, 0o600)
+        self.programs.run("view", "a.nrrd", "--port", "70000", expect=2)
 
     @unittest.skipUnless(shutil.which("openssl"), "openssl is not installed")
     def test_tls(self):

@@ -145,6 +145,56 @@ TEST(ViewMachineTest, SlowPicturesBecomeCoarserWhileTheViewMoves) {
                                                       ViewAction{.kind = Kind::kRender, .seq = 3, .coarseness = kMostCoarseness}));
 }
 
+class SmallPictures : public testing::Test {
+ protected:
+  // Of the next view's picture, which takes so long.
+  double ScaleOf(int begin, int ms, bool finest = true) {
+    const auto actions = machine.OnView(std::uint64_t(begin), At(begin));
+    const ViewAction render = actions.back();
+    EXPECT_EQ(render.kind, Kind::kRender);
+    machine.OnRendered(finest, false, At(begin + ms));
+    machine.OnEncoded(At(begin + ms + 1));
+    machine.OnAck(++frames_, At(begin + ms + 2));
+    return render.scale;
+  }
+  ViewMachine machine;
+
+ private:
+  std::uint64_t frames_ = 0;
+};
+
+TEST_F(SmallPictures, MoveWhereThereIsNoCoarserLevel) {
+  EXPECT_EQ(ScaleOf(1000, 500, false), 1);
+  EXPECT_EQ(ScaleOf(2000, 500), 1) << "a coarser level helped";
+  EXPECT_EQ(ScaleOf(3000, 130), 0.5);
+  EXPECT_EQ(ScaleOf(4000, 60), 0.25);
+  EXPECT_EQ(ScaleOf(5000, 20), 0.25);
+  EXPECT_EQ(ScaleOf(6000, 60), 0.5) << "larger ones may take four times as long";
+  // The view stands still: the whole picture, however long it takes.
+  const auto still = machine.OnTime(At(6150));
+  ASSERT_THAT(still, ElementsAre(Is(Kind::kRender)));
+  EXPECT_EQ(still[0].scale, 1);
+}
+
+TEST_F(SmallPictures, DoNotMoveWhereTheyTakeAsLong) {
+  EXPECT_EQ(ScaleOf(1000, 500), 1);
+  EXPECT_EQ(ScaleOf(2000, 450), 0.5);
+  EXPECT_EQ(ScaleOf(3000, 500), 1) << "the voxels take the time";
+  EXPECT_EQ(ScaleOf(4000, 500), 1);
+  EXPECT_EQ(ScaleOf(23000, 500), 1);
+  EXPECT_EQ(ScaleOf(24000, 450), 0.5) << "now and then it is tried again";
+  EXPECT_EQ(ScaleOf(25000, 500), 1);
+}
+
+TEST_F(SmallPictures, DoNotFollowFromReading) {
+  machine.OnView(1, At(0));
+  machine.OnLoading(At(4950));
+  machine.OnRendered(true, false, At(5000));
+  machine.OnEncoded(At(5001));
+  machine.OnAck(1, At(5002));
+  EXPECT_EQ(machine.OnView(2, At(6000)).back().scale, 1);
+}
+
 TEST(ViewMachineTest, SlowShadowsGoWhileTheViewMovesAndComeBack) {
   ViewMachine machine;
   std::uint64_t frames = 0;

@@ -27,10 +27,13 @@ trap end EXIT
 "$prefix/bin/slabstream" up --detach --workers 1 --listen 'tcp://127.0.0.1:*' --data ball=ball.nrrd > up.log
 endpoint="$(awk '/is up at/ { print $5; exit }' up.log)"
 "$prefix/bin/slabstream" render ball --endpoint "$endpoint" --azimuth 30 --size 256x256 -o commandline.png
+# By the module for OpenImageIO and cairo.
+for ending in exr pdf; do "$prefix/bin/slabstream" render ball --endpoint "$endpoint" --size 32 -o "module.$ending"; done
 
 echo "-- C++"
 build-cmake/picture "$endpoint" ball cmake.png
 ./picture-pkgconfig "$endpoint" ball pkgconfig.png
+./picture-pkgconfig "$endpoint" ball pkgconfig.exr
 if said="$(./picture-pkgconfig "$endpoint" nothing nothing.png 2>&1)"; then
   echo "a picture of no dataset: $said"
   exit 1

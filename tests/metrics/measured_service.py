@@ -91,6 +91,7 @@ class MeasuredService:
         self.children = []
         self.token_file = self.folder / "token"
         self.token_file.write_text(TOKEN + "\n")
+        self.token_file.chmod(0o600)
 
     def run(self, program, *arguments):
         return subprocess.run([str(self.programs / program), *map(str, arguments)], cwd=self.folder, env=self.environment,
@@ -126,7 +127,7 @@ class MeasuredService:
         child, log = self.start("slabstream-gateway", "--endpoint", self.endpoint, "--token-file", self.token_file, *arguments)
         line = child.stdout.readline().split()
         assert line and line[0] == "ready", log.read_text()
-        self.gateway = line[1].split("/#")[0].split("//")[1]
+        self.gateway = line[1].split("//")[1].rstrip("/")
         return child
 
     def start_all(self):

@@ -186,6 +186,7 @@ class StrangersTest(WithService):
         listen = ("--listen", "tcp://127.0.0.1:*")
         short = self.service.folder / "short"
         short.write_text("short\n")
+        short.chmod(0o600)
         for arguments, why in [
             (("--metrics", "0.0.0.0:0"), "--metrics 0.0.0.0 is not loopback: it needs --metrics-token-file"),
             (("--metrics", "x"), "--metrics 'x' is not a port"),

@@ -1,13 +1,16 @@
 """docs/notebook.ipynb runs from top to bottom, and show() embeds a viewer that works. Exit status 77: skipped, since nbconvert is missing."""
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
 import subprocess
 import sys
+import time
 import unittest
 import unittest.mock
+import urllib.error
 import urllib.request
 
 import numpy as np
@@ -23,6 +26,18 @@ except ImportError as missing:
     sys.exit(77)
 
 import slabstream as ss  # noqa: E402
+
+
+def when_ready(asked: urllib.request.Request, seconds: float = 60):
+    """The answer of a gateway that may not have found its service yet."""
+    limit = time.monotonic() + seconds
+    while True:
+        try:
+            return urllib.request.urlopen(asked)
+        except urllib.error.HTTPError as error:
+            if error.code != 503 or time.monotonic() > limit:
+                raise
+            time.sleep(0.05)
 
 
 class Notebook(InAFolder):
@@ -69,6 +84,29 @@ class Shows(WithAService):
         self.assertEqual(viewer._repr_mimebundle_()["image/png"], self.service.render("head", size=40, azimuth=30).png())
         with self.assertRaisesRegex(ss.InvalidArgument, "zoom"):
             self.service.show("head", zoom=0)
+
+    def test_where_pages_cannot_be_framed_the_address_stands_below_a_picture(self) -> None:
+        with unittest.mock.patch.dict(os.environ, {"VSCODE_PID": "7"}):
+            viewer = self.service.show("head", size=40)
+            framed = self.service.show("head", embed=True)
+        html = viewer._repr_mimebundle_()["text/html"]
+        png = re.search(r'<img alt="head" src="data:image/png;base64,([^"]+)">', html)[1]
+        self.assertEqual(base64.b64decode(png), self.service.render("head", size=40).png())
+        self.assertRegex(html, r'<a href="http://127.0.0.1:\d+/#token=[^"&]+&amp;dataset=head" target="_blank">Open the viewer of head</a>: http://127.0.0.1:\d+/<')
+        self.assertNotIn("<iframe", html)
+        self.assertIn("<iframe", framed._repr_mimebundle_()["text/html"])
+
+    def test_a_proxy_leads_to_the_viewer(self) -> None:
+        with unittest.mock.patch.dict(os.environ, {"JUPYTERHUB_SERVICE_PREFIX": "/user/a/"}):
+            viewer = self.service.show("head", behind_proxy="https://hub.test/user/a/proxy/{port}/")
+        port, token = re.match(r"https://hub\.test/user/a/proxy/(\d+)/#token=([^&]+)&dataset=head$", viewer.url).groups()
+        self.assertIn('<iframe src="https://hub.test/user/a/proxy/', viewer._repr_mimebundle_()["text/html"])
+        asked = urllib.request.Request(f"http://127.0.0.1:{port}/api/v1/datasets?token={token}", headers={"Host": "hub.test"})
+        with when_ready(asked) as answer:
+            self.assertEqual([each["name"] for each in json.load(answer)["datasets"]], ["head"])
+            self.assertIn("https://hub.test", answer.headers["Content-Security-Policy"])
+        with self.assertRaisesRegex(ss.InvalidArgument, "behind_proxy 'hub.test' is no address such as"):
+            self.service.show("head", behind_proxy="hub.test")
 
     def test_arrays_are_shown_and_stay(self) -> None:
         viewer = ss.show(np.full((8, 9, 10), 3, np.uint8), service=self.service, embed=False)

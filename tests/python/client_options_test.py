@@ -22,6 +22,7 @@ from client_support import ROOT, WithAService
 import slabstream as ss  # noqa: E402
 from slabstream import drafts, schema  # noqa: E402
 from slabstream.drafts import draft_of, slice_drafts_of  # noqa: E402
+from slabstream.errors import error_of  # noqa: E402
 from slabstream.options import COMMANDS  # noqa: E402
 from slabstream.volumes import check_spacing  # noqa: E402
 
@@ -89,6 +90,8 @@ RENDER_CASES: list[tuple[dict, list[str]]] = [
      ["--renderer", "xray", "--attenuation", "hounsfield", "--energy", "40", "--integral-window", "3", "--integral-level", "1", "--polarity",
       "dark-bone"]),
     ({"fit": True, "clip_box": "25:,:18.5,-5:12"}, ["--fit", "--clip-box", "25:,:18.5,-5:12"]),
+    ({"fit": False, "clip_box": "25:,:18.5,-5:12"}, ["--no-fit", "--clip-box", "25:,:18.5,-5:12"]),
+    ({"size": 96, "color_bar": True, "font_size": 9}, ["--size", "96", "--color-bar", "--font-size", "9"]),
     ({"renderer": "mip", "interpolation": "nearest", "projection_mode": "mean", "sampling_rate": 2},
      ["--renderer", "mip", "--interpolation", "nearest", "--projection-mode", "mean", "--sampling-rate", "2"]),
     ({"transfer": COLOR_MAP, "opacity_distance": 3.5}, ["--transfer", "map.json", "--opacity-distance", "3.5"]),
@@ -133,6 +136,7 @@ SLICE_CASES: list[tuple[dict, list[str]]] = [
     ({"plane": "anatomical", "scale_bar": True, "orientation_marker": True, "title": "Three"},
      ["--plane", "anatomical", "--scale-bar", "--orientation-marker", "--title", "Three"]),
     ({"plane": "coronal", "color_bar": "HU", "legend": True}, ["--plane", "coronal", "--color-bar=HU", "--legend"]),
+    ({"plane": "coronal", "color_bar": True, "font_size": 9}, ["--plane", "coronal", "--color-bar", "--font-size", "9"]),
     ({"plane": "axial", "window": "brain"}, ["--plane", "axial", "--window", "brain"]),
     ({"plane": "axial", "window": "soft-tissue", "level": 90}, ["--plane", "axial", "--window", "soft-tissue", "--level", "90"]),
     ({"plane": "sagittal", "window": 150}, ["--plane", "sagittal", "--window", "150"]),
@@ -252,7 +256,8 @@ class Pixels(WithAService):
     def test_every_option_is_compared(self) -> None:
         for command, cases in (("render", RENDER_CASES + GRID_CASES + LEVEL_CASES), ("slice", SLICE_CASES)):
             compared = {name for python, _ in cases for name in python}
-            self.assertEqual(set(COMMANDS[command]) - compared, set())
+            of_files = {"dpi", "quality"}  # which have no pixels of their own
+            self.assertEqual(set(COMMANDS[command]) - compared, of_files)
             for name in ("view", "renderer", "plane"):
                 if name in COMMANDS[command]:
                     self.assertEqual({python.get(name) for python, _ in cases} - {None}, set(COMMANDS[command][name].choices))
@@ -305,6 +310,16 @@ class Drift(unittest.TestCase):
         self.assertIn("(default: 1; from 0.001 to 10000)", words)
 
 
+    def test_texts_of_the_service_say_keywords(self) -> None:
+        for text, expected in (
+            ("view.up needs view.eye; without an eye, view.roll_degrees turns the picture", "up needs eye; without an eye, roll turns the picture"),
+            ("--clip-box '1' is not X0:X1,Y0:Y1,Z0:Z1", "clip_box '1' is not X0:X1,Y0:Y1,Z0:Z1"),
+            ("clipping.clip_planes[0].normal is 0,0,0", "clip_plane[0].normal is 0,0,0"),
+            ("--labels needs --local; see --keys, a.nrrd and docs/x.md", "labels needs --local; see --keys, a.nrrd and docs/x.md"),
+        ):
+            self.assertEqual(str(error_of(1, text)), expected)
+
+
 class Requests(unittest.TestCase):
     def test_values_are_pythons_or_the_command_lines(self) -> None:
         for python, text in (
@@ -347,7 +362,7 @@ class Requests(unittest.TestCase):
             ({"size": 0}, "size 0 is out of range [1, 16384]"),
             ({"size": (1, 2, 3)}, "size (1, 2, 3) is neither WIDTHxHEIGHT nor one number"),
             ({"shading": "toon"}, "shading 'toon' is not one of phong, none, depth-gradient"),
-            ({"renderer": "crayon"}, "renderer 'crayon' is not one of auto, splat, zbuffer, raycast, shear, mip, slice"),
+            ({"renderer": "crayon"}, "renderer 'crayon' is not one of auto, splat, raycast, zbuffer, shear, mip, slice"),
             ({"fit": "yes"}, "fit 'yes' is neither True nor False"),
             ({"look_at": (1, 2)}, "look_at (1, 2) is not X,Y,Z"),
             ({"light": (0, 0, 0)}, "light [0, 0, 0] has no direction"),
@@ -358,6 +373,8 @@ class Requests(unittest.TestCase):
             ({"background": "#12345"}, "background '#12345' is neither #rrggbb nor #rrggbbaa"),
             ({"isovalue": [3, 3]}, "isovalue [3, 3] has the value 3 twice"),
             ({"transfer": "none.json"}, "transfer 'none.json' does not exist"),
+            ({"transfer": 3}, "transfer 3 is neither the name of a preset nor a colour map of ParaView or matplotlib"),
+            ({"look_at": (1e301, 0, 0)}, "look_at 1e+301 is out of range [-1e+300, 1e+300]"),
             ({"transfer": {"Points": []}}, "transfer: not a colour map: RGBPoints is missing"),
             ({"transfer": {"Regions": [{"Values": [0, 1], "Color": [1, 1, 1]}]}}, "transfer: Regions[0] must have either Corners or Values and Slopes"),
             ({"transfer": {"Regions": [{"Corners": [0, 1], "Color": [1, 1, 1]}]}},
@@ -367,7 +384,7 @@ class Requests(unittest.TestCase):
             ({"view": "left", "azimuth": 3}, "view excludes azimuth"),
             ({"up": (0, 0, 1)}, "up requires eye"),
             ({"labels": "atlas.nii"}, "labels 'atlas.nii' must be True"),
-            ({"azimut": 3}, "there is no option 'azimut'; is 'azimuth' meant?"),
+            ({"azimut": 3}, "there is no option 'azimut'; did you mean 'azimuth'?"),
             ({"output": "a.png"}, "there is no option 'output'"),
         ):
             with self.subTest(given=given), self.assertRaises(ss.SlabstreamError) as caught:

@@ -8,6 +8,7 @@ import os
 import pathlib
 import shutil
 import signal
+import struct
 import subprocess
 import sys
 import tempfile
@@ -42,6 +43,13 @@ class AtAService(WithAService):
         self.assertEqual(image.statistics.renderer, "splat")
         self.assertGreater(image.statistics.worker_seconds["splat"], 0)
         self.assertGreaterEqual(image.statistics.latency_seconds, image.statistics.frame_seconds)
+
+    def test_the_view_is_that_of_the_command_line(self) -> None:
+        front = self.service.render("head", size=40)  # of a patient
+        np.testing.assert_allclose(front.geometry.forward, (0, -1, 0), atol=1e-12)
+        np.testing.assert_array_equal(np.asarray(front), np.asarray(self.service.render("head", size=40, azimuth=180, elevation=0, fit=True)))
+        whole, fitted = (self.service.render("head", size=40, clip_box=":30%,:30%,:30%", fit=fit) for fit in (False, True))
+        self.assertGreater(whole.geometry.pixel_size, fitted.geometry.pixel_size)
 
     def test_the_zbuffer_has_depths(self) -> None:
         image = self.service.render("head", renderer="zbuffer", size=50)
@@ -81,6 +89,38 @@ class AtAService(WithAService):
         with self.assertRaisesRegex(ss.InvalidArgument, "at '1,2' is not X,Y,Z"):
             self.service.value("head", at="1,2")
 
+    def test_labels_are_measured(self) -> None:
+        values, labels, _ = volume_arrays()
+        found = self.service.label_statistics("head")
+        self.assertEqual([(each.label.value, each.label.name) for each in found], [(1, "left_1"), (2, "left_2"), (3, "right_2")])
+        for each in found:
+            there = values[labels == each.label.value].astype(float)
+            self.assertEqual((each.voxels, each.non_finite, each.least, each.largest), (there.size, 0, there.min(), there.max()))
+            self.assertEqual((each.mean, each.unit), (there.sum() / there.size, "ml"))
+            self.assertAlmostEqual(each.deviation, there.std(), 9)
+            self.assertAlmostEqual(each.volume, there.size * 2 * 1.5 * 1.25 / 1000, 12)
+        z = -10 + 2 * 4  # of the slice with index 4
+        boxed = self.service.label_statistics("head", clip_box=((None, None), (None, None), (z - 0.5, z + 0.5)))
+        self.assertEqual([each.voxels for each in boxed], [int((labels[4] == value).sum()) for value in (1, 2, 3)])
+        self.assertTrue(all((each.mean is None) == (each.voxels == 0) for each in boxed))
+        with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
+            self.service.label_statistics("nothing")
+
+    def test_colour_maps_of_matplotlib_look_like_presets(self) -> None:
+        try:
+            import matplotlib
+        except ImportError:
+            self.skipTest("install python3-matplotlib")
+        preset = np.asarray(self.service.render("head", transfer="viridis", size=40, background="black")).astype(int)
+        same = np.asarray(self.service.render("head", transfer=matplotlib.colormaps["viridis"], size=40, background="black"))
+        self.assertLessEqual(np.abs(preset - same).max(), 3, "our table of it has fewer colours")
+        other = np.asarray(self.service.render("head", transfer="RdBu", size=40, background="black"))
+        self.assertGreater(np.abs(preset - other).max(), 30)
+        np.testing.assert_array_equal(np.asarray(self.service.slice("head", transfer=matplotlib.colormaps["viridis"], plane="z", size=20))[..., 3],
+                                      np.asarray(self.service.slice("head", transfer="viridis", plane="z", size=20))[..., 3])
+        with self.assertRaisesRegex(ss.SlabstreamError, "nonesuch"):
+            self.service.render("head", transfer="nonesuch")
+
     def test_a_pixel_shows_the_point_that_its_depth_says(self) -> None:
         options = dict(renderer="zbuffer", size=(50, 40), azimuth=40, elevation=25, zoom=1.3)
         image = self.service.render("head", **options)
@@ -106,10 +146,25 @@ class AtAService(WithAService):
         image = self.service.render("head", size=20)
         image.save(self.folder / "a.PNG")
         self.assertEqual((self.folder / "a.PNG").read_bytes(), image.png())
-        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png or .exr"):
+        with self.assertRaisesRegex(ss.InvalidArgument, "must end in .png, .*, .pdf or .svg"):
             image.save("a.gif")
         with self.assertRaisesRegex(ss.Unavailable, "cannot write '.*none/a.png': No such file"):
             image.save(self.folder / "none" / "a.png")
+
+    def test_other_types_are_those_of_the_command_line(self) -> None:
+        options = dict(size=(60, 50), dpi=200, font_size=9, title="A head", scale_bar=True, quality=60, background="white", azimuth=30)
+        image = self.service.render("head", **options)
+        arguments = ["--size=60x50", "--dpi=200", "--font-size=9", "--title=A head", "--scale-bar", "--quality=60", "--background=white", "--azimuth=30"]
+        image.save(self.folder / "a.svg")
+        self.assertIn(b"<image", (self.folder / "a.svg").read_bytes())
+        for ending in ("jpg", "webp", "tif", "pdf"):
+            image.save(self.folder / f"a.{ending}")
+            self.running.run("render", "head", "-o", f"b.{ending}", "--no-record", "--endpoint", self.running.endpoint, *arguments)
+            self.assertEqual((self.folder / f"a.{ending}").read_bytes(), (self.folder / f"b.{ending}").read_bytes(), ending)
+        self.assertIn(struct.pack(">II", round(200 / 0.0254), round(200 / 0.0254)), image.png())
+        image.save(self.folder / "a.tif", bits=16)
+        with self.assertRaisesRegex(ss.InvalidArgument, "bits is 16, but samples of .jpg have 8"):
+            image.save("a.jpg", bits=16)
 
     def test_openexr_has_the_samples_of_the_command_line(self) -> None:
         for renderer, size in (("zbuffer", (37, 21)), ("raycast", (50, 33))):
@@ -149,7 +204,7 @@ class AtAService(WithAService):
         self.assertFalse(self.service.submit("head", size=30).future.cancel())
 
         async def get() -> ss.Image:
-            return await asyncio.wrap_future(self.service.submit("head", size=30).future)
+            return await asyncio.wrap_future(self.service.submit("head", size=30, azimuth=0).future)
 
         np.testing.assert_array_equal(np.asarray(asyncio.run(get())), np.asarray(frames[0].result()))
         told: list = []
@@ -182,7 +237,14 @@ class AtAService(WithAService):
             np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, azimuth=azimuth)))
         still = list(self.service.turntable("head", 2, turns=0, size=30, eye=(100, 0, 0)))
         np.testing.assert_array_equal(np.asarray(still[0]), np.asarray(still[1]))
-        for given, sentence in (({"frames": 0}, "frames 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye fixes the viewpoint"),
+        path = [{"azimuth": 10, "elevation": 20}, {"azimuth": 100, "zoom": 2}, {}]
+        moved = list(self.service.turntable("head", 5, size=30, path=path))
+        for image, camera in zip(moved[::2], path):
+            np.testing.assert_array_equal(np.asarray(image), np.asarray(self.service.render("head", size=30, **camera)))
+        for given, sentence in (({"frames": 0}, "frames 0 is out of range"),
+                                ({"frames": 2, "path": [{}]}, "path must be a list of 2 to 1000 cameras"),
+                                ({"frames": 2, "path": [{}, {}], "azimuth": 3}, "path excludes azimuth"),
+                                ({"frames": 2, "path": [{}, {"zoom": 0}]}, "camera 2 of the path: zoom 0 is out of range"), ({"frames": 2, "eye": (1, 2, 3)}, "eye fixes the viewpoint"),
                                 ({"frames": 2, "in_flight": 65}, "in_flight 65 is out of range"), ({"frames": 2, "zoom": 0}, "zoom 0 is out")):
             with self.subTest(given=given), self.assertRaisesRegex(ss.InvalidArgument, sentence):
                 self.service.turntable("head", **given)
@@ -197,8 +259,8 @@ class AtAService(WithAService):
     def test_the_services_sentence_is_the_exceptions(self) -> None:
         for options, kind, sentence in (
             ({"dataset": "foot"}, ss.NotFound, "foot"),
-            ({"dataset": "head", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'auto', but shading 'depth-gradient' needs one of: zbuffer"),
-            ({"dataset": "head", "isovalue": 4}, ss.InvalidArgument, "renderer is 'auto', but isovalue needs one of: zbuffer, raycast"),
+            ({"dataset": "head", "renderer": "splat", "shading": "depth-gradient"}, ss.InvalidArgument, "renderer is 'splat', but shading 'depth-gradient' needs one of: zbuffer"),
+            ({"dataset": "head", "isovalue": 4, "energy": 60}, ss.InvalidArgument, "isovalue needs one of: raycast, zbuffer; energy needs one of: xray"),
             ({"dataset": "head", "fit": True, "renderer": "mip", "sampling_rate": 1, "combine": "knit"}, ss.InvalidArgument, "knit"),
         ):
             with self.subTest(options=options), self.assertRaises(kind) as caught:
@@ -453,6 +515,15 @@ class OwnService(InAFolder):
         (self.folder / "a.raw").write_bytes(values.tobytes())
         found = ss.render(f"{self.folder}/a.raw?dims=28,24,20,type=uint8", spacing=(2, 1.5, 1.25), size=30)
         np.testing.assert_array_equal(np.asarray(found), np.asarray(ss.render(values, spacing=(2, 1.5, 1.25), size=30)))
+
+    def test_a_wrong_option_is_told_before_anything_is_started(self) -> None:
+        ss.shutdown()
+        with unittest.mock.patch("slabstream.loading.running", side_effect=AssertionError("it is started")):
+            for call in (ss.render, ss.show):
+                with self.assertRaisesRegex(ss.UnknownOption, "there is no option 'azimut'; did you mean 'azimuth'"):
+                    call(volume_arrays()[0], azimut=3)
+                with self.assertRaisesRegex(ss.InvalidArgument, "zoom 0 is out of range"):
+                    call("none.nrrd", zoom=0)
 
     def test_what_is_wrong_is_told(self) -> None:
         with self.assertRaisesRegex(ss.NotFound, "volume '.*none.nrrd' does not exist"):

@@ -5,13 +5,14 @@ import json
 import subprocess
 import types
 import unittest
+import warnings
 
 import numpy as np
 
 from client_support import PROGRAM, InAFolder
 
 import slabstream as ss  # noqa: E402
-from slabstream.volumes import grid_of, volume_of, write_nrrd  # noqa: E402
+from slabstream.volumes import Grid, grid_of, labels_of, volume_of, write_nrrd  # noqa: E402
 
 
 def need(name: str):
@@ -56,8 +57,8 @@ class Files(InAFolder):
 
     def test_types_are_kept_or_converted_exactly(self) -> None:
         values = np.arange(2 * 3 * 4).reshape(2, 3, 4)
-        for dtype, file_type in (("bool", "u1"), ("uint8", "u1"), ("int8", "i1"), ("uint16", "<u2"), (">i2", "<i2"), ("int32", "<f4"),
-                                 ("uint32", "<f4"), ("int64", "<f4"), ("uint64", "<f4"), ("float16", "<f4"), (">f4", "<f4"), ("float64", "<f4")):
+        for dtype, file_type in (("bool", "u1"), ("uint8", "u1"), ("int8", "i1"), ("uint16", "<u2"), (">i2", "<i2"), ("int32", "<i4"),
+                                 (">u4", "<u4"), ("int64", "<i8"), ("uint64", "<u8"), ("float16", "<f4"), (">f4", "<f4"), ("float64", "<f4")):
             array = values.astype(dtype)
             np.testing.assert_array_equal(self.samples_in_file(array, file_type), array, dtype)
         for array in (np.asfortranarray(values.astype(np.uint8)), values.astype(np.uint8)[::-1, :, ::2]):
@@ -67,12 +68,9 @@ class Files(InAFolder):
 
     def test_other_arrays_are_refused_by_name(self) -> None:
         for array, sentence in (
-            (np.full((2, 2, 2), 0.1), "the array has samples of type float64, and 0.1 is no float32"),
-            (np.full((2, 2, 2), 2**24 + 1), "the array has samples of type int64, and 16777217 is no float32"),
-            (np.full((2, 2, 2), 2**60 + 1), "the array has samples of type int64, and 1152921504606846977 is no float32"),
             (np.zeros((2, 2, 2), complex), "the array has samples of type complex128"),
             (np.zeros((2, 2, 2), "M8[s]"), "the array has samples of type datetime64"),
-            (np.zeros((2, 2)), "the array has the shape (2, 2), must have 3 axes: z, y, x"),
+            (np.zeros(2), "the array has the shape (2,), must have 3 axes: z, y, x, or 2 of a slice: y, x"),
             (np.zeros((2, 0, 2)), "the array has the shape (2, 0, 2), each side must be in [1, 65535]"),
             ([1, 2, 3], "a list is no volume"),
             (3, "a int is no volume"),
@@ -80,6 +78,85 @@ class Files(InAFolder):
             with self.subTest(sentence), self.assertRaises(ss.InvalidArgument) as caught:
                 write_nrrd(volume_of(array), self.folder / "a.nrrd")
             self.assertTrue(str(caught.exception).startswith(sentence), str(caught.exception))
+
+    def test_values_are_rounded_as_those_of_files_are_with_a_warning(self) -> None:
+        for array, sentence in (
+            (np.full((2, 2, 2), 0.1), "pictures show the array's values of type float64 rounded to float32; array.astype"),
+            (np.array([[[0, 2**24 + 1]]]), "pictures show the array's values of type int64 rounded to float32; values at points and labels are exact"),
+            (np.full((2, 2, 2), 2**60 + 1), "pictures show the array's values of type int64 rounded"),
+            (np.array([[[0, 1e40, -1e300, np.inf, np.nan]]]), "2 values of the array are beyond those of float32 (3.4e38)"),
+        ):
+            with self.subTest(sentence), self.assertWarns(ss.SlabstreamWarning) as caught:
+                write_nrrd(volume_of(array), self.folder / "a.nrrd")
+            self.assertTrue(str(caught.warning).startswith(sentence), str(caught.warning))
+            self.assertEqual(caught.filename, __file__)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            for array in (np.full((2, 2, 2), 0.5), np.array([[[0, 2**40]]]), np.array([[[2**30, 2**30 + 1]]]), np.full((2, 2, 2), 0.1, np.float32)):
+                write_nrrd(volume_of(array), self.folder / "a.nrrd")
+
+    def test_whole_numbers_are_exact_where_values_are_told(self) -> None:
+        write_nrrd(volume_of(np.array([[[2**53 + 1, 0]]])), self.folder / "a.nrrd")
+        told = subprocess.run([PROGRAM, "value", self.folder / "a.nrrd", "--local", "--at", "0,0,0"], capture_output=True, text=True).stdout
+        self.assertTrue(told.strip().endswith("value 9007199254740993"), told)
+
+    def test_what_is_masked_is_not_shown(self) -> None:
+        whole = np.ma.masked_equal(np.arange(8, dtype=np.int16).reshape(2, 2, 2), 3)
+        found = self.samples_in_file(whole, "<f4").ravel()
+        np.testing.assert_array_equal(found, [0, 1, 2, np.nan, 4, 5, 6, 7])
+        np.testing.assert_array_equal(self.samples_in_file(np.ma.array(whole.data), "<i2"), whole.data)  # nothing is masked
+        np.testing.assert_array_equal(labels_of(whole).samples.ravel(), [0, 1, 2, 0, 4, 5, 6, 7])
+        dask = need("dask.array")
+        np.testing.assert_array_equal(self.samples_in_file(dask.array.from_array(whole, chunks=1), "<f4").ravel(), found)
+
+    def test_labels_are_whole_numbers(self) -> None:
+        with self.assertRaisesRegex(ss.InvalidArgument, "labels hold 1.5, must be whole numbers"):
+            labels_of(np.array([[[1, 1.5]]]))
+        self.assertEqual(labels_of(np.array([[[1.0, 2**24 + 1.0]]])).samples.ravel().tolist(), [1, 2**24 + 1])
+
+    def test_tensors_are_taken_if_numpy_can_view_them(self) -> None:
+        class Tensor:
+            """As torch has it: of a type that numpy does not know."""
+
+            def __init__(self, array: np.ndarray):
+                self.array, self.shape = array, array.shape
+                self.dtype = types.SimpleNamespace(name="torch.float32")
+
+            def __getitem__(self, at: slice) -> Tensor:
+                return Tensor(self.array[at])
+
+        class WithArray(Tensor):
+            def __array__(self, dtype=None) -> np.ndarray:
+                return self.array
+
+        class WithDlpack(Tensor):
+            def __dlpack__(self, **options) -> object:
+                return self.array.__dlpack__(**options)
+
+            def __dlpack_device__(self) -> tuple[int, int]:
+                return self.array.__dlpack_device__()
+
+        class Elsewhere(Tensor):
+            def __array__(self, dtype=None) -> np.ndarray:
+                raise TypeError("can't convert cuda:0 device type tensor to numpy.\nUse Tensor.cpu()")
+
+        values = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
+        for kind in (WithArray, WithDlpack):
+            np.testing.assert_array_equal(self.samples_in_file(kind(values), "<f4"), values)
+        with self.assertRaisesRegex(ss.InvalidArgument, "^the array has samples of type .*torch.float32.*, which numpy does not know"):
+            volume_of(Tensor(values))
+        with self.assertRaisesRegex(ss.InvalidArgument, "^numpy cannot view a client_volumes_test.Elsewhere: can't convert cuda:0|^numpy cannot view a __main__"):
+            volume_of(Elsewhere(values))
+
+    def test_torch_arrives(self) -> None:
+        torch = need("torch")
+        values = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
+        np.testing.assert_array_equal(self.samples_in_file(torch.from_numpy(values), "<f4"), values)
+
+    def test_jax_arrives(self) -> None:
+        jax = need("jax.numpy")
+        values = np.arange(8, dtype=np.float32).reshape(2, 2, 2)
+        np.testing.assert_array_equal(self.samples_in_file(jax.numpy.asarray(values), "<f4"), values)
 
     def test_geometry_is_refused_by_name(self) -> None:
         for given, sentence in (
@@ -128,7 +205,7 @@ class Files(InAFolder):
                               (None, [(0, 3), (3, 6), (6, 7)])):
             with self.subTest(chunks=chunks):
                 lazy = Chunks(array, chunks)
-                np.testing.assert_array_equal(self.samples_in_file(lazy, "<f4"), array)
+                np.testing.assert_array_equal(self.samples_in_file(lazy, "<u4"), array)
                 self.assertEqual(lazy.asked, asked)
 
     def test_xarray_coordinates_give_spacing_and_place(self) -> None:
@@ -143,6 +220,37 @@ class Files(InAFolder):
         np.testing.assert_array_equal(self.written(array, spacing=(1, 1, 1))[0], values)  # whatever is given says more
         with self.assertRaisesRegex(ss.InvalidArgument, "the coordinates of 'x' do not lie evenly"):
             volume_of(xarray.DataArray(values, dims=("z", "y", "x"), coords={"x": [0, 1, 2, 4]}))
+        volume_of(xarray.DataArray(values, dims=("z", "y", "x"), coords={"x": [0, 1, 2, 4]}), spacing=1)
+
+    def test_axes_of_xarray_are_known_by_name(self) -> None:
+        xarray = need("xarray")
+        values = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)  # z, y, x
+        places = {"z": [5, 8], "y": [3, 1, -1], "x": [0, 0.5, 1, 1.5]}
+        for z, y, x in (("Z", "Y", "X"), ("height", "latitude", "longitude"), ("level", "lat", "lon")):
+            with self.subTest(z):
+                array = xarray.DataArray(values, dims=(z, y, x), coords=dict(zip((z, y, x), places.values()))).transpose(x, y, z)
+                volume = volume_of(array)
+                np.testing.assert_array_equal(volume.samples, values)
+                self.assertEqual(volume.grid, Grid(((0.5, 0, 0), (0, -2, 0), (0, 0, 3)), (0, 3, 5), "scene"))
+        named = xarray.DataArray(values, dims=("a", "b", "c"), coords={"c": ("c", [0, 1, 2, 3], {"axis": "X"}), "b": ("b", [0, 1, 2], {"axis": "Y"}),
+                                                                      "a": ("a", [0, 1], {"axis": "Z"})})
+        np.testing.assert_array_equal(volume_of(named.transpose("c", "b", "a")).samples, values)
+
+    def test_depth_is_downwards(self) -> None:
+        xarray = need("xarray")
+        ocean = xarray.DataArray(np.zeros((4, 3, 2), np.uint8), dims=("lon", "lat", "depth"), coords={"depth": [10, 15]})
+        self.assertEqual(volume_of(ocean).grid, Grid(((1, 0, 0), (0, 1, 0), (0, 0, -5)), (0, 0, -10), "scene"))
+
+    def test_the_first_time_is_taken_with_a_warning(self) -> None:
+        xarray = need("xarray")
+        values = np.arange(48, dtype=np.uint8).reshape(2, 2, 3, 4)
+        with self.assertWarnsRegex(ss.SlabstreamWarning, r"^the DataArray has 2 of 'time': the first is taken; array.isel\(time=...\) chooses another one$"):
+            volume = volume_of(xarray.DataArray(values, dims=("time", "z", "y", "x")))
+        np.testing.assert_array_equal(volume.samples, values[0])
+        maps = xarray.DataArray(values[0], dims=("time", "lat", "lon"), coords={"time": np.array(["2026-01-01", "2026-02-01"], "M8[ns]"), "lon": [0, 2, 4, 6]})
+        self.assertEqual(volume_of(maps).grid.steps, ((2, 0, 0), (0, 1, 0), (0, 0, 1)))
+        with self.assertRaisesRegex(ss.InvalidArgument, "the DataArray has the axes dim_0, dim_1, dim_2, dim_3, must have 3"):
+            volume_of(xarray.DataArray(values))
 
     def test_dask_arrives(self) -> None:
         dask, values = need("dask.array"), np.arange(6 * 5 * 4, dtype=np.uint16).reshape(6, 5, 4)

@@ -93,7 +93,7 @@ class Sentences(unittest.TestCase):
         cls.addClassCleanup(made.cleanup)
         cls.folder = pathlib.Path(made.name)
         for experiment in EXPERIMENTS:
-            run = [PROGRAM, "experiment", experiment, "-o", cls.folder / experiment, "--quick", "--scale", "0.1"]
+            run = [PROGRAM, "experiment", experiment, "-o", cls.folder / experiment, "--quick", "--repeats", "1", "--scale", "0.1"]
             subprocess.run(run, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
         synthetic.sweep(cls.folder / "sweep")
         with open(cls.folder / "paper" / "results.jsonl", "a", encoding="utf-8") as results:

@@ -1,14 +1,18 @@
 #include "coordinator/background_actions.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <future>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "common/transport/socket.h"
 #include "common/volume/sphere.h"
 #include "coordinator/voxel_server.h"
+#include "tests/data/stores/scripted_server.h"
 
 namespace slabstream {
 namespace {
@@ -34,6 +38,41 @@ TEST(BackgroundActions, VoxelsAreServedWhenTheirEventIsHandledWhateverAnEarlierE
     if (loaded.size() == 1) background.Perform(drop);
   });
   EXPECT_EQ(loaded, std::vector<LoadId>({1, 2}));
+}
+
+// A server that takes requests and does not answer: more datasets of it than are loaded at a time, all asked for before a file.
+TEST(BackgroundActions, AServerThatDoesNotAnswerHoldsUpItsOwnDatasetsAlone) {
+  std::promise<void> end;
+  const std::shared_future<void> ended(end.get_future());
+  const ScriptedServer silent([&](const ServerRequest&) {
+    ended.wait();
+    return AnswerText("403 Forbidden", "");
+  });
+  const auto sphere = std::make_shared<const Volume>(MakeSphere({.size = 8}).value());
+  Context context;
+  const auto voxels = VoxelServer::Start(context, {"inproc://background-actions-silent-test"}, Epoch{8}).value();
+  BackgroundActions background({}, {}, {}, *voxels);
+  const std::size_t far = 2 * kLoadsAtOnce;
+  for (std::size_t i = 0; i < far; ++i) {
+    LoadDataset action{.name = fmt::format("far{}", i), .load = LoadId(i), .source = {fmt::format("{}/{}", silent.url(), i), ""}};
+    ASSERT_FALSE(background.Perform(action).has_value());
+  }
+  LoadDataset action{.name = "ball", .load = LoadId(far), .source = VolumeLoader([sphere] { return sphere; }), .most_bytes = 1 << 20};
+  ASSERT_FALSE(background.Perform(action).has_value());
+  std::vector<std::string> order;
+  const auto take = [&](std::size_t count) {
+    while (order.size() < count) {
+      Wait({}, &background.wakeup(), std::chrono::seconds(60));
+      background.HandleEvents([&](const CoordinatorEvent& event) {
+        if (const auto* loaded = std::get_if<DatasetLoaded>(&event)) order.push_back(loaded->name);
+        if (const auto* failed = std::get_if<DatasetFailed>(&event)) order.push_back(failed->name);
+      });
+    }
+  };
+  take(1);
+  EXPECT_EQ(order.front(), "ball");
+  end.set_value();
+  take(far + 1);
 }
 
 }  // namespace

@@ -411,25 +411,45 @@ TEST_F(CatalogueTest, BadArgumentsAreNamed) {
   ExpectError({"a=/" + std::string(4096, 'p')}, StatusCode::kInvalidArgument, "a path of 4097 bytes");
   ExpectError({"a=" + file + ".missing"}, StatusCode::kNotFound, "does not exist");
   ExpectError({"missing"}, StatusCode::kNotFound, "does not exist");
-  ExpectError({file}, StatusCode::kInvalidArgument, "NAME=");
   ExpectError({directory_.string(), directory_.string() + "/."}, StatusCode::kInvalidArgument, "the folder is given before it");
   EXPECT_EQ(FindData({"a=" + file + ".missing", "missing", "b=" + file}).errors.size(), 2U) << "each mistake is told";
 }
 
-TEST_F(CatalogueTest, InAFolderWhatCannotBeNamedIsLeftOutAndToldOf) {
+TEST_F(CatalogueTest, EveryFileOfAFolderIsServed) {
   Touch("head.nii.gz");
   Touch("head.nrrd");
   Touch("a b.nrrd");
+  Touch("Sch\u00e4del (2).nrrd");
+  Touch("foot.nrrd");
   const FoundData found = FindData({"foot=" + (directory_ / "head.nrrd").string(), directory_.string()});
   EXPECT_THAT(found.errors, testing::IsEmpty());
-  EXPECT_THAT(NamesOf(found), testing::ElementsAre("foot", "head"));
+  EXPECT_THAT(NamesOf(found), testing::ElementsAre("Sch_del_2", "a_b", "foot", "head", "head-2"));
+  EXPECT_EQ(found.datasets.at("head-2").path, (directory_ / "head.nrrd").string());
   EXPECT_THAT(found.complaints,
-              testing::ElementsAre(testing::AllOf(HasSubstr("a b.nrrd: left out"), HasSubstr("must have 1 to 256")),
-                                   testing::AllOf(HasSubstr("head.nrrd: left out"), HasSubstr("already a dataset named \"head\""))));
+              testing::ElementsAre(testing::AllOf(HasSubstr("foot.nrrd: left out"), HasSubstr("already a dataset named \"foot\"")),
+                                   testing::AllOf(HasSubstr("head.nrrd: its dataset is named \"head-2\""), HasSubstr("another file"))));
+  EXPECT_EQ(ListFolder(directory_.string())->datasets.at("head-2").path, found.datasets.at("head-2").path) << "the same at each search";
   std::filesystem::create_directory(directory_ / "empty");
   const FoundData empty = FindData({(directory_ / "empty").string()});
   EXPECT_THAT(empty.errors, testing::IsEmpty()) << "files may come";
   EXPECT_THAT(empty.complaints, testing::ElementsAre(HasSubstr("no volume file in this folder yet")));
+}
+
+TEST_F(CatalogueTest, WhatHasNoNameIsNamedAfterItsFile) {
+  const std::string head = Write("head.nrrd", 8), layer = Write("layer.nrrd", 5);
+  std::filesystem::create_directories(directory_ / "brain.ome.zarr");
+  std::ofstream(directory_ / "brain.ome.zarr" / "zarr.json") << R"({"zarr_format": 3, "node_type": "group"})";
+  std::filesystem::create_directory(directory_ / "other");
+  std::filesystem::copy_file(head, directory_ / "other" / "head.nrrd");
+  const FoundData found = FindData({head + "?spacing=1,1,2,labels=" + layer, (directory_ / "brain.ome.zarr").string(),
+                                    (directory_ / "other" / "head.nrrd").string(), "last=" + head});
+  EXPECT_THAT(found.errors, testing::IsEmpty());
+  EXPECT_THAT(NamesOf(found), testing::ElementsAre("brain", "head", "head-2", "last"));
+  EXPECT_THAT(found.folders, testing::IsEmpty()) << "a store is one volume";
+  EXPECT_EQ(found.datasets.at("head").path, head + "?spacing=1,1,2");
+  EXPECT_EQ(found.datasets.at("head").layers.labels, layer);
+  EXPECT_THAT(found.complaints, testing::ElementsAre(HasSubstr("named \"head-2\"")));
+  ExpectError({(directory_ / "other").string() + ",labels=" + layer}, StatusCode::kInvalidArgument, "a folder to watch");
 }
 
 TEST_F(CatalogueTest, AFolderOfSlicesIsOneVolumeUntilOtherVolumesLieInIt) {
@@ -489,9 +509,11 @@ TEST_F(CatalogueTest, TimesOfAFileAreDatasets) {
 
   FoundData beyond = FindData({"beat=" + file + "?time=2:9", "one=" + file});
   CheckFiles(beyond);
-  ASSERT_EQ(beyond.errors.size(), 2U) << "one error for all times";
+  ASSERT_EQ(beyond.errors.size(), 1U) << "one error for all times";
   EXPECT_THAT(beyond.errors[0].message(), testing::AllOf(testing::StartsWith("dataset \"beat@4\": "), HasSubstr("must be in [0, 3]")));
-  EXPECT_THAT(beyond.errors[1].message(), HasSubstr("holds 4 volumes"));
+  const Result<LoadedSource> first = LoadWhole(beyond.datasets.at("one"));
+  ASSERT_TRUE(first.ok()) << first.status().message();
+  EXPECT_THAT(first->volume->block.bytes, testing::Each(std::byte{'a'})) << "who names no time gets the first one";
   ExpectError({"beat=" + file + "?time=0:10000"}, StatusCode::kInvalidArgument, "time 0:10000 names 10001 volumes, limit 10000");
   ExpectError({"beat=" + file + "?time=3:2"}, StatusCode::kInvalidArgument, "FIRST must not be above LAST");
   ExpectError({"beat@1=" + file}, StatusCode::kInvalidArgument, "dataset name \"beat@1\" must have 1 to 256 letters");

@@ -109,6 +109,20 @@ TEST_P(TaskFailuresTest, OfAllWorkersAreToldAtOnceAndTheServiceLivesOn) {
 INSTANTIATE_TEST_SUITE_P(Tasks, TaskFailuresTest, testing::Values("box", "render", "encode", "combine", "picture", "send"),
                          [](const auto& test) { return std::string(test.param); });
 
+TEST_F(FailuresTest, WhoComesToTheOthersEndpointIsTold) {
+  StartOne();
+  WorkerOptions options;
+  options.coordinator_endpoint = coordinator_->client_endpoint();
+  const auto worker = WorkerService::Start(context_, std::move(options)).value();
+  worker->WaitUntilRegistered();  // or stopped
+  EXPECT_EQ(worker->ended().code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(worker->ended().message(), HasSubstr("endpoint for clients; workers connect to " + coordinator_->worker_endpoint()));
+  const Status client = Client::Connect(context_, coordinator_->worker_endpoint(), seconds(60)).status();
+  EXPECT_EQ(client.code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(client.message(), HasSubstr("endpoint for workers; clients connect to " + coordinator_->client_endpoint()));
+  EXPECT_TRUE(Render().ok());
+}
+
 TEST_F(FailuresTest, ARendererThatThrowsIsReportedWithWhatItSaid) {
   Start({TaskHook(), TaskHook()}, [](const RendererKind&) -> std::unique_ptr<Renderer> { throw std::runtime_error("no such shader"); });
   ExpectFailure(Render(), StatusCode::kInternal, "render: no such shader");

@@ -128,7 +128,8 @@ TEST_F(InPartsTest, PicturesAreThoseOfVoxelsInMemory) {
     Start(path);
     for (const RendererKind* renderer : VoxelRenderers()) {
       for (FrameRequest& request : RequestsFor(renderer)) {
-        SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name() << ", azimuth " << request.view.azimuth_degrees);
+        SCOPED_TRACE(testing::Message() << path << ", renderer " << renderer->name() << ", azimuth "
+                                        << request.view.azimuth_degrees.value_or(0));
         request.level = "0";
         ExpectPictureOf(request, *ball_);
       }
@@ -555,11 +556,11 @@ TEST_F(InPartsTest, AnswersAreThoseOfVoxelsInMemory) {
     constexpr std::uint64_t kNoLimit = 0;
     Start(path, 1, kNoLimit);
     const std::vector<VolumeSample> held = client_->SampleAt("ball", points).value();
-    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value();
+    const BoxStatistics statistics = client_->StatisticsIn("ball", box).value().statistics;
     const SummaryReply summary = client_->Summarize("ball").value();
     Start(path, 1);
     EXPECT_EQ(client_->SampleAt("ball", points).value(), held);
-    EXPECT_EQ(client_->StatisticsIn("ball", box).value(), statistics);
+    EXPECT_EQ(client_->StatisticsIn("ball", box).value().statistics, statistics);
     const SummaryReply in_parts = client_->Summarize("ball").value();
     EXPECT_EQ(in_parts.description, summary.description);
     EXPECT_EQ(in_parts.range, summary.range);

@@ -190,7 +190,7 @@ TEST_F(KeysOfServiceTest, PicturesComeThroughTheCoordinatorIfNobodyListensAtTheD
 
 TEST(PictureSockets, AClientThatNamesManyKeysTakesFewSockets) {
   Context context;
-  PictureSockets sockets(context, MakeKeyPair());
+  PictureSockets sockets(context, MakeKeyPair(), 1);
   const Time now = MonotonicNow();
   for (std::size_t i = 0; i < PictureSockets::kMostConnections + 10; ++i) {
     sockets.Prepare({"tcp://127.0.0.1:9", MakeKeyPair().public_key}, now);
@@ -201,8 +201,10 @@ TEST(PictureSockets, AClientThatNamesManyKeysTakesFewSockets) {
 }
 
 TEST_F(KeysOfServiceTest, WhoeverHasNoKeyOfTheRoleIsRefused) {
-  // Without keys, nobody answers; with those of a stranger or of a worker, the service says so.
-  EXPECT_FALSE(Client::Connect(client_context_, coordinator_->client_endpoint(), milliseconds(500)).ok());
+  // At once, long before the time-out: without a key, with that of a stranger, and with a worker's.
+  const Status without = Client::Connect(client_context_, coordinator_->client_endpoint(), seconds(60)).status();
+  EXPECT_EQ(without.code(), StatusCode::kInvalidArgument);
+  EXPECT_THAT(without.message(), HasSubstr("has keys: name its service file"));
   ServiceFile stranger = FileOf(Role::kClient);
   stranger.own = MakeKeyPair();
   for (const ServiceFile& file : {stranger, FileOf(Role::kWorker)}) {
@@ -269,6 +271,26 @@ TEST_F(KeysOfServiceTest, ARevokedKeyIsRefusedAndItsConnectionsEnd) {
   EXPECT_THAT(ConnectWith(old_file, seconds(2)).status().message(), HasSubstr("refuses the key"));
   Client new_client = ConnectAs(Role::kClient);
   EXPECT_TRUE(new_client.Render(TestRequest(Splatting(), 20)).ok());
+}
+
+TEST_F(KeysOfServiceTest, AKeyOfAPersonIsAdmittedAtOnceAndRevokedAlone) {
+  Client admin = ConnectAs(Role::kAdmin), other = ConnectAs(Role::kClient);
+  ServiceFile annas = FileOf(Role::kClient);
+  annas.own = MakeKeyPair();
+  const KeysOrder issue{.action = KeysAction::kIssue, .role = Role::kClient, .key = annas.own.public_key, .name = "anna"};
+  EXPECT_EQ(other.OrderKeys(issue).status().code(), StatusCode::kInvalidArgument);
+  Result<std::vector<AdmittedKey>> keys = admin.OrderKeys(issue);
+  ASSERT_TRUE(keys.ok()) << keys.status().message();
+  EXPECT_EQ(keys->back().name, "anna");
+  EXPECT_FALSE(keys->back().silent_ms) << "nobody has come with it";
+  Client anna = ConnectWith(annas).value();
+  ASSERT_TRUE(anna.QueryStatus().ok());
+  keys = admin.OrderKeys({});
+  ASSERT_TRUE(keys.ok());
+  EXPECT_TRUE(keys->back().silent_ms);
+  ASSERT_TRUE(admin.OrderKeys({.action = KeysAction::kRevoke, .key = "anna"}).ok());
+  EXPECT_FALSE(anna.QueryStatus(seconds(2)).ok());
+  EXPECT_TRUE(other.QueryStatus().ok());
 }
 
 TEST_F(KeysOfServiceTest, AWorkerWhoseKeyIsRevokedIsLostAndEnds) {

@@ -14,6 +14,7 @@
 #include "common/mesh/lattice.h"
 #include "common/mesh/mesh_part.h"
 #include "common/planning/frame_plan.h"
+#include "common/renderers/renderer_choice.h"
 #include "common/volume/sphere.h"
 #include "tests/support/renderers.h"
 #include "worker/renderers/renderer.h"
@@ -97,13 +98,13 @@ float LargestDifference(const A& a, const B& b, ImageSize size) {
 
 // Accumulated opacity differs by rounding and by what termination hides; pictures of other formats are identical.
 inline float AllowedDifference(const FrameRequest& request) {
-  const PixelFormat format = RenderersFor(request.renderer).value().front()->format();
+  const PixelFormat format = RenderersFor(request).value().front()->format();
   return format == PixelFormat::kRgba ? 2e-5F + float(request.termination) : 0.0F;
 }
 
 // The least alpha that the most opaque pixel of a test picture has: opacity accumulates, but a projection shows that of one value.
 inline double ExpectedAlpha(const FrameRequest& request) {
-  const PixelFormat format = RenderersFor(request.renderer).value().front()->format();
+  const PixelFormat format = RenderersFor(request).value().front()->format();
   return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
 }
 

@@ -65,7 +65,7 @@ ClientToCoordinator HostileWords::OfClient(const Policy& policy) {
 }
 
 ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
-  switch (random_.Integer(0, 13)) {
+  switch (random_.Integer(0, 14)) {
     case 0:
     case 1: {
       SubmitFrame submit = RandomRequest(random_, policy, Number(), random_.Chance(0.5) ? Number32() : random_.Integer(1U, 86400000U));
@@ -96,6 +96,7 @@ ClientToCoordinator HostileWords::MakeOfClient(const Policy& policy) {
       return add;
     }
     case 12: return PrefetchQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
+    case 13: return ViewQuery{.nonce = Number(), .frame = RandomRequest(random_, policy, Number(), 1).frame};
     default: return SampleQuery{.nonce = Number(), .dataset = random_.Chance(0.5) ? "volume" : "nonesuch", .points = {{1, 2, 3}}};
   }
 }

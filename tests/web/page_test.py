@@ -76,7 +76,7 @@ class PageTest(unittest.TestCase):
         (cls.programs.folder / "big.nrrd").write_bytes(big + gzip.compress(bytes(1 << 20), 1) * BIG_MEGABYTES)
         cls.programs.run("sphere", "--class", 2, "--size", 130, "-o", "v.nrrd")
         cls.programs.run("convert", "v.nrrd", "v.ome.zarr")
-        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "big=big.nrrd")
+        cls.data = ("--data", "levels=v.ome.zarr", "--data", "patient=p.nrrd,labels=l.nrrd:names.txt,overlay=o.nrrd", "--data", "sphere=s.nrrd", "--data", "grid=g.vtk", "--data", "cells=c.nrrd", "--data", "other=o.nrrd", "--data", "big=big.nrrd", "--data", "later=big.nrrd")
         cls.service, cls.endpoint = cls.programs.up(*cls.data)
         cls.process, cls.gateway = cls.programs.gateway("--endpoint", cls.endpoint)
         wait_until(lambda: cls.gateway.request("/readyz")[0] == 200, "ready")
@@ -365,7 +365,7 @@ class PageTest(unittest.TestCase):
         viewer.until("document.querySelector('.facts dd') !== null")
         viewer.find(".by-gradient input[role=switch]").click()
         # The values span 220 over voxels of 2: a steep gradient is a quarter of that, and the curve reaches 1 at 0.4 of it.
-        drawn = viewer.final("o['gradient-opacity'] !== undefined && o.renderer === 'raycast'")
+        drawn = viewer.final("o['gradient-opacity'] !== undefined && o.renderer === 'auto' && h.statistics.plan.renderer === 'raycast'")
         first, steep = drawn["options"]["gradient-opacity"].split(",")
         self.assertEqual((first.split(":")[1], steep.split(":")[1]), ("0", "1"))
         self.assertAlmostEqual(float(steep.split(":")[0]), 0.4 * 0.25 * 220 / 2, delta=0.3)
@@ -502,7 +502,7 @@ class PageTest(unittest.TestCase):
         viewer.until("document.querySelector('.facts dd') !== null")
         viewer.open_section("Layers")
         viewer.driver.find_element(By.XPATH, "//input[@value = 'tint']").click()
-        viewer.final("o.renderer === 'raycast' && o['label-mode'] === 'tint'")
+        viewer.final("o.renderer === 'auto' && o['label-mode'] === 'tint' && h.statistics.plan.renderer === 'raycast'")
         tinted = viewer.pixels()
         self.assertEqual(viewer.js("[...document.querySelectorAll('[data-label]')].map(row => row.dataset.label + ' ' + row.querySelector('.label-name').textContent)"), ["1 left", "2 middle", "3 right"])
         viewer.find("[data-label='2'] input[type=checkbox]").click()
@@ -533,7 +533,7 @@ class PageTest(unittest.TestCase):
         viewer.driver.find_element(By.XPATH, "//div[@class='button-row']/button[. = 'Left']").click()
         viewer.final("o.light && o.light.length === 1")
         for renderer in ("mip", "zbuffer", "splat", "shear"):
-            viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => s.value === 'raycast' || s.value === 'mip' || s.value === 'zbuffer' || s.value === 'splat'))", renderer)
+            viewer.js("(s => { s.value = arguments[0]; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'mip')))", renderer)
             drawn = viewer.final(f"o.renderer === '{renderer}'")
             self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
 
@@ -546,14 +546,14 @@ class PageTest(unittest.TestCase):
         light = "[...document.querySelectorAll('details')].find(d => d.querySelector('h2').textContent === 'Light')"
         self.assertFalse(volume.js(f"{light}.querySelector('.button-row').hidden"))
         viewer = self.viewer(dataset="grid", sampling_rate=2)
-        drawn = viewer.final("o['sampling-rate'] === '2' && h.statistics.plan.renderer === 'slice'")
+        drawn = viewer.final("o['sampling-rate'] === undefined && h.statistics.plan.renderer === 'slice'")
         self.assertEqual(drawn["options"]["renderer"], "auto", "which draws the cells")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.until(f"{renderers}.includes('slice')")
         self.assertEqual(viewer.js(renderers)[0], "auto")
         self.assertFalse(viewer.js(f"{light}.querySelector('.button-row').hidden"), "cells are lit, too")
         viewer.js("(s => { s.value = 'slice'; s.dispatchEvent(new Event('change')); return true; })([...document.querySelectorAll('select')].find(s => [...s.options].some(o => o.value === 'slice')))")
-        drawn = viewer.final("o.renderer === 'slice'")
+        drawn = viewer.final("o.renderer === 'slice' && o['sampling-rate'] === '2'")
         self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
         viewer.save(SHOTS, "grid")
 
@@ -644,11 +644,11 @@ class PageTest(unittest.TestCase):
         viewer.drag(50, 0)
         viewer.final("o.azimuth === 160")
         viewer.find(".dataset select").find_element(By.XPATH, "option[. = 'sphere']").click()
-        viewer.final("o.dataset === 'sphere' && o.azimuth === 150 && o.elevation === 15 && o['look-at']")
+        viewer.final("o.dataset === 'sphere' && o.azimuth === 30 && o.elevation === 20 && o['look-at']")
         viewer.drag(50, 0)
-        viewer.final("o.azimuth === 130")
+        viewer.final("o.azimuth === 10")
         viewer.keys("r")
-        viewer.final("o.azimuth === 150")
+        viewer.final("o.azimuth === 30")
         linked = self.viewer(dataset="sphere", azimuth=180, elevation=0)
         linked.settled()
         linked.until("document.querySelector('.facts dd') !== null")
@@ -888,6 +888,148 @@ class PageTest(unittest.TestCase):
         press(Keys.TAB)
         self.assertEqual(viewer.js("document.querySelectorAll('.pane').length"), panes, "in fields letters are text")
 
+    def test_shortcuts_are_those_of_every_keyboard(self):
+        viewer = self.viewer()
+        viewer.settled()
+
+        def press(key, code, modifiers=0):
+            for kind in ("rawKeyDown", "keyUp"):
+                viewer.command("Input.dispatchKeyEvent", type=kind, key=key, code=code, modifiers=modifiers)
+
+        viewer.drag(30, 0)
+        for key, code in (("к", "KeyR"), ("ρ", "KeyR"), ("ר", "KeyR"), ("r", "KeyO")):  # Russian, Greek, Hebrew; Dvorak, where R is printed there
+            viewer.drag(30, 0)
+            viewer.final("o.azimuth !== 180")
+            press(key, code)
+            viewer.final("o.azimuth === 180")
+        press("é", "Digit2")  # French: the digit is above it
+        viewer.final("o.azimuth === 0")
+        press("à", "Digit0")
+        for key, code, modifiers in (("х", "BracketLeft", 0), ("ü", "BracketLeft", 0), ("[", "Digit8", 3)):  # Russian; German, by place and by AltGr
+            before = viewer.final("true")["options"].get("scalar-range", "")
+            press(key, code, modifiers)
+            viewer.final(f"o['scalar-range'] !== undefined && o['scalar-range'] !== '{before}'")
+        last = viewer.final("true")["options"]["scalar-range"]
+        press("я", "KeyZ", 2)
+        viewer.final(f"o['scalar-range'] !== '{last}'")
+        viewer.js("(document.querySelector('.panel').hidden || document.querySelector(\"[aria-label='Settings']\").click(), true)")
+        press("p", "Semicolon")  # Dvorak or Bépo: the letter counts
+        viewer.until("!document.querySelector('.panel').hidden")
+
+    def test_another_dataset_keeps_what_applies(self):
+        viewer = self.viewer(azimuth=140, elevation=20, label_mode="tint", renderer="raycast")
+        first = viewer.settled()["options"]
+        viewer.drag(20, 0, keys=["shift"])
+        viewer.drag(60, 0, button="right")
+        before = viewer.final(f"o['scalar-range'] !== undefined && o['look-at'] !== '{first['look-at']}'")
+
+        def show(name):
+            viewer.js("(s => (s.value = arguments[0], s.dispatchEvent(new Event('change', {bubbles: true})), true))(document.querySelector('.dataset select'))", name)
+
+        # The same place of the same world: what is seen is the same but for the voxels.
+        show("other")
+        other = viewer.final("o.dataset === 'other'")
+        self.assertEqual({**other["options"], "dataset": 0}, {**{k: v for k, v in before["options"].items() if not k.startswith("label")}, "dataset": 0})
+        viewer.keys(Keys.CONTROL, "z")
+        viewer.final("o.dataset === 'other' && o['scalar-range'] === undefined")
+        viewer.keys(Keys.CONTROL, "y")
+        show("patient")
+        self.assertEqual(viewer.final("o.dataset === 'patient' && o['label-mode']")["options"], before["options"])
+        # Another world: it is framed anew, and seen from where datasets of its kind are.
+        show("cells")
+        cells = viewer.final("o.dataset === 'cells' && o['look-at'] !== undefined && o.azimuth !== 140")
+        self.assertNotEqual(cells["options"]["look-at"], before["options"]["look-at"])
+        self.assertEqual(cells["options"]["renderer"], "raycast")
+        # A range that the other dataset does not have is dropped.
+        far = self.viewer(scalar_range="1000:2000")
+        far.final("o['scalar-range'] === '1000:2000'")
+        far.js("(s => (s.value = 'other', s.dispatchEvent(new Event('change', {bubbles: true})), true))(document.querySelector('.dataset select'))")
+        far.final("o.dataset === 'other' && o['scalar-range'] === undefined")
+
+    def test_a_file_that_is_dropped_is_shown(self):
+        viewer = self.viewer()
+        viewer.settled()
+        drop = """(() => { const d = new DataTransfer(), bytes = Uint8Array.from(atob(arguments[0]), c => c.charCodeAt(0)); d.items.add(new File([bytes], arguments[1]));
+            document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()"""
+        data = (self.programs.folder / "o.nrrd").read_bytes()
+        viewer.js(drop, base64.b64encode(data).decode(), "my brain.nrrd")
+        drawn = viewer.final("o.dataset === 'my_brain' && o['look-at'] !== undefined")
+        self.assertSamePixels(viewer.pixels(), self.command_line(drawn))
+        viewer.until("document.querySelector('.dataset select').value === 'my_brain' && document.querySelector('.sending').hidden")
+        viewer.save(SHOTS, "dropped")
+        viewer.js(drop, base64.b64encode(b"nothing").decode(), "notes.txt")
+        viewer.until("document.querySelector('.banner:not([hidden])')?.textContent.includes('notes.txt')")
+        self.assertNotIn("/tmp", viewer.js("document.querySelector('.banner').textContent"))
+        viewer.save(SHOTS, "dropped-wrong")
+        viewer.js(drop, "", "empty.nii")
+        viewer.until("document.querySelector('.message.error')?.textContent.includes('empty.nii: the file is empty')")
+
+    def test_a_large_file_is_sent_with_a_bar_and_can_be_given_up(self):
+        viewer = self.viewer(self.proxy(delay=0.2).port)
+        viewer.settled()
+        viewer.js("""(() => { const d = new DataTransfer(); d.items.add(new File([new Uint8Array(40 << 20)], 'large.nrrd'));
+            document.querySelector('canvas').dispatchEvent(new DragEvent('drop', {bubbles: true, cancelable: true, dataTransfer: d})); return true; })()""")
+        viewer.until("/Sending large.nrrd: [1-9].* of 42 MB/.test(document.querySelector('.sending').textContent)")
+        viewer.save(SHOTS, "sending")
+        viewer.find(".sending button").click()
+        viewer.until("document.querySelector('.sending').hidden")
+        wait_until(lambda: all(each["name"] != "large" for each in self.gateway.json("/api/v1/datasets")[1]["datasets"]), "it is dropped")
+
+    def test_no_curve_is_made_up_while_a_dataset_is_read(self):
+        viewer = self.viewer(dataset="later")
+        viewer.until("document.querySelector('.plot .curve') !== null && document.querySelector('.progress-text').textContent.startsWith('Reading')")
+        self.assertEqual(viewer.js("[document.querySelector('.plot .curve').getAttribute('d') || '', document.querySelectorAll('.plot .point').length]"), ["", 0])
+        viewer.settled()
+        viewer.until("document.querySelector('.plot .curve').getAttribute('d').length > 10")
+
+    def test_a_colour_bar_tells_values(self):
+        viewer = self.viewer(color_bar=1, background="#ffffff")
+        viewer.settled()
+        ticks = "[...document.querySelectorAll('[data-pane=\"3d\"] .color-bar text')].map(t => Number(t.textContent.replace('−', '-')))"
+        viewer.until(f"{ticks}.length >= 3")
+        before = viewer.js(ticks)
+        self.assertEqual(before, sorted(before))
+        viewer.save(SHOTS, "color-bar")
+        viewer.drag(150, 0, button="right")
+        viewer.until(f"({ticks}).join() !== '{','.join(f'{tick:g}' for tick in before)}'")
+        viewer.open_section("Transfer function")
+        viewer.js("[...document.querySelectorAll('.row.toggle')].find(r => r.textContent === 'Colour bar').querySelector('input').click()")
+        viewer.until("document.querySelector('.color-bar') === null")
+
+    def test_key_frames_are_kept_and_saved(self):
+        viewer = self.viewer()
+        viewer.settled()
+        viewer.keys("n")
+        viewer.drag(50, 25)
+        viewer.final("o.azimuth !== 180")
+        viewer.keys("n")
+        viewer.until("location.hash.includes('path=')")
+        viewer.command("Page.setDownloadBehavior", behavior="allow", downloadPath=str(self.programs.folder))
+        viewer.open_section("Key frames")
+        viewer.driver.find_element(By.XPATH, "//button[contains(., 'Save for --path')]").click()
+        saved = self.programs.folder / "path.json"
+        wait_until(saved.exists, "saved")
+        path = json.loads(saved.read_text())
+        self.assertEqual([camera["azimuth"] for camera in path], [180, 160])
+        self.assertEqual(set(path[0]), {"projection", "azimuth", "elevation", "roll", "zoom", "look-at"})
+        viewer.find("[aria-label='Show key frame 1']").click()
+        viewer.final("o.azimuth === 180")
+        viewer.keys("v")
+        viewer.until("[...document.querySelectorAll('dialog label')].some(l => l.textContent === '2 key frames')")
+        viewer.save(SHOTS, "key-frames")
+
+    def test_labels_are_measured(self):
+        asked = []
+        answer = {"unit": "ml", "labels": [{"value": 2, "name": "middle", "color": "#40c080", "volume": 7.469, "voxels": 934, "non_finite": 0, "mean": 140.5, "deviation": 9.75, "least": 124, "largest": 180}]}
+        viewer = self.viewer(self.proxy(answers={"/api/v1/statistics": lambda fields, _: asked.append(fields) or (answer if fields.get("labels") else None)}).port)
+        viewer.settled()
+        viewer.open_section("Measure")
+        viewer.until("[...document.querySelectorAll('.section button')].some(b => b.textContent === 'Labels…' && b.checkVisibility())")
+        viewer.driver.find_element(By.XPATH, "//button[contains(., 'Labels…')]").click()
+        viewer.until("document.querySelector('.label-table tbody tr')?.innerText.split('\\t').join() === '2,middle,7.469,140.5,9.75,124,180'")
+        self.assertEqual(asked[0]["dataset"], "patient")
+        viewer.save(SHOTS, "label-table")
+
     def test_the_clip_box_opens_its_section(self):
         viewer = self.viewer()
         viewer.settled()
@@ -1053,9 +1195,16 @@ class PageTest(unittest.TestCase):
         self.assertEqual(viewer.js(outside), [])
         self.assertEqual(viewer.js("document.documentElement.scrollWidth"), 360)
         viewer.save(SHOTS, "narrow-machine")
-        viewer.find("[aria-label='Machine panel']").click()
+        viewer.find("[aria-label='Views']").click()
+        viewer.driver.find_element(By.XPATH, "//button[@role='menuitem'][contains(., 'Machine panel')]").click()
         viewer.find("[aria-label='Settings']").click()
         viewer.until("document.querySelector('.panel:not([hidden])') !== null")
+        # Fingers hit what they mean: 44 pixels each way.
+        small = """[...document.querySelectorAll('button, select, summary, .panel input:not([type=checkbox])')].filter(e => e.checkVisibility() && !e.matches('.offscreen, .skip, [type=radio]'))
+            .filter(e => { const b = e.getBoundingClientRect(); return b.height < 43.5 || (e.matches('button') && b.width < 43.5); }).map(e => e.outerHTML.slice(0, 80))"""
+        self.assertEqual(viewer.js(small), [])
+        reset = viewer.find("[aria-label='Reset the view']")
+        self.assertTrue(reset.is_displayed())
         self.assertEqual(viewer.js("[document.documentElement.scrollWidth, document.querySelector('.panel').scrollWidth <= 360]"), [360, True])
         viewer.save(SHOTS, "narrow-settings")
 
@@ -1121,6 +1270,30 @@ class PageTest(unittest.TestCase):
         self.assertSamePixels(viewer.pixels(), picture)
         viewer.drag(30, 0)
         viewer.final("o.azimuth < 180")
+
+    def test_a_connection_that_dies_without_a_word_is_noticed_and_made_anew(self):
+        proxy = self.proxy()
+        viewer = self.viewer(proxy.port, layout="quad")
+        viewer.settled()
+        viewer.final("true", "axial")
+        proxy.freeze()
+        viewer.drag(30, 0)
+        viewer.until("document.querySelector('.status').textContent === 'Not connected'")
+        viewer.final("o.azimuth < 180")
+        viewer.until("document.querySelector('.status').dataset.state === 'good' && document.querySelector('.banner').hidden")
+        viewer.keys(Keys.ARROW_UP, pane="axial")  # the other panes' connections, too
+        viewer.js("(window.drawn.length = 0, true)")
+        viewer.keys(Keys.ARROW_UP, pane="axial")
+        viewer.final("true", "axial")
+
+    def test_without_its_script_the_page_says_so(self):
+        viewer = Viewer(self.driver, "about:blank")
+        self.addCleanup(viewer.close)
+        viewer.command("Network.enable")
+        viewer.command("Network.setBlockedURLs", urls=["*page.js"])
+        viewer.driver.get(self.url())
+        viewer.until("getComputedStyle(document.querySelector('.unstarted')).visibility === 'visible'")
+        self.assertIn("script has not started", viewer.js("document.body.innerText"))
 
     def test_a_worker_is_seen_dying_while_the_picture_stays(self):
         viewer = self.viewer(machine=1)

@@ -17,7 +17,7 @@ class Proxy:
         self.strays = []
         self.listener = socket.create_server(("127.0.0.1", 0))
         self.port = self.listener.getsockname()[1]
-        self.open = set()
+        self.open, self.relayed, self.frozen = set(), set(), set()
         self.lock = threading.Lock()
         self.ended = False
         threading.Thread(target=self._accept, daemon=True).start()
@@ -31,6 +31,11 @@ class Proxy:
                 connection.shutdown(socket.SHUT_RDWR)
             except OSError:
                 pass
+
+    def freeze(self):
+        """The open WebSockets carry nothing any more, and nobody is told, as when a network forgets them. New ones work."""
+        with self.lock:
+            self.frozen |= self.relayed
 
     def close(self):
         self.ended = True
@@ -102,6 +107,7 @@ class Proxy:
         upstream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         with self.lock:
             self.open.add(upstream)
+            self.relayed |= {connection, upstream}
         upstream.sendall(first)
         back = threading.Thread(target=self._carry, args=(upstream, connection), daemon=True)
         back.start()
@@ -135,6 +141,8 @@ class Proxy:
                 chunk = source.recv(65536)
             except OSError:
                 chunk = b""
+            if chunk and source in self.frozen:
+                continue
             under_way.put((time.monotonic() + self.delay, chunk))
             if not chunk:
                 break

@@ -58,7 +58,9 @@ begin="$(date +%s.%N)"
 install whole /wheels
 installed="$(date +%s.%N)"
 in_root whole python -c 'import slabstream as ss
-ss.render("ball.nrrd", size=200, title="A ball", scale_bar=True).save("ball.png")'
+image = ss.render("ball.nrrd", size=200, title="A ball", scale_bar=True)
+for ending in ("png", "tif", "pdf"):
+    image.save("ball." + ending)'
 awk -v a="$begin" -v b="$installed" -v c="$(date +%s.%N)" 'BEGIN { printf "%.1f s, of which the installation %.1f s\n", c - a, b - a }'
 /usr/bin/python3 -c 'import sys, numpy, PIL.Image
 here, there = (numpy.asarray(PIL.Image.open(path)) for path in sys.argv[1:])

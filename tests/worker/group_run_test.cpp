@@ -293,7 +293,7 @@ TEST(GroupRun, AScheduleThatDoesNotFitIsAFailure) {
   }
 }
 
-TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
+TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankOrOfAnotherFormatAreIgnored) {
   GroupAssignment assignment = MakeAssignment(2, "fan-in", 0);
   assignment.group.placements[1].worker = 2;
   assignment.display = 1;
@@ -309,6 +309,12 @@ TEST(GroupRun, ImagesFromWorkersThatDoNotOwnTheRankAreIgnored) {
   run.OnPartial(PartialImage(stranger), {}, actions);
   EXPECT_TRUE(actions.empty());
   stranger.from_worker = 2;
+  for (const PixelFormat format : {PixelFormat::kDepth, PixelFormat::kRgbaDepth, PixelFormat::kMaximum, PixelFormat::kSum}) {
+    stranger.image.format = format;
+    run.OnPartial(PartialImage(stranger), {}, actions);
+    EXPECT_TRUE(actions.empty()) << "it combines with no image of the frame";
+  }
+  stranger.image.format = assignment.setup.format;
   run.OnPartial(PartialImage(stranger), {}, actions);
   EXPECT_EQ(actions.size(), 1U);
 }

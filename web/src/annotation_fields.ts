@@ -8,7 +8,7 @@ import type { State } from "./state";
 const MOST_TITLE = 120;
 
 export function annotationFields(state: State): { elements: HTMLElement[]; options(): Options } {
-  const shown: Record<string, boolean> = { "scale-bar": state.scaleBar, "orientation-marker": state.marker };
+  const shown: Record<string, boolean> = { "scale-bar": state.scaleBar, "color-bar": state.colorBar, "orientation-marker": state.marker };
   const flags = offered("Annotations").filter(({ type }) => type === undefined).map(({ name, help }) => {
     const control = toggle(words(name), on => { shown[name] = on; });
     control.set(shown[name] ?? false);

@@ -14,6 +14,12 @@ export function pageGeometry({ frame: { header }, cssWidth }: Shown): Geometry {
   return { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / cssWidth };
 }
 
+// Whether dark lines stand out better on it (WCAG 2.2, relative luminance).
+function isLight([r, g, b]: readonly [number, number, number, number]): boolean {
+  const linear = (c: number): number => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+  return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) > 0.18;
+}
+
 const AXIS_DIRECTIONS: readonly Vec3[] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 // 1, 2 or 5 times a power of ten, as near as possible to a fifth of the width.
@@ -110,10 +116,30 @@ function legendOf(labels: readonly LegendEntry[], width: number, height: number)
     ...(rows.length < labels.length ? [line(rows.length, `and ${labels.length - rows.length} more`, "")] : []));
 }
 
+const BAR = { width: 12, right: 44, top: 0.2, bottom: 64, least: 80 } as const;
+
+// Values for ticks: some four multiples of 1, 2 or 5 times a power of ten.
+function ticksOf({ low, high }: ColorBar): number[] {
+  const step = roundLength((high - low) / 4), first = Math.ceil(low / step - 1e-9);
+  return Array.from({ length: Math.max(0, Math.floor(high / step + 1e-9) - first + 1) }, (_, i) => (first + i) * step);
+}
+
+// Values upwards. `above`: what the legend takes.
+function colorBar(bar: ColorBar, width: number, height: number, above: number): SVGElement {
+  const top = Math.max(height * BAR.top, above + 24), long = height - BAR.bottom - top, x = width - BAR.right - BAR.width, { colors, low, high } = bar;
+  if (long < BAR.least) return svg("g");
+  const y = (value: number): number => top + long * (1 - (value - low) / (high - low)), step = long / colors.length;
+  return svg("g", { class: "color-bar" }, ...colors.map((color, i) => svg("rect", { x, y: top + long - (i + 1) * step, width: BAR.width, height: step + 0.5, fill: color })),
+    svg("rect", { x, y: top, width: BAR.width, height: long, class: "frame" }),
+    ...ticksOf(bar).flatMap(value => [svg("path", { d: `M${x - 5} ${y(value)}h5` }), svg("text", { x: x - 8, y: y(value), "text-anchor": "end", "dominant-baseline": "central" }, text(value))]));
+}
+
+export interface ColorBar { low: number; high: number; colors: readonly string[] } // low < high; evenly spread, from low to high
 export interface LegendEntry { name: string; color: string }
 interface Crosshair { at: Vec3; lines: boolean }
 export interface Annotations {
   marker: boolean; scaleBar: boolean; sides: boolean; crosshair: Crosshair | null; measures: readonly DrawnMeasure[]; legend: readonly LegendEntry[];
+  bar?: ColorBar | null;
   slice?: Cut; // measurements beside it are faint
 }
 
@@ -125,17 +151,20 @@ export class Drawing {
   draw(shown: Shown, which: Annotations): void {
     const { cssWidth: width, cssHeight: height } = shown, geometry = pageGeometry(shown), { right, up, forward, world, pixel_size, projection, unit } = geometry;
     put(this.element, "viewBox", `0 0 ${width} ${height}`);
+    put(this.element, "data-ground", isLight(shown.frame.header.background) ? "light" : "dark");
     this.part("crosshair", which.crosshair && [project(geometry, width, height, which.crosshair.at), which.crosshair.lines, width, height], () => crosshair(geometry, width, height, which.crosshair as Crosshair));
     const placed = which.measures.length > 0 && which.measures.map(each => [each, each.measure.points.map(p => project(geometry, width, height, p))]);
     this.part("measures", placed && [placed, which.slice], () => svg("g", {}, ...which.measures.map(each => drawnMeasure(geometry, width, height, each, which.slice))));
     this.part("legend", which.legend.length > 0 && width > 320 && [which.legend, width, height], () => legendOf(which.legend, width, height));
+    const rows = width > 320 ? Math.min(which.legend.length, LEGEND_MOST) : 0;
+    this.part("bar", which.bar && width > 240 && [which.bar, rows, width, height], () => colorBar(which.bar as ColorBar, width, height, rows * LEGEND_ROW));
     this.part("sides", which.sides && world === "patient" && [sideNames(geometry), width, height], () => patientSides(geometry, width, height));
     this.part("axes", which.marker && height > 160 && [right, up, forward, world, height], () => axesMarker(geometry, height));
     this.part("scale", which.scaleBar && width > 160 && [pixel_size, projection, unit, width, height], () => scaleBar(geometry, width, height));
   }
 
-  // `of`: what the part is made from; false or null: there is none.
-  private part(name: string, of: readonly unknown[] | false | null, make: () => SVGElement): void {
+  // `of`: what the part is made from; false, null or undefined: there is none.
+  private part(name: string, of: readonly unknown[] | false | null | undefined, make: () => SVGElement): void {
     let part = this.parts.get(name);
     if (!part) {
       part = { of: "", place: svg("g") };

@@ -15,6 +15,10 @@ export interface Dataset {
 }
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
+export interface LabelStatistics {
+  unit: string; // of volumes
+  labels: { value: number; name: string; volume: number; mean: number | null; deviation: number | null; least: number | null; largest: number | null }[];
+}
 export interface LabelName { value: number; name: string; color?: string }
 export interface Value { inside?: boolean; hit?: boolean; at?: Vec3; voxel?: [number, number, number] | null; value?: number | null; label?: LabelName | null }
 
@@ -26,11 +30,16 @@ export class Api {
   // Whether the gateway has said that it has no such address.
   lacks(path: string): boolean { return this.missing.has(path); }
 
-  async ask(path: string, fields: Record<string, string> = {}, body?: Options, signal?: AbortSignal): Promise<Response> {
+  ask = (path: string, fields: Record<string, string> = {}, body?: Options, signal?: AbortSignal): Promise<Response> =>
+    this.request(path, fields, body ? { method: "POST", body: JSON.stringify(body) } : {}, signal);
+
+  // Bytes, as they are.
+  send = (path: string, fields: Record<string, string>, body: ArrayBuffer | null, signal?: AbortSignal): Promise<Response> =>
+    this.request(path, fields, { method: "POST", body }, signal);
+
+  private async request(path: string, fields: Record<string, string>, what: RequestInit, signal?: AbortSignal): Promise<Response> {
     const query = new URLSearchParams(fields).toString();
-    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, {
-      method: body ? "POST" : "GET", headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(body ? { body: JSON.stringify(body) } : {}), ...(signal ? { signal } : {}),
-    });
+    const response = await fetch(`api/v1/${path}${query ? `?${query}` : ""}`, { ...what, headers: { Authorization: `Bearer ${this.token}` }, cache: "no-store", ...(signal ? { signal } : {}) });
     if (response.ok) return response;
     const answer = (await response.json().catch(() => null)) as { error?: string } | null;
     throw new ApiError(response.status, answer?.error ?? `${path}: ${response.status} ${response.statusText}`);
@@ -55,6 +64,7 @@ export class Api {
   value = (dataset: string, at: Vec3, signal?: AbortSignal): Promise<Value | null> => this.maybe("value", { dataset, at: at.join(",") }, undefined, signal);
   profile = (dataset: string, from: Vec3, to: Vec3): Promise<Profile | null> => this.maybe("profile", { dataset, from: from.join(","), to: to.join(",") });
   statistics = (dataset: string, box: string): Promise<BoxStatistics | null> => this.maybe("statistics", { dataset, box });
+  labelStatistics = (dataset: string): Promise<LabelStatistics | null> => this.maybe("statistics", { dataset, labels: "true" });
   pick = (options: Options, x: number, y: number, signal?: AbortSignal): Promise<Value | null> => this.maybe("pick", {}, { ...options, x, y }, signal);
 
   private async maybe<T>(path: string, fields: Record<string, string>, body?: Options, signal?: AbortSignal): Promise<T | null> {

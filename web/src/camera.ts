@@ -20,10 +20,10 @@ export const OTHER_SIDES: readonly Side[] = [
 ];
 export const sidesOf = (world: string | undefined): readonly Side[] => (world === "patient" ? PATIENT_SIDES : OTHER_SIDES);
 
-// Where a view begins: at a patient's front, else a little beside and above the back, so that three sides show.
+// Where a view begins: the service's default view (common/view/default_view.h).
 type Start = Pick<State, "azimuth" | "elevation">;
 export const PATIENT_START: Start = { azimuth: 180, elevation: 0 };
-export const startOf = (world: string): Start => (world === "patient" ? PATIENT_START : { azimuth: 150, elevation: 15 });
+export const startOf = (world: string): Start => (world === "patient" ? PATIENT_START : { azimuth: 30, elevation: 20 });
 
 type View = Pick<State, "azimuth" | "elevation" | "roll" | "zoom" | "lookAt">;
 

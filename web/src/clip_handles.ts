@@ -30,6 +30,7 @@ export class ClipHandles {
   readonly element = svg("svg", { class: "tools" });
   private readonly edges = svg("path", { class: "clip-edges" });
   private readonly handles: SVGCircleElement[] = [];
+  private readonly reaches: SVGCircleElement[] = [];
   private last: readonly [number, number] = [0, 0]; // of the pointer that drags
   private shown: Shown | null = null;
   private box: ClipBox | null = null;
@@ -39,15 +40,19 @@ export class ClipHandles {
     this.element.append(this.edges);
     for (const axis of AXES) for (const end of [0, 1] as const) {
       const handle = svg("circle", { r: 7, class: `handle axis-${AXIS_NAMES[axis]}`, tabindex: 0, role: "slider", "aria-label": `Clip ${AXIS_NAMES[axis]} ${end === 0 ? "from" : "to"}` });
-      handle.addEventListener("pointerdown", event => { handle.setPointerCapture(event.pointerId); this.last = [event.clientX, event.clientY]; event.preventDefault(); });
-      handle.addEventListener("pointermove", event => {
-        if (!handle.hasPointerCapture(event.pointerId)) return;
-        this.drag(axis, end, event.clientX - this.last[0], event.clientY - this.last[1]);
-        this.last = [event.clientX, event.clientY];
-      });
+      const reach = svg("circle", { r: 22, class: "reach" }); // of a finger
+      for (const part of [reach, handle]) {
+        part.addEventListener("pointerdown", event => { part.setPointerCapture(event.pointerId); this.last = [event.clientX, event.clientY]; event.preventDefault(); });
+        part.addEventListener("pointermove", event => {
+          if (!part.hasPointerCapture(event.pointerId)) return;
+          this.drag(axis, end, event.clientX - this.last[0], event.clientY - this.last[1]);
+          this.last = [event.clientX, event.clientY];
+        });
+      }
       handle.addEventListener("keydown", event => this.press(axis, end, event));
       this.handles.push(handle);
-      this.element.append(handle);
+      this.reaches.push(reach);
+      this.element.append(reach, handle);
     }
   }
 
@@ -67,8 +72,7 @@ export class ClipHandles {
     for (const axis of AXES) for (const end of [0, 1] as const) {
       const handle = this.handles[2 * axis + end] as SVGCircleElement, value = (end === 0 ? low : high)[axis];
       const [x, y] = at(withAxis(middle, axis, value));
-      handle.setAttribute("cx", String(x));
-      handle.setAttribute("cy", String(y));
+      for (const part of [handle, this.reaches[2 * axis + end] as SVGCircleElement]) { part.setAttribute("cx", String(x)); part.setAttribute("cy", String(y)); }
       handle.setAttribute("aria-valuenow", String(rounded(value)));
       handle.setAttribute("aria-valuemin", String(rounded(volume.low[axis])));
       handle.setAttribute("aria-valuemax", String(rounded(volume.high[axis])));

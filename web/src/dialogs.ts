@@ -18,7 +18,7 @@ export function dialog(title: string, ...content: (HTMLElement | null)[]): HTMLD
 const POINTER_HELP: readonly (readonly [string, string])[] = [
   ["Drag", "Turn"], ["Shift and drag, or middle button", "Move"], ["Wheel", "Zoom about the pointer"], ["Ctrl and drag", "Roll"],
   ["Right button and drag", "Window and level: sideways widens, upwards brightens"], ["Double click", "Put the cross-hair there"],
-  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Load it as a colour map (ParaView’s JSON)"],
+  ["One finger", "Turn"], ["Two fingers", "Move, zoom and roll"], ["Drop a file", "Show it: a volume, or a colour map (ParaView’s JSON)"],
 ];
 
 export function helpDialog(groups: readonly KeyGroup[]): void {

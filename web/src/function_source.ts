@@ -1,6 +1,10 @@
 // The transfer function as points: that of the state, or what its preset is for this dataset, which the gateway tells.
+import type { ColorBar } from "./annotations";
 import type { Context } from "./context";
-import { type ColorMap, parseParaView, ramp, rangeOf, stretched } from "./transfer";
+import { can } from "./offers";
+import { colorAt, type ColorMap, hexOf, parseParaView, ramp, rangeOf, stretched, visibleRangeOf } from "./transfer";
+
+const BAR_COLORS = 64;
 
 export class FunctionSource {
   private readonly presets = new Map<string, ColorMap | null>(); // null: the gateway does not tell
@@ -23,6 +27,20 @@ export class FunctionSource {
   get untold(): boolean {
     const { map, preset } = this.context.store.state;
     return map === null && this.presets.get(this.key(preset)) === null;
+  }
+
+  // Whether the points are on their way: nothing is known of them yet.
+  get pending(): boolean {
+    const { map, preset } = this.context.store.state;
+    return map === null && this.presets.get(this.key(preset)) === undefined;
+  }
+
+  // What colours of the picture mean; null: no bar can say it.
+  bar(): ColorBar | null {
+    const { state } = this.context.store;
+    const map = this.current(), [low, high] = visibleRangeOf(map);
+    if (this.pending || map.regions || !can("transfer", state.renderer) || (state.surfaces.length > 0 && state.surfacesAlone && can("isosurfaces", state.renderer))) return null;
+    return low < high ? { low, high, colors: Array.from({ length: BAR_COLORS }, (_, i) => hexOf(colorAt(map, low + ((high - low) * (i + 0.5)) / BAR_COLORS))) } : null;
   }
 
   // The user's own function in the place of the present one.

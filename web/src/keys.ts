@@ -13,18 +13,35 @@ function actsOn(target: EventTarget | null, key: string): boolean {
   return target instanceof Element && !document.querySelector("dialog[open]") && !target.matches(TEXT_FIELDS) && !(key.startsWith("Arrow") && target.matches(ARROW_CONTROLS));
 }
 
+// Keys whose place counts where their letter is none of ours, by their places on the keyboard of the United States.
+const PLACES: Readonly<Record<string, string>> = { BracketLeft: "[{", BracketRight: "]}", Comma: ",<", Period: ".>", Minus: "-_", Equal: "=+", Slash: "/?" };
+
+// What a key may mean, the likelier first: what it types; and where that is no Latin letter (Greek, Cyrillic, Hebrew, Arabic, ...), or a sign
+// in the place of a digit or a bracket (French, Czech, ...), what its place would type. A letter is found where it is printed.
+export function meaningsOf({ key, code, shiftKey }: Pick<KeyboardEvent, "key" | "code" | "shiftKey">): readonly string[] {
+  const typed = key.length === 1 ? key.toLowerCase() : key;
+  if (/^[a-z0-9]$/.test(typed)) return [typed];
+  const placed = /^Key([A-Z])$|^Digit([0-9])$/.exec(code), place = placed ? (placed[1] ?? placed[2] ?? "").toLowerCase() : PLACES[code]?.charAt(shiftKey ? 1 : 0);
+  return place ? [typed, place] : [typed];
+}
+
+// With other keys held, a key belongs to the browser; but many keyboards type brackets with AltGr (Ctrl and Alt to some systems) or Alt.
+const isFree = ({ ctrlKey, metaKey, altKey, key }: KeyboardEvent): boolean => (!ctrlKey && !metaKey && !altKey) || (altKey && !metaKey && /^[[\]{}]$/.test(key));
+
 export function listenToKeys(groups: readonly KeyGroup[], undo: () => void, redo: () => void): void {
   // The picture has the focus from the start; its ring shows once keys are used.
   document.addEventListener("keydown", () => put(document.body, "data-keys", "used"), true);
   document.addEventListener("pointerdown", () => { delete document.body.dataset["keys"]; }, true);
   document.addEventListener("keydown", event => {
     const field = event.target instanceof HTMLElement && event.target.matches(TEXT_FIELDS);
-    if ((event.ctrlKey || event.metaKey) && !field && /^[zy]$/i.test(event.key)) {
+    const meanings = meaningsOf(event), step = meanings.find(each => each === "z" || each === "y");
+    if ((event.ctrlKey || event.metaKey) && !event.altKey && !field && step) {
       event.preventDefault();
-      return event.key.toLowerCase() === "y" || event.shiftKey ? redo() : undo();
+      return step === "y" || event.shiftKey ? redo() : undo();
     }
-    if (event.ctrlKey || event.metaKey || event.altKey || !actsOn(event.target, event.key)) return;
-    const key = groups.flatMap(group => group.keys).find(each => each.keys.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
+    if (!isFree(event) || !actsOn(event.target, event.key)) return;
+    const all = groups.flatMap(group => group.keys), meant = meanings.find(each => all.some(({ keys }) => keys.includes(each)));
+    const key = all.find(({ keys }) => meant !== undefined && keys.includes(meant));
     if (!key) return;
     event.preventDefault();
     key.run(event.shiftKey, event.timeStamp);

@@ -2,7 +2,7 @@
 // The token comes in the link that the gateway prints, and stays out of the address and of copied links.
 import { type Measure, MEASURE_KINDS, MOST_MEASURES } from "./measure";
 import { limitsOf, parametersIn } from "./offers";
-import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type SlopePoint, type State, type Surface } from "./state";
+import { type Bounds, type ClipBox, type ClipPlane, INITIAL, type KeyFrame, MOST_KEY_FRAMES, type SlopePoint, type State, type Surface } from "./state";
 import { cornersOf, isArea, MOST_REGIONS, type Region } from "./regions";
 import { type ColorMap, MATERIAL } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -115,6 +115,17 @@ const measures: Field<readonly Measure[]> = {
   },
 };
 
+const path: Field<readonly KeyFrame[]> = {
+  name: "path", write: value => value.map(({ azimuth, elevation, roll, zoom, lookAt }) => [azimuth, elevation, roll, zoom, ...lookAt].join(",")).join(";"),
+  read: value => {
+    const read = list(value, ";", (item): KeyFrame | undefined => {
+      const n = numbers(item, 7) as [number, number, number, number, number, number, number] | undefined;
+      return n && { azimuth: n[0], elevation: n[1], roll: n[2], zoom: n[3], lookAt: [n[4], n[5], n[6]] };
+    });
+    return read && read.length <= MOST_KEY_FRAMES ? read : undefined;
+  },
+};
+
 const NAME = /^[a-z][a-z0-9-]{0,40}$/;
 type Named = Omit<State, "parameters">; // whose own names are those of their fields
 const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
@@ -129,7 +140,7 @@ const FIELDS: { [K in keyof Named]: Field<State[K]> } = {
   labels: oneOf("label-mode", "off", "tint", "highlight", "surface"), labelTint: real("label-tint"), labelsShown: text("labels-shown", /^([^,]+(,[^,]+)*)?$/), labelOpacities: opacities,
   overlay: flag("overlay"), overlayPreset: text("overlay-transfer", NAME), overlayColor: text("overlay-color", COLOR), overlayRange: nullable(range("overlay-range")), overlayWeight: real("overlay-weight"),
   layout: oneOf("layout", "single", "quad"), crosshair: nullable(point("at")), window: nullable(real("window")), level: nullable(real("level")),
-  measures, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), machine: flag("machine"),
+  measures, path, legend: flag("legend"), marker: flag("orientation-marker"), scaleBar: flag("scale-bar"), colorBar: flag("color-bar"), machine: flag("machine"),
 };
 
 // Spaces and most marks are legible as they are in a fragment.

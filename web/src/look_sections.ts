@@ -3,7 +3,7 @@ import { axesOf } from "./camera";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, parameterField, row, section, segmented, slider, toggle } from "./controls";
 import { h } from "./dom";
-import { automaticRenderer, can, limitsOf, type Offer, parametersOf, renderers, settled, titleOf, titlesThatCan, turnTo, words } from "./offers";
+import { automaticRenderer, can, limitsOf, type Offer, parametersOf, renderers, titleOf, titlesThatCan, turnTo, words } from "./offers";
 import { projectionOf } from "./options";
 import { LOOK, type State, type Store, type Surface } from "./state";
 import { add, normalized, rounded, scale, type Vec3 } from "./vec";
@@ -35,7 +35,7 @@ function parameterRows(store: Store): { element: HTMLElement; set(state: State):
   return {
     element,
     set: state => {
-      if (settled(state.renderer) !== renderer) { renderer = settled(state.renderer); element.replaceChildren(); made = parametersOf(renderer).map(make); }
+      if (state.renderer !== renderer) { renderer = state.renderer; element.replaceChildren(); made = parametersOf(renderer).map(make); }
       for (const { name, standard, set } of made) set(state.parameters[name] ?? standard);
     },
   };
@@ -50,7 +50,7 @@ export function renderingSection({ store, volume, onVolume }: Context): HTMLElem
   const background = colorField("Background", value => store.update({ background: value }, "background"));
   const update = (): void => {
     const { state } = store;
-    renderer.fill(rendererChoices((volume()?.cells ?? 0) > 0 || can("cells", state.renderer)));
+    renderer.fill(rendererChoices((volume()?.cells ?? 0) > 0 || (state.renderer !== automaticRenderer() && can("cells", state.renderer))));
     renderer.set(state.renderer);
     parameters.set(state);
     shading.set(state.shading);

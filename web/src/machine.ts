@@ -93,6 +93,6 @@ export class Machine {
       figure("Frame", `${shown(latency_ms, 3)} ms`), figure("Encode", `${shown(encode_ms, 2)} ms`), figure("Round trip", `${shown(round_trip_ms, 2)} ms`),
       figure("Imbalance", shown(imbalance, 3)), figure("Idle", `${Math.round(idle_share * 100)} %`), figure("Workers", `${workers}${attempts > 1 ? `, attempt ${attempts}` : ""}`), figure("Groups", String(groups)),
       figure("Voxels moved", bytes(moved.voxels)), figure("Between workers", bytes(moved.images)), figure("Picture", bytes(moved.picture)),
-      figure("Plan", `${plan["decomposition"] ?? ""} ${plan["axis"] ?? ""}, ${plan["combine"] ?? ""}`));
+      figure("Plan", `${plan["renderer"] ?? ""}, ${plan["decomposition"] ?? ""} ${plan["axis"] ?? ""}, ${plan["combine"] ?? ""}`));
   }
 }

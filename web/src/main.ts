@@ -1,14 +1,16 @@
 // The page: makes the parts and connects them.
 import { Api, type Dataset } from "./api";
 import { orbited, panned, rolled, type Side, sidesOf, startOf, zoomed } from "./camera";
+import { carried } from "./carry";
 import { wholeBox } from "./clip_handles";
 import { clipSection } from "./clip_section";
 import type { Context } from "./context";
-import { openSection, section } from "./controls";
+import { openSection, section, toggle } from "./controls";
 import { commandDialog, helpDialog, screenshotDialog, tokenDialog } from "./dialogs";
 import { copyText, h, putText } from "./dom";
 import { FunctionSource } from "./function_source";
 import { GradientEditor } from "./gradient_editor";
+import { keepView, keyFramesSection } from "./key_frames";
 import { type KeyGroup, listenToKeys } from "./keys";
 import { linkOf, showInAddress, stateOf, takeToken } from "./link";
 import { Labels } from "./labels";
@@ -20,9 +22,10 @@ import { measureSection } from "./measure_section";
 import { Measuring } from "./measuring";
 import { movieDialog } from "./movie_dialog";
 import { Notices } from "./notices";
-import { automaticRenderer, can, loadOffers, noteKind } from "./offers";
+import { automaticRenderer, can, loadOffers, noteDataset } from "./offers";
 import { Pointed } from "./pointed";
 import { applyTheme, Shell, switchTheme } from "./shell";
+import { Sending } from "./sending";
 import { Slices } from "./slices";
 import { slicesSection } from "./slices_section";
 import { INITIAL, type State, Store } from "./state";
@@ -38,8 +41,10 @@ const TURN = { near: 5, far: 45 }, MOVE_PIXELS = { near: 20, far: 100 }, ZOOM_ST
 class Page {
   private readonly store = new Store(stateOf(location.hash.slice(1)));
   private readonly api: Api;
+  private readonly context: Context;
   private readonly notices = new Notices();
   private readonly shell: Shell;
+  private readonly sending: Sending;
   private readonly machine = new Machine(() => this.store.update({ machine: false }));
   private readonly pointed: Pointed;
   private readonly viewer: Viewer;
@@ -48,28 +53,36 @@ class Page {
   private readonly measuring: Measuring;
   private readonly measures: HTMLDetailsElement;
   private volume: Volume | null = null;
+  private left: Volume | null = null; // the one before, whose view the other dataset takes over
   private starts = !/(^|&)(azimuth|elevation)=/.test(location.hash.slice(1)); // the view has not been chosen yet
   private asking = ""; // the dataset that is being asked about
+  private refused = false; // a view of the dataset
+  private listed: readonly Dataset[] = []; // as the gateway told last
   private readonly volumeListeners: ((volume: Volume | null) => void)[] = [];
   private addressTimer = 0;
+  private readonly file = h("input", { type: "file" });
 
   constructor(token: string) {
     this.api = new Api(token);
     const { store, notices, api } = this;
-    const context: Context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
-    const source: FunctionSource = new FunctionSource(context, () => editor.refresh());
+    const context: Context = this.context = { store, api, volume: () => this.volume, onVolume: listener => void this.volumeListeners.push(listener), say: (message, kind) => notices.say(message, kind) };
+    const source: FunctionSource = new FunctionSource(context, () => { editor.refresh(); this.viewer.annotate(); });
     const labels = new Labels(context), layers = layersSection(context, labels);
     this.measuring = new Measuring(context);
     this.measures = measureSection(context, this.measuring);
     this.pointed = new Pointed(context, label => labels.note(label));
-    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element);
+    this.sending = new Sending(api, context.say, name => this.showDataset(name));
+    this.shell = new Shell(this.actions(), notices.status, notices.banner, notices.progress, notices.messages, this.pointed.element, this.machine.element, this.sending.element);
     const editor = new TransferEditor(context, source);
     this.clipping = clipSection(context);
-    const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element);
-    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, layers, lightSection(context), this.facts());
+    const bar = toggle("Colour bar", on => store.update({ colorBar: on }));
+    store.subscribe(state => bar.set(state.colorBar), ["colorBar"]);
+    bar.set(store.state.colorBar);
+    const functions = section("Transfer function", true, editor.element, new GradientEditor(context).element, bar.element);
+    this.shell.panel.append(functions, slicesSection(context), renderingSection(context), surfacesSection(context), this.clipping, this.measures, keyFramesSection(context), layers, lightSection(context), this.facts());
     this.viewer = new Viewer(context, source, this.pointed, this.measuring, labels, {
       drawn: ({ frame: { header } }) => { notices.onFrame(); this.machine.onFrame(header.statistics); this.know(); },
-      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => notices.onError(message),
+      status: status => this.onStatus(status), progress: progress => notices.onProgress(progress), error: message => { this.refused = true; notices.onError(message); },
       connection: (state, reason) => { notices.onConnection(state, reason); if (state === "lost") void this.checkToken(); },
     });
     this.shell.panes.append(this.viewer.pane.element);
@@ -87,11 +100,12 @@ class Page {
     });
     addEventListener("hashchange", () => {
       if (location.hash.includes("token=")) return location.reload(); // a link of another start of the gateway, perhaps
+      this.left = null;
       store.update(stateOf(location.hash.slice(1)));
     });
     document.addEventListener("pointerdown", () => store.press(), true);
     for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => store.letGo(), true);
-    this.dropsFiles(editor);
+    this.takesFiles(editor);
     this.shell.setPanel(innerWidth > NARROW_PIXELS);
     this.show();
     showInAddress(store.state, token);
@@ -113,28 +127,42 @@ class Page {
     this.machine.onStatus(status);
     const { dataset } = this.store.state, first = status.datasets[0];
     if (!dataset && first) this.store.update({ dataset: first.name });
+    this.listed = status.datasets;
     this.shell.showDatasets(status.datasets, this.store.state.dataset);
     this.know();
   }
 
+  // The view, the look and what undo knows stay. What of it does not apply shows once the dataset is known.
+  private showDataset(name: string): void {
+    this.left = this.volume ?? this.left;
+    this.starts = !this.left;
+    noteDataset(this.listed.find(each => each.name === name), true);
+    this.store.update({ dataset: name });
+  }
+
   private forgetVolume(): void {
     this.volume = null;
-    noteKind(0);
+    this.refused = false;
+    noteDataset(this.listed.find(each => each.name === this.store.state.dataset), this.left !== null);
     for (const listener of this.volumeListeners) listener(null);
   }
 
-  // Once a picture of the dataset is there, the gateway can tell of it; what it tells may be a second old, so it is asked again then.
+  // Once a picture of the dataset is there, or none can be made of it as it was asked for although it is loaded, the gateway can tell of it;
+  // what it tells may be a second old, so it is asked again then.
   private know(): void {
-    const { dataset } = this.store.state;
-    if (this.volume?.name === dataset || this.asking === dataset || this.viewer.pane.shown?.frame.view.options["dataset"] !== dataset) return;
+    const { dataset } = this.store.state, drawn = this.viewer.pane.shown?.frame.view.options["dataset"] === dataset;
+    const loaded = drawn || (this.refused && this.listed.some(each => each.name === dataset && each.state === "ready"));
+    if (this.volume?.name === dataset || this.asking === dataset || !loaded) return;
     this.asking = dataset;
     Promise.all([this.api.datasets(), centreOf(this.api.token, dataset)]).then(([list, { centre, world, unit }]) => {
       const entry = list.find((each: Dataset) => each.name === dataset);
       if (!entry || this.store.state.dataset !== dataset) return;
       this.volume = volumeOf(entry, centre, world, unit);
       if (!this.volume) return;
-      noteKind(this.volume.cells);
+      noteDataset(entry, false);
       if (this.starts) this.store.update(startOf(world));
+      if (this.left) this.store.update(carried(this.store.state, this.left, this.volume));
+      this.left = null;
       for (const listener of this.volumeListeners) listener(this.volume);
       this.show();
     }).catch((error: unknown) => this.notices.say(error instanceof Error ? error.message : String(error), "error")).finally(() => { this.asking = ""; });
@@ -206,7 +234,7 @@ class Page {
   private actions(): ConstructorParameters<typeof Shell>[0] {
     const { store } = this;
     return {
-      dataset: name => { this.starts = true; store.update({ ...INITIAL, dataset: name, layout: store.state.layout, machine: store.state.machine }); },
+      dataset: name => this.showDataset(name), open: () => this.file.click(),
       view: index => this.view(index), sides: () => this.sides().map(side => side.name), reset: () => this.reset(),
       layout: quad => store.update({ layout: quad ? "quad" : "single" }), machine: () => store.update({ machine: !store.state.machine }),
       panel: () => this.shell.setPanel(!this.shell.panelOpen), theme: switchTheme, help: () => helpDialog(this.keyGroups()),
@@ -247,20 +275,22 @@ class Page {
         { keys: ["p"], label: "P", does: "Settings", run: actions.panel }, { keys: ["b"], label: "B", does: "Clip box", run: () => this.toggleBox() },
         { keys: ["a"], label: "A", does: "Axes and scale bar", run: () => store.update({ marker: !store.state.marker, scaleBar: !store.state.marker }) },
         { keys: ["c"], label: "C", does: "Copy link", run: () => actions.copyLink(false) }, { keys: ["k"], label: "K", does: "Command", run: actions.command },
-        { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
+        { keys: ["f"], label: "F", does: "Open a file", run: actions.open }, { keys: ["s"], label: "S", does: "Save picture", run: actions.screenshot }, { keys: ["v"], label: "V", does: "Save movie", run: actions.movie }, { keys: ["n"], label: "N", does: "Add a key frame", run: () => keepView(this.context) }, { keys: ["?", "h"], label: "?", does: "This help", run: actions.help },
         { keys: [], label: "Ctrl+Z", does: "Undo", run: () => undefined }, { keys: [], label: "Ctrl+Y", does: "Redo", run: () => undefined },
       ] },
     ];
   }
 
-  private dropsFiles(editor: TransferEditor): void {
+  // A file that is dropped or chosen: a colour map, or else a volume.
+  private takesFiles(editor: TransferEditor): void {
+    const take = (file: File | undefined): void => { if (file) void (file.name.toLowerCase().endsWith(".json") ? editor.open(file) : this.sending.send(file)); };
+    this.file.addEventListener("change", () => { take(this.file.files?.[0]); this.file.value = ""; });
     document.addEventListener("dragover", event => { event.preventDefault(); document.body.dataset["drop"] = "over"; });
     document.addEventListener("dragleave", event => { if (!event.relatedTarget) delete document.body.dataset["drop"]; });
     document.addEventListener("drop", event => {
       event.preventDefault();
       delete document.body.dataset["drop"];
-      const file = event.dataTransfer?.files[0];
-      if (file) void editor.open(file);
+      take(event.dataTransfer?.files[0]);
     });
   }
 }
@@ -278,6 +308,7 @@ applyTheme();
 const token = takeToken();
 const showAlone = (text: string): void => document.body.replaceChildren(h("main", { class: "empty" }, h("h1", {}, text)));
 if (token) {
+  showAlone("Connecting…");
   loadOffers().then(() => {
     INITIAL.renderer = automaticRenderer();
     new Page(token);

@@ -2,6 +2,7 @@
 import type { Context } from "./context";
 import { button, iconButton, section } from "./controls";
 import { copyText, h, put, putText, svg } from "./dom";
+import { labelTable } from "./label_table";
 import { MEASURE_KINDS, type Measure, nameOf, pointsOf, type Profile } from "./measure";
 import type { Measuring } from "./measuring";
 
@@ -32,7 +33,10 @@ export function measureSection(context: Context, measuring: Measuring): HTMLDeta
   const copy = button("Copy", "copy", () => void copyText(measuring.table()).then(() => context.say("The measurements are copied.")), "quiet");
   const clear = button("Remove all", null, () => store.update({ measures: [] }, "no measures"), "quiet");
   const end = h("div", { class: "button-row" }, copy, clear);
-  const element = section("Measure", false, h("div", { class: "button-row" }, ...tools.map(each => each.tool)), hint, list, end);
+  const labels = button("Labels…", null, () => void labelTable(context, store.state.dataset), "quiet");
+  context.onVolume(volume => { labels.hidden = (volume?.labels ?? 0) === 0; });
+  labels.hidden = true;
+  const element = section("Measure", false, h("div", { class: "button-row" }, ...tools.map(each => each.tool), labels), hint, list, end);
   let made: { measure: Measure; text: HTMLElement; plot: HTMLElement; profile: Profile | null }[] = [];
   const draw = (): void => {
     const { measures } = store.state;

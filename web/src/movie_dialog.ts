@@ -4,11 +4,13 @@ import { annotationFields } from "./annotation_fields";
 import { button, row, segmented } from "./controls";
 import { dialog } from "./dialogs";
 import { bytes, copyText, download, h } from "./dom";
+import { pathOf } from "./key_frames";
 import { type Options, renderOptions } from "./options";
 import type { State } from "./state";
 
 const FRAMES = { usual: 120, most: 1000 } as const, FPS = { usual: 25, most: 120 } as const;
 const MOST_PIXELS = 2048 * 2048;
+const CAMERA = ["projection", "azimuth", "elevation", "roll", "zoom", "look-at", "fit"] as const; // what each key frame has of its own
 const even = (side: number): number => Math.max(16, Math.round(side / 2) * 2);
 
 // Counts the frames of an MP4 stream, in which each has a box "moof" of its own.
@@ -50,15 +52,23 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   cancel.hidden = true;
   const length = (): string => `${frames.value} frames, ${Math.round((10 * Number(frames.value)) / Number(fps.value)) / 10} s`;
   const marks = annotationFields(state);
-  let first: State = front ? { ...state, ...front } : state;
-  const start = segmented("Begin", [["front", "At the front"], ["view", "At this view"]], value => { first = value === "front" ? { ...state, ...front } : state; });
-  start.set("front");
-  const options = (): Options => ({ ...renderOptions(first), ...marks.options(), size: `${w.value}x${t.value}` });
+  // One turn, from the front or from here, or the way through the key frames.
+  const ways = [...(front ? [["front", "A turn from the front"] as const] : []), ["view", "A turn from here"] as const, ...(state.path.length > 1 ? [["path", `${state.path.length} key frames`] as const] : [])];
+  let way: string = state.path.length > 1 ? "path" : front ? "front" : "view";
+  const start = segmented("Way", ways, value => { way = value; });
+  start.set(way);
+  const view = (): Options => {
+    const options = renderOptions(way === "front" ? { ...state, ...front } : state);
+    if (way !== "path") return options;
+    for (const name of CAMERA) delete options[name];
+    return { ...options, path: pathOf(state) };
+  };
+  const options = (): Options => ({ ...view(), ...marks.options(), size: `${w.value}x${t.value}` });
 
   // What to do where the gateway cannot: the same by the command line.
   const offerCommand = async (): Promise<void> => {
-    const { command } = await api.command(options());
-    const movie = command.replace(/^slabstream render/, "slabstream turntable").replace(/ -o \S+$/, ` --frames ${frames.value} --fps ${fps.value} -o turntable.mp4`);
+    const { path, ...rest } = options(), { command } = await api.command(rest);
+    const movie = command.replace(/^slabstream render/, "slabstream turntable").replace(/ -o \S+$/, `${path ? " --path path.json" : ""} --frames ${frames.value} --fps ${fps.value} -o turntable.mp4`);
     help.replaceChildren(h("h3", {}, "On a machine with ffmpeg, use this command"), h("pre", { tabindex: 0 }, movie), button("Copy", "copy", () => void copyText(movie).then(() => { status.textContent = "Copied."; }), "quiet"));
     help.hidden = false;
   };
@@ -92,9 +102,9 @@ export function movieDialog(state: State, api: Api, width: number, height: numbe
   };
 
   const form = h("form", { onsubmit: (event: Event) => { event.preventDefault(); void make(); } },
-    h("p", { class: "hint" }, "One full turn, as MP4. The service renders each frame."),
+    h("p", { class: "hint" }, "An MP4. The service renders each frame."),
     h("div", { class: "size-row" }, w, h("span", { "aria-hidden": "true" }, "×"), t, h("span", {}, "pixels")),
     h("div", { class: "size-row" }, frames, h("span", {}, "frames,"), fps, h("span", {}, "a second")),
-    ...(front ? [row("Begin", start.element)] : []), ...marks.elements, bar, status, help, h("div", { class: "dialog-actions" }, cancel, save));
+    ...(ways.length > 1 ? [row("Way", start.element)] : []), ...marks.elements, bar, status, help, h("div", { class: "dialog-actions" }, cancel, save));
   dialog("Movie", form).addEventListener("close", () => running?.abort());
 }

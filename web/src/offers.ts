@@ -1,8 +1,8 @@
 // What the gateway offers: options with their limits, and what each renderer can do (docs/http.md, api/v1/options). Loaded before the page is made.
+import type { Dataset } from "./api";
 
 export interface Offer {
   name: string; group: string; type?: string; help: string; unit?: string; default?: string; min?: number; above?: number; max?: number; choices?: string[]; presets?: string[]; region_presets?: string[]; renderers?: Renderer[]; windows?: NamedWindow[];
-  automatic?: { volumes: string; grids: string }; // renderers
 }
 export interface NamedWindow { name: string; width: number; level: number }
 export interface Renderer { name: string; title: string; abilities: string[]; parameters: Record<string, string> } // parameters with their standard values
@@ -48,24 +48,30 @@ export const namedWindows = (): readonly NamedWindow[] => offers.get("window")?.
 
 const has = (what: string, { abilities, parameters }: Renderer): boolean => abilities.includes(what) || what in parameters;
 
-// The renderer unless the user chooses one: the service takes that of volumes or that of unstructured grids.
+// The renderer unless the user chooses one: the service takes one that can do what is asked, and says which.
 export const automaticRenderer = (): string => offers.get("renderer")?.default ?? "";
-let ofGrids = false;
-export const noteKind = (cells: number): void => { ofGrids = cells > 0; }; // of the dataset that is shown
-export function settled(renderer: string): string {
-  const automatic = offers.get("renderer")?.automatic;
-  return renderer !== automaticRenderer() || !automatic ? renderer : ofGrids ? automatic.grids : automatic.volumes;
+// The dataset that is shown: whether it is a grid, and which layers it has. `cautious`: what is not known yet counts as missing.
+let ofGrids: boolean | null = null; // null: not known
+let layers = { labels: true, overlay: true };
+export function noteDataset(dataset: Dataset | undefined, cautious: boolean): void {
+  const known = dataset?.state === "ready";
+  ofGrids = known ? (dataset.cells ?? 0) > 0 : cautious ? false : null;
+  layers = known ? { labels: (dataset.layers?.labels ?? 0) > 0, overlay: dataset.layers?.overlay ?? false } : { labels: !cautious, overlay: !cautious };
+}
+export const hasLayer = (name: "labels" | "overlay"): boolean => layers[name];
+
+// The renderer, or the automatic one if it draws cells and the dataset has none.
+export function fitting(renderer: string): string {
+  const chosen = renderers().find(({ name }) => name === renderer);
+  return ofGrids === false && chosen?.abilities.includes("cells") ? automaticRenderer() : renderer;
 }
 
 // An ability ("isosurfaces") or a parameter ("sampling-rate") of a renderer; the service refuses the rest.
-export function can(what: string, renderer: string): boolean {
-  const name = settled(renderer);
-  return renderers().some(each => each.name === name && has(what, each));
-}
+export const can = (what: string, renderer: string): boolean => renderers().some(each => (each.name === renderer || renderer === automaticRenderer()) && has(what, each));
 
-// What a renderer has that others do not.
+// What a renderer has that others do not; nothing, if the service chooses it.
 export function parametersOf(renderer: string): readonly Offer[] {
-  const name = settled(renderer), own = renderers().find(each => each.name === name)?.parameters ?? {};
+  const own = renderers().find(each => each.name === renderer)?.parameters ?? {};
   return Object.entries(own).flatMap(([parameter, standard]) => { const offer = offers.get(parameter); return offer ? [{ ...offer, default: standard }] : []; });
 }
 const allParameters = (): ReadonlySet<string> => new Set(renderers().flatMap(each => Object.keys(each.parameters)));

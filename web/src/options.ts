@@ -1,6 +1,6 @@
 // The state as options of the gateway, which are those of the command line.
 import { boxText, slopeText } from "./link";
-import { can, hasRegions, parametersOf } from "./offers";
+import { can, fitting, hasLayer, hasRegions, parametersOf } from "./offers";
 import { ONE_COLOR, type State } from "./state";
 import { rampTo, toParaView } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -41,11 +41,11 @@ function overlayOptions(state: State): Options {
 }
 
 // That the renderer draws.
-export const projectionOf = ({ projection, renderer }: State): State["projection"] => (can("perspective", renderer) ? projection : "orthographic");
+export const projectionOf = ({ projection, renderer }: State): State["projection"] => (can("perspective", fitting(renderer)) ? projection : "orthographic");
 
 // Of the picture, without its size.
 export function renderOptions(state: State): Options {
-  const { renderer } = state;
+  const renderer = fitting(state.renderer);
   const options: Options = {
     dataset: state.dataset, renderer, background: state.background, projection: projectionOf(state),
     azimuth: state.azimuth, elevation: state.elevation, roll: state.roll, zoom: state.zoom,
@@ -65,15 +65,15 @@ export function renderOptions(state: State): Options {
   if (state.clipBox) options["clip-box"] = boxText(state.clipBox);
   if (state.clipPlanes.length > 0) options["clip-plane"] = state.clipPlanes.map(plane => plane.join(","));
   if (state.clipMode !== "keep" && (state.clipBox || state.clipPlanes.length > 0)) options["clip-mode"] = state.clipMode;
-  if (state.labels !== "off" && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
-  if (state.overlay && can("overlay", renderer)) Object.assign(options, overlayOptions(state));
+  if (state.labels !== "off" && hasLayer("labels") && can("labels", renderer)) Object.assign(options, labelOptions(state, true));
+  if (state.overlay && hasLayer("overlay") && can("overlay", renderer)) Object.assign(options, overlayOptions(state));
   return options;
 }
 
 export function sliceOptions(state: State, plane: string, at: Vec3): Options {
   const options: Options = { dataset: state.dataset, plane, at: at.join(","), background: state.background };
   if (state.window !== null && state.level !== null) Object.assign(options, { window: state.window, level: state.level });
-  if (state.labels !== "off") Object.assign(options, labelOptions(state, false));
-  if (state.overlay) Object.assign(options, overlayOptions(state));
+  if (state.labels !== "off" && hasLayer("labels")) Object.assign(options, labelOptions(state, false));
+  if (state.overlay && hasLayer("overlay")) Object.assign(options, overlayOptions(state));
   return options;
 }

@@ -77,14 +77,14 @@ export class Pane {
   // The canvas keeps its picture until another is there: resizing a canvas clears it.
   private draw(frame: Frame): void {
     const { header, picture } = frame;
-    const width = Math.round(header.size[0] / header.scale), height = Math.round(header.size[1] / header.scale);
+    const [width, height] = String(frame.view.options["size"]).split("x").map(Number) as [number, number]; // a small picture fills it, too
     if (this.canvas.width !== width) this.canvas.width = width;
     if (this.canvas.height !== height) this.canvas.height = height;
     const [r, g, b] = header.background.map(c => Math.round(c * 255));
     this.element.style.background = this.context.fillStyle = `rgb(${r} ${g} ${b})`;
     this.context.fillRect(0, 0, width, height);
-    const up = 1 / header.scale, [x, y, w, h] = header.bounds;
-    if (picture) this.context.drawImage(picture, x * up, y * up, w * up, h * up);
+    const across = width / header.size[0], down = height / header.size[1], [x, y, w, h] = header.bounds;
+    if (picture) this.context.drawImage(picture, x * across, y * down, w * across, h * down);
     this.markOld();
     this.shown = { frame, cssWidth: width / devicePixelRatio, cssHeight: height / devicePixelRatio };
     this.events.drawn?.(this.shown);

@@ -1,5 +1,6 @@
 // Pointers and keys of a plot whose points are moved by hand. Its marks have `data-index`; the chosen one has the class `selected`.
 import { put, svg } from "./dom";
+import { markNear } from "./near";
 
 export interface PointEditor {
   choose(mark: SVGElement, event?: PointerEvent): void; // with the event that begins a drag
@@ -15,7 +16,7 @@ const ARROWS: Record<string, readonly [number, number]> = { ArrowLeft: [-1, 0], 
 export const editPoints = (plot: SVGElement, editor: PointEditor): void => {
   let dragging = false;
   plot.addEventListener("pointerdown", event => {
-    const hit = event.target instanceof SVGElement && event.target.dataset["index"] ? event.target : null;
+    const hit = markNear(plot.querySelectorAll<SVGElement>("[data-index]"), event);
     if (hit) {
       editor.choose(hit, event);
       hit.focus();

@@ -42,6 +42,9 @@ export interface SessionEvents {
 }
 
 const RETRY_MS = [250, 500, 1000, 2000, 4000];
+// The gateway says something each second. After such a silence the connection is dead, even if nobody has closed it: a computer that slept, a
+// network that changed. A large picture that is announced may take longer, at such a rate.
+const SILENCE_MS = 4000, LOOK_MS = 500, LEAST_BYTES_A_MS = 100;
 const KEPT_VIEWS = 256;
 
 export class Session {
@@ -53,9 +56,13 @@ export class Session {
   private wanted: View | null = null;
   private sent = new Map<number, SentView>();
   private lastSent = "";
+  private silentAt = 0; // when the connection counts as dead, if nothing comes until then
+  private lookedAt = 0;
+  private readonly looking: number;
 
   constructor(private readonly token: string, private readonly events: SessionEvents) {
     this.connect();
+    this.looking = setInterval(() => this.look(), LOOK_MS);
     addEventListener("online", this.retryNow);
     document.addEventListener("visibilitychange", this.retryNow);
   }
@@ -76,6 +83,7 @@ export class Session {
   end(): void {
     this.ended = true;
     clearTimeout(this.timer);
+    clearInterval(this.looking);
     removeEventListener("online", this.retryNow);
     document.removeEventListener("visibilitychange", this.retryNow);
     this.socket?.close();
@@ -87,6 +95,27 @@ export class Session {
     this.connect();
   };
 
+  private heard(more = 0): void { this.silentAt = performance.now() + SILENCE_MS + more; }
+
+  // If this page itself has slept, what came meanwhile may still wait to be read: it gets a moment.
+  private look(): void {
+    const now = performance.now(), late = now - this.lookedAt > 4 * LOOK_MS;
+    this.lookedAt = now;
+    const { socket } = this;
+    if (!socket || now < this.silentAt) return;
+    if (late) { this.silentAt = now + 2 * LOOK_MS; return; }
+    this.lose(socket, "");
+    socket.close();
+  }
+
+  private lose(socket: WebSocket, reason: string): void {
+    if (this.socket !== socket) return;
+    this.socket = null;
+    if (this.ended) return;
+    this.events.connection?.("lost", reason);
+    this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
+  }
+
   private connect(): void {
     const address = new URL("api/v1/view", location.href);
     address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
@@ -95,7 +124,10 @@ export class Session {
     const socket = new WebSocket(address, ["slabstream.view.v1", `slabstream.token.${this.token}`]);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
+    this.heard();
     socket.onopen = () => {
+      if (this.socket !== socket) return;
+      this.heard();
       this.attempts = 0;
       this.seq = 0;
       this.sent.clear();
@@ -103,20 +135,20 @@ export class Session {
       this.events.connection?.("open", "");
       if (this.wanted) this.show(this.wanted);
     };
-    socket.onmessage = event => (typeof event.data === "string" ? this.onText(event.data) : void this.onPicture(socket, event.data as ArrayBuffer));
-    socket.onclose = event => {
+    socket.onmessage = event => {
       if (this.socket !== socket) return;
-      this.socket = null;
-      if (this.ended) return;
-      this.events.connection?.("lost", event.reason);
-      this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.attempts++, RETRY_MS.length - 1)]);
+      this.heard();
+      if (typeof event.data === "string") this.onText(event.data);
+      else void this.onPicture(socket, event.data as ArrayBuffer);
     };
+    socket.onclose = event => this.lose(socket, event.reason);
   }
 
   private onText(text: string): void {
-    const message = JSON.parse(text) as { type: string; seq?: number; error?: string };
+    const message = JSON.parse(text) as { type: string; seq?: number; error?: string; bytes?: number };
     if (message.type === "status") this.events.status?.(message as unknown as ServiceStatus);
     else if (message.type === "progress") this.events.progress?.(message as unknown as Progress);
+    else if (message.type === "picture") this.heard((message.bytes ?? 0) / LEAST_BYTES_A_MS);
     else if (message.type === "error" && message.seq === this.seq) this.events.error?.(message.error ?? "");
   }
 

@@ -4,7 +4,7 @@ import { button, choice, iconButton, menu, menuItem } from "./controls";
 import { h, put } from "./dom";
 
 export interface Actions {
-  dataset(name: string): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
+  dataset(name: string): void; open(): void; view(index: number): void; sides(): readonly string[]; reset(): void; layout(quad: boolean): void; machine(): void; panel(): void; theme(): void; help(): void;
   copyLink(withToken: boolean): void; command(): void; screenshot(): void; movie(): void; projection(): void;
 }
 
@@ -24,24 +24,26 @@ export class Shell {
   private readonly panelButton: HTMLButtonElement;
   private names = "";
 
-  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, machine: HTMLElement) {
+  constructor(private readonly actions: Actions, status: HTMLElement, banner: HTMLElement, progress: HTMLElement, messages: HTMLElement, readout: HTMLElement, machine: HTMLElement, sending: HTMLElement) {
     const views = iconButton("Views", "views", () => undefined);
     const share = button("Share", "link", () => undefined, "share");
     this.layoutButtons = [iconButton("One picture", "single", () => actions.layout(false), "L"), iconButton("With slices", "quad", () => actions.layout(true), "L")];
     this.machineButton = iconButton("Machine panel", "machine", actions.machine, "M");
     this.panelButton = iconButton("Settings", "panel", actions.panel, "P");
+    for (const each of this.layoutButtons) each.classList.add("layout-button"); // a narrow page has them in menus
+    this.machineButton.classList.add("machine-button");
     this.panelButton.setAttribute("aria-controls", "panel");
-    const header = h("header", { class: "bar" }, h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element,
+    const header = h("header", { class: "bar" }, h("h1", { class: "brand" }, h("img", { src: "assets/icon.svg", alt: "", width: 20, height: 20 }), h("span", {}, "Slabstream")), this.datasets.element, iconButton("Open a file", "open", actions.open, "F"),
       h("div", { class: "group", role: "group", "aria-label": "View" },
-        menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection)]),
+        menu(views, "Views", () => [...actions.sides().map((name, i) => menuItem(name, String(i + 1), () => actions.view(i))), h("hr"), menuItem("Reset the view", "R", actions.reset), menuItem("Parallel or perspective", "O", actions.projection), menuItem("Slices beside the picture", "L", () => actions.layout(this.panes.dataset["layout"] !== "quad")), menuItem("Machine panel", "M", actions.machine)]),
         iconButton("Reset the view", "reset", actions.reset, "R")),
       h("div", { class: "group", role: "group", "aria-label": "Layout" }, ...this.layoutButtons, this.machineButton),
       h("span", { class: "space" }), readout, status,
       h("div", { class: "group", role: "group", "aria-label": "Page" },
-        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie)]),
+        menu(share, "Share", () => [menuItem("Copy link", "C", () => actions.copyLink(false)), menuItem("Copy link with access", "", () => actions.copyLink(true)), menuItem("Command…", "K", actions.command), menuItem("Save picture…", "S", actions.screenshot), menuItem("Save movie…", "V", actions.movie), menuItem("Help", "?", actions.help)]),
         iconButton("Light or dark", "theme", actions.theme), iconButton("Help", "help", actions.help, "?"), this.panelButton));
     this.datasets.element.classList.add("dataset");
-    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, messages), machine);
+    this.stage.append(h("div", { class: "canvas-area" }, progress, this.panes, banner, sending, messages), machine);
     document.body.replaceChildren(h("a", { class: "skip", href: "#", onclick: (event: Event) => { event.preventDefault(); this.panes.querySelector("canvas")?.focus(); } }, "Skip to the picture"), header, this.stage, this.panel);
   }
 

@@ -10,6 +10,10 @@ export type Bounds = readonly [number | null, number | null]; // null: not clipp
 export type ClipBox = readonly [Bounds, Bounds, Bounds];
 export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
 
+export interface KeyFrame { azimuth: number; elevation: number; roll: number; zoom: number; lookAt: Vec3 }
+
+export const MOST_KEY_FRAMES = 100;
+
 export const ONE_COLOR = "one-color"; // instead of a preset: from clear to this colour
 
 export interface State {
@@ -54,30 +58,32 @@ export interface State {
   window: number | null;
   level: number | null;
   measures: readonly Measure[];
+  path: readonly KeyFrame[]; // of a movie
   // The page
   legend: boolean; // of labels
   marker: boolean;
   scaleBar: boolean;
+  colorBar: boolean;
   machine: boolean;
 }
 
 // `renderer`: the gateway's default.
 export const INITIAL: State = {
   dataset: "",
-  ...PATIENT_START, roll: 0, zoom: 1.15, lookAt: null, projection: "orthographic",
+  ...PATIENT_START, roll: 0, zoom: 1, lookAt: null, projection: "orthographic",
   renderer: "", parameters: {}, shading: "phong", lights: [], shadows: 0, ambientOcclusion: 0, background: "#0d1014",
   preset: "auto", map: null, range: null, opacityDistance: 1, slopes: [], surfaces: [], surfacesAlone: true,
   clipBox: null, clipPlanes: [], clipMode: "keep",
   labels: "off", labelTint: 0.5, labelsShown: "", labelOpacities: {},
   overlay: false, overlayPreset: "auto", overlayColor: "#ff4fd8", overlayRange: null, overlayWeight: 1,
-  layout: "single", crosshair: null, window: null, level: null, measures: [], legend: true,
-  marker: true, scaleBar: true, machine: false,
+  layout: "single", crosshair: null, window: null, level: null, measures: [], path: [], legend: true,
+  marker: true, scaleBar: true, colorBar: false, machine: false,
 };
 
 // What undo brings back: the look, not the place from which one looks.
 export const LOOK = ["renderer", "parameters", "shading", "lights", "shadows", "ambientOcclusion", "background", "preset", "map", "range", "opacityDistance", "slopes",
   "surfaces", "surfacesAlone", "clipBox", "clipPlanes", "clipMode", "labels", "labelTint", "labelsShown", "labelOpacities", "overlay",
-  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "window", "level", "measures"] as const;
+  "overlayPreset", "overlayColor", "overlayRange", "overlayWeight", "window", "level", "measures", "path"] as const;
 const UNDO_STEPS = 200;
 const ONE_GESTURE_MS = 700;
 

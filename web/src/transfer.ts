@@ -17,6 +17,13 @@ export function rangeOf(map: ColorMap): [number, number] {
   return [Math.min(...xs), Math.max(...xs)];
 }
 
+// The values that show: from where opacity begins to where it ends. The whole range if nothing shows, or if regions stand in the curves' place.
+export function visibleRangeOf(map: ColorMap): [number, number] {
+  const shows = map.regions ? [] : map.opacities.flatMap((p, i, all) => (p.y > 0 || (all[i - 1]?.y ?? 0) > 0 || (all[i + 1]?.y ?? 0) > 0 ? [p.x] : []));
+  const low = Math.min(...shows), high = Math.max(...shows);
+  return low < high ? [low, high] : rangeOf(map);
+}
+
 // The map with its first point at low and its last one at high.
 export function stretched(map: ColorMap, [low, high]: readonly [number, number]): ColorMap {
   const [from, to] = rangeOf(map);

@@ -2,7 +2,7 @@
 import type { Histogram } from "./api";
 import type { Context } from "./context";
 import { button, choice, colorField, iconButton, numberField, slider } from "./controls";
-import { copyText, download, h, shown, svg } from "./dom";
+import { copyText, download, h, put, shown, svg } from "./dom";
 import type { FunctionSource } from "./function_source";
 import { curvePath, gradientStops, histogramPath, PLOT, Scale } from "./plot";
 import { hasRegions, presetChoices, turnTo } from "./offers";
@@ -42,6 +42,7 @@ export class TransferEditor {
   private readonly frame = h("div", { class: "plot-frame" }, this.plot);
   private readonly regions: RegionEditor;
   private readonly pointFields: HTMLElement;
+  private readonly stretchFields: HTMLElement;
   private selected: Selected = { kind: "opacity", index: 0 };
   private histogram: Histogram | null = null;
   private width = 280;
@@ -51,12 +52,12 @@ export class TransferEditor {
     const file = h("input", { type: "file", accept: ".json,application/json", class: "offscreen", tabindex: -1, "aria-label": "Colour map", onchange: () => { const chosen = file.files?.[0]; if (chosen) void this.open(chosen); file.value = ""; } });
     this.pointFields = h("div", { class: "fields" },
       h("label", {}, h("span", {}, "Value"), this.value.input), h("label", { class: "of-opacity" }, h("span", {}, "Opacity"), this.opacity.input), h("label", { class: "of-color" }, h("span", {}, "Colour"), this.color.input));
+    this.stretchFields = h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet"));
     this.regions = new RegionEditor(context, source);
     this.element = h("div", { class: "editor" }, this.presets.element, this.frame, this.note, this.pointFields, this.regions.element,
       h("div", { class: "tools-row" }, this.undoButton, this.redoButton, this.addButton, this.removeButton, h("span", { class: "space" }),
         iconButton("Open a colour map", "open", () => file.click()), iconButton("Save as a file", "save", () => this.save()), iconButton("Copy for --transfer", "copy", () => void this.copy()), file),
-      h("div", { class: "fields" }, h("label", {}, h("span", {}, "From"), this.low.input), h("label", {}, h("span", {}, "To"), this.high.input), button("Whole range", null, () => this.wholeRange(), "quiet")),
-      this.density.element, this.regions.switch);
+      this.stretchFields, this.density.element, this.regions.switch);
     onWidth(this.frame, width => { this.width = width; this.refresh(); });
     editPoints(this.plot, {
       choose: circle => this.focusOn(circle), insertAt: event => this.insertAt(event), dragTo: event => this.drag(event),
@@ -82,13 +83,16 @@ export class TransferEditor {
   }
 
   refresh(): void {
-    const { state } = this.context.store, map = this.source.current(), custom = state.map !== null;
+    const { state } = this.context.store, map = this.source.current(), custom = state.map !== null, { pending } = this.source;
     this.presets.fill([...presetChoices(), ...(custom ? [["", `${state.map?.name ?? ""} (own)`] as const] : [])]);
     this.presets.set(custom ? "" : state.preset);
     for (const part of [this.frame, this.pointFields, this.addButton, this.removeButton]) part.hidden = map.regions !== undefined;
-    if (!map.regions) this.drawCurves(map);
+    for (const part of [this.pointFields, this.stretchFields]) put(part, "data-pending", pending);
+    if (pending) this.drawNothing();
+    else if (!map.regions) this.drawCurves(map);
     this.regions.refresh(map);
-    this.note.textContent = this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : "";
+    this.regions.switch.hidden = pending;
+    this.note.textContent = pending ? "The function shows once the dataset is read." : this.source.untold ? "This gateway does not send the points of a preset. Editing begins with a ramp." : "";
     this.note.hidden = this.note.textContent === "";
     const [low, high] = this.source.range();
     this.low.set(low);
@@ -99,6 +103,12 @@ export class TransferEditor {
   }
 
   // ---- drawing
+
+  // No curve is made up before its points are known.
+  private drawNothing(): void {
+    for (const path of [this.bars, this.area, this.curve]) path.setAttribute("d", "");
+    for (const part of [this.ticks, this.points, this.gradient]) part.replaceChildren();
+  }
 
   private drawCurves(map: ColorMap): void {
     const scale = this.scale(map), height = PLOT.height + PLOT.stripGap + PLOT.strip + 26;
@@ -155,7 +165,7 @@ export class TransferEditor {
 
   // ---- changing
 
-  private edit(map: ColorMap, gesture: string): void { this.source.edit(map, gesture); }
+  private edit(map: ColorMap, gesture: string): void { if (!this.source.pending) this.source.edit(map, gesture); }
   private rendererFor(regions: boolean): { renderer?: string } { return regions ? turnTo("regions", this.context.store.state.renderer) : {}; }
 
   private moveTo(x: number | null, y: number | null): void {

@@ -13,6 +13,7 @@ import { Pane, type PaneEvents, type Shown } from "./pane";
 import type { Pointed } from "./pointed";
 import type { Part } from "./saving";
 import type { State } from "./state";
+import { visibleRangeOf } from "./transfer";
 import { rounded, roundedPoint, type Vec3 } from "./vec";
 
 const LEAST_WINDOW = 1e-3; // as a share of the data's range
@@ -33,12 +34,12 @@ export class Viewer {
     context.onVolume(volume => {
       if (this.pane.shown) this.resolveFit(this.pane.shown);
       this.annotate();
-      if (volume && Object.keys(context.store.state.parameters).length > 0) this.later(); // by now it is known which of them apply
+      if (volume) this.later(); // by now it is known which of its options apply
     });
     measuring.onChange(() => this.annotate());
     labels.onChange(() => this.annotate());
     context.store.subscribe(() => this.later());
-    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "layout", "crosshair", "clipBox", "legend", "labels", "labelsShown", "labelOpacities"]); // else with the next picture
+    context.store.subscribe(() => this.annotate(), ["marker", "scaleBar", "colorBar", "layout", "crosshair", "clipBox", "legend", "labels", "labelsShown", "labelOpacities"]); // else with the next picture
     listenToGestures(this.pane.canvas, {
       state: () => context.store.state,
       pixelSize: () => this.pixelSize(),
@@ -70,14 +71,18 @@ export class Viewer {
     this.context.store.update(patch, gesture);
   }
 
-  // To the right widens the range of values, upwards brightens: the range goes down.
+  // To the right widens the range of values, upwards brightens: the range goes down. The window is that of what shows: the rest of the
+  // function, such as clear air, moves with it.
   window(widen: number, raise: number, inputAt: number): void {
-    const [low, high] = this.source.range(), volume = this.context.volume();
-    if (!volume || !can("transfer", this.context.store.state.renderer)) return;
-    const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], 1e-9);
-    const width = Math.max((high - low) * Math.exp(1.5 * widen), least), middle = (low + high) / 2 - raise * (high - low);
+    const volume = this.context.volume();
+    if (!volume || this.source.pending || !can("transfer", this.context.store.state.renderer)) return;
+    const [low, high] = this.source.range(), [from, to] = visibleRangeOf(this.source.current());
+    const least = LEAST_WINDOW * Math.max(volume.range[1] - volume.range[0], Number.MIN_VALUE);
+    const width = Math.max((to - from) * Math.exp(1.5 * widen), least), middle = (from + to) / 2 - raise * (to - from);
+    const moved = (value: number): number => rounded(middle + ((value - (from + to) / 2) * width) / (to - from), 5);
+    if (!(to > from && moved(low) < moved(high))) return;
     this.inputAt ??= inputAt;
-    this.context.store.update({ range: [rounded(middle - width / 2, 5), rounded(middle + width / 2, 5)] }, "window");
+    this.context.store.update({ range: [moved(low), moved(high)] }, "window");
     this.context.say(`Window ${rounded(width, 3)}, level ${rounded(middle, 3)}`);
   }
 
@@ -109,11 +114,11 @@ export class Viewer {
     this.context.store.update({ lookAt: roundedPoint(header.geometry.target), zoom: rounded((zoomOf(header.geometry, header.size[0], header.size[1], volume.extent) * state.zoom) / made) });
   }
 
-  private annotate(): void {
+  annotate(): void {
     const { shown } = this.pane, { state } = this.context.store;
     if (!shown) return;
     const crosshair = state.layout === "quad" && state.crosshair ? { at: state.crosshair, lines: false } : null;
-    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.labels.legend() });
+    this.pane.drawing.draw(shown, { marker: state.marker, scaleBar: state.scaleBar, sides: state.marker, crosshair, measures: this.measuring.drawn(), legend: this.labels.legend(), bar: state.colorBar ? this.source.bar() : null });
     this.handles.update(shown, state.clipBox, this.context.volume());
     this.pane.level.show(shown.frame.header, this.context.volume()?.levels.length ?? 0);
   }
@@ -122,7 +127,7 @@ export class Viewer {
   part(): Part {
     return {
       name: "3d", title: "3-D picture", view: { picture: "render", timeline: false, options: renderOptions(this.context.store.state) },
-      marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.labels.legend() },
+      marks: { marker: true, scaleBar: true, sides: true, crosshair: null, measures: this.measuring.drawn(), legend: this.labels.legend(), bar: this.context.store.state.colorBar ? this.source.bar() : null },
     };
   }
 

@@ -35,7 +35,7 @@ struct SampleRow {
 // The extinction of stored samples, by place: between two bins of the classification table it is linear, and there are several places from
 // bin to bin.
 struct ExtinctionTable {
-  float scale = 1, offset = 0, last = 0;  // the place of a sample s: clamp(s * scale + offset, 0, last), cut to a whole number
+  float origin = 0, scale = 1, last = 0;  // the place of a sample s: clamp((s - origin) * scale + 0.5, 0, last), cut to a whole number
   std::int32_t first = 0;                 // nothing before this place takes any light
   std::vector<double> each, before;       // extinction, and its integral from the first place to this one
 };
@@ -55,7 +55,7 @@ void ExtinctionOfRow(const ExtinctionTable& table, const SampleRow& row, std::in
   const hn::Rebind<float, decltype(dd)> df;
   const hn::Rebind<std::int32_t, decltype(dd)> di;
   const auto place_of = [&](auto sample) HWY_ATTR {
-    const auto place = hn::Add(hn::Mul(sample, hn::Set(df, table.scale)), hn::Set(df, table.offset));
+    const auto place = hn::MulAdd(hn::Sub(sample, hn::Set(df, table.origin)), hn::Set(df, table.scale), hn::Set(df, 0.5F));
     return hn::ConvertTo(di, hn::Min(hn::Max(place, hn::Zero(df)), hn::Set(df, table.last)));
   };
   for (std::int32_t x = 0; x < count; x += std::int32_t(hn::Lanes(dd))) {
@@ -116,8 +116,8 @@ ExtinctionTable MakeExtinctionTable(const ClassificationTable& table, double per
     bins.push_back(ExtinctionOfOpacity(double(opacity), table.opacity_distance) * per_voxel_length);
   }
   const auto last = (bins.size() - 1) * std::size_t(fine);
-  ExtinctionTable made{.scale = float(table.bin_from_stored_scale * fine),
-                       .offset = float(0.5 - table.stored_origin * table.bin_from_stored_scale * fine),
+  ExtinctionTable made{.origin = float(table.stored_origin),
+                       .scale = float(table.bin_from_stored_scale * fine),
                        .last = float(last),
                        .each = {},
                        .before = {}};

@@ -6,7 +6,9 @@
 // Highway wants this order.
 #include <hwy/highway.h>
 
+#include <array>
 #include <limits>
+#include <type_traits>
 
 #include "worker/rays/ray_packet-inl.h"
 
@@ -19,6 +21,36 @@ struct ProjectedSamples {
   Floats values;
   Mask valid;
 };
+
+// Samples beside voxels that are not finite, by the weights of the finite ones.
+HWY_NOINLINE ProjectedSamples SamplesOfFinite(const Neighbours<float>& n, const SamplePlace& place, Mask owned) {
+  const FloatTag df;
+  const auto one = Set(1), half = Set(0.5F);
+  const auto upper = [&](std::size_t axis) HWY_ATTR { return hn::Ge(place.fraction[axis], half); };
+  auto sum = hn::Zero(df), weights = sum, nearest = sum;
+  auto least = Set(std::numeric_limits<float>::max()), largest = Set(std::numeric_limits<float>::lowest());
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    const std::array<std::size_t, 3> side = {corner % 2, corner / 2 % 2, corner / 4};
+    const InnerPair& pair = n.inner[side[2]][side[1]];
+    const auto value = side[0] == 0 ? pair.a : pair.b;
+    auto weight = one, is_nearest = one;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto& fraction = place.fraction[axis];
+      weight = hn::Mul(weight, side[axis] == 0 ? hn::Sub(one, fraction) : fraction);
+      is_nearest = side[axis] == 0 ? hn::IfThenZeroElse(upper(axis), is_nearest) : hn::IfThenElseZero(upper(axis), is_nearest);
+    }
+    const auto finite = hn::IsFinite(value);
+    weights = hn::Add(weights, hn::IfThenElseZero(finite, weight));
+    sum = hn::Add(sum, hn::IfThenElseZero(finite, hn::Mul(value, weight)));
+    nearest = hn::Add(nearest, hn::IfThenElseZero(finite, is_nearest));
+    least = hn::IfThenElse(finite, hn::Min(least, value), least);
+    largest = hn::IfThenElse(finite, hn::Max(largest, value), largest);
+  }
+  const auto valid = hn::And(owned, hn::Gt(nearest, hn::Zero(df)));
+  const auto value = hn::Div(sum, hn::IfThenElse(valid, weights, one));
+  return {hn::Min(hn::Max(value, least), largest), hn::And(valid, hn::IsFinite(value))};
+}
+
 template <class T, bool kNearest>
 HWY_INLINE ProjectedSamples SamplesAt(const RayBox& box, SamplePlace place, Mask owned) {
   if constexpr (kNearest) {
@@ -33,8 +65,16 @@ HWY_INLINE ProjectedSamples SamplesAt(const RayBox& box, SamplePlace place, Mask
       largest = hn::Max(largest, hn::Max(pair.a, pair.b));
     }
   }
-  const auto finite = hn::Le(hn::Abs(value), Set(std::numeric_limits<float>::max()));
-  return {hn::Min(hn::Max(value, least), largest), hn::And(owned, finite)};
+  const auto clamped = hn::Min(hn::Max(value, least), largest);
+  if constexpr (std::is_floating_point_v<T>) {
+    // What is interpolated from voxels that are not finite is neither.
+    const auto finite = hn::IsFinite(value);
+    if (!hn::AllTrue(FloatTag(), hn::Or(hn::Not(owned), finite))) {
+      const ProjectedSamples others = SamplesOfFinite(n, place, owned);
+      return {hn::IfThenElse(finite, clamped, others.values), hn::Or(hn::And(owned, finite), others.valid)};
+    }
+  }
+  return {clamped, owned};
 }
 
 HWY_INLINE Floats ValueOf(const ProjectWork& work, Floats samples) {

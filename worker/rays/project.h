@@ -1,9 +1,10 @@
 // ProjectTile: the kernel of projections. It reduces the samples of a box along a pixel's ray to one value: the largest, the least, or
 // their sum.
 //
-// Samples are interpolated trilinearly and clamped to the range of their eight voxels, so that a cell's range bounds them exactly. Samples
-// that are not finite are skipped. Results have the same bits on every instruction set, and combining the boxes of any partition gives the
-// same bits as one box:
+// Samples are interpolated trilinearly and clamped to the range of their eight voxels, so that a cell's range bounds them exactly. Where
+// one of these is not finite, the others are interpolated if the nearest one is among them; else the sample is skipped. So a voxel without
+// a value leaves a hole of its own size. Results have the same bits on every instruction set, and combining the boxes of any partition
+// gives the same bits as one box:
 //
 //   extreme  the extreme of `sign` * sample; then normalised, which is monotonic
 //   sum      sums of integers

@@ -8,12 +8,12 @@
 namespace slabstream {
 namespace {
 
-Float3 Divided(const Vec3& direction, const Vec3& spacing) {
-  const Vec3 v = direction / spacing;
+Float3 Divided(const Vec3& direction, const Vec3& spacing, double unit) {
+  const Vec3 v = direction / (unit * spacing);
   return {float(v.x), float(v.y), float(v.z)};
 }
 
-void AddGradientOpacity(const TransferFunction& transfer, const VolumeDescription& description, RayLook& look) {
+void AddGradientOpacity(const TransferFunction& transfer, const VolumeDescription& description, double unit, RayLook& look) {
   const std::vector<GradientOpacityPoint>& points = transfer.gradient_opacities;
   if (points.empty() || !transfer.regions.empty()) return;  // a RegionTable has them, too
   const double steepest = points.back().slope;
@@ -23,7 +23,7 @@ void AddGradientOpacity(const TransferFunction& transfer, const VolumeDescriptio
     look.gradient_factors.push_back(float(GradientOpacity(points, steepest * entry / std::max(double(look.gradient_last), 1.0))));
   }
   // The kernel's gradients are differences over two voxels, of stored samples.
-  look.gradient_scale = float(std::min(per_slope * std::abs(description.mapping.scale) / 2, 1e30));
+  look.gradient_scale = float(std::min(per_slope * std::abs(description.mapping.scale) * unit / 2, 1e30));
 }
 
 }  // namespace
@@ -39,7 +39,10 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   look.rounding = exact ? 0.5F : 0.5F - 0x1p-9F;
   look.last = float(entries - 1);
   const double exponent = 1 / (steps_per_voxel * table.opacity_distance);
-  AddGradientOpacity(transfer, description, look);
+  // A power of two, so that it moves no bit of a light.
+  const double unit = std::exp2(std::clamp(std::round(std::log2(table.stored_extent)), -126.0, 126.0));
+  look.gradient_unit = float(unit);
+  AddGradientOpacity(transfer, description, unit, look);
   look.step_exponent = float(exponent);
   look.entries.reserve(4 * std::size_t(entries));
   for (int entry = 0; entry < entries; ++entry) {
@@ -61,9 +64,9 @@ RayLook MakeRayLook(const ClassificationTable& table, const TransferFunction& tr
   const Phong phong(shading, camera.view_direction);
   const Vec3 to_viewer = -camera.view_direction;
   look.phong = shading.model == ShadingModel::kPhong;
-  look.inverse_spacing = Divided({1, 1, 1}, spacing);
-  look.viewer = Divided(to_viewer, spacing);
-  for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, spacing), float(Dot(light, to_viewer))});
+  look.inverse_spacing = Divided({1, 1, 1}, spacing, unit);
+  look.viewer = Divided(to_viewer, spacing, unit);
+  for (const Vec3& light : phong.lights()) look.lights.push_back({Divided(light, spacing, unit), float(Dot(light, to_viewer))});
   const auto [ambient, diffuse, specular, shininess] = shading.On();
   look.ambient = ambient;
   look.diffuse = diffuse;

@@ -35,13 +35,15 @@ struct RayLook {
 
   bool volume_shows = false;  // an entry's opacity is above 0
 
-  // Phong's model for the gradient g of samples in data space. With n = g / spacing: N.L = Dot(g, light) / |g * inverse_spacing|.
+  // Phong's model for the gradient g of samples in data space. With n = g / spacing: N.L = Dot(g, light) / |g * inverse_spacing|. Gradients
+  // are counted in a unit near to what the table's samples differ by, so that neither 1e-30 nor 1e30 has a square that no float holds.
   struct Light {
-    Float3 direction;  // towards the light, by component divided by the spacing
+    Float3 direction;  // towards the light, by component divided by spacing and unit
     float to_viewer;   // L.V
   };
   bool phong = true;
-  Float3 inverse_spacing{}, viewer{};  // towards the viewer, divided like the lights
+  float gradient_unit = 1;             // stored samples; a power of two
+  Float3 inverse_spacing{}, viewer{};  // 1, and towards the viewer, divided like the lights
   std::vector<Light> lights;
   float ambient = 0, diffuse = 1, specular = 0, shininess = 1;
   int whole_shininess = 0;  // shininess if it is a whole number up to 128, otherwise 0

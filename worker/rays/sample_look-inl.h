@@ -63,7 +63,7 @@ HWY_INLINE Gradient Choose(Mask mask, const Gradient& a, const Gradient& b) {
   return {hn::IfThenElse(mask, a.x, b.x), hn::IfThenElse(mask, a.y, b.y), hn::IfThenElse(mask, a.z, b.z)};
 }
 
-// The gradient's magnitude per unit of the world, times two; 0 where it is not finite.
+// The gradient's magnitude in gradient_unit per unit of length, times two; 0 where it is not finite.
 HWY_INLINE Floats SlopeOf(const RayLook& look, const Gradient& g) {
   const auto square = [&](Floats slope, std::size_t axis) HWY_ATTR {
     const auto physical = hn::Mul(slope, Set(look.inverse_spacing[axis]));
@@ -90,7 +90,7 @@ HWY_INLINE Ints RegionOf(const RayLook& look, Floats value, const Gradient& g) {
     return hn::ConvertTo(di, hn::Min(hn::Max(hn::Add(number, Set(0.5F)), hn::Zero(df)), Set(float(count - 1))));
   };
   const auto row = place(hn::Mul(hn::Sub(value, Set(table.origin)), Set(table.scale)), RegionTable::kValues);
-  const auto steep = place(hn::Sqrt(hn::Mul(SlopeOf(look, g), Set(0.5F * table.slope_scale))), RegionTable::kSlopes);
+  const auto steep = place(hn::Sqrt(hn::Mul(SlopeOf(look, g), Set(0.5F * look.gradient_unit * table.slope_scale))), RegionTable::kSlopes);
   static_assert(RegionTable::kSlopes == 256);
   return hn::ShiftLeft<2>(hn::Add(hn::ShiftLeft<8>(row), steep));
 }

@@ -54,7 +54,8 @@ ViewRays MakeViewRays(const Camera& camera, const VolumeGeometry& geometry, doub
   rays.step = float(step);
   // Under perspective samples lie at distances from the eye, which are larger than depths.
   const double farthest = std::max(centre_depth, rays.perspective ? Length((middle - camera.eye) * spacing) : 0) + radius;
-  rays.sample_count = std::int32_t(std::ceil(farthest / step) - first) + 1;
+  constexpr double kMostSamples = 0x1p24;  // single precision numbers so many; only eyes beside the picture would see more
+  rays.sample_count = std::int32_t(std::clamp(std::ceil(farthest / step) - first, 0.0, kMostSamples)) + 1;
   rays.volume_end = ToFloat3(ToVec3(geometry.size) - Vec3{0.5, 0.5, 0.5});
   for (const HalfSpace& side : clip.sides) rays.clip.sides.push_back({ToFloat3(side.normal), float(side.offset)});
   rays.clip.cut_away = clip.mode == ClipMode::kCutAway && !clip.empty();  // without sides nothing is clipped
@@ -85,7 +86,10 @@ RayReach ReachOfBox(const ViewRays& rays, const Camera& camera, const Vec3& low,
     nearest = std::min(nearest, at.depth);  // no point is nearer to the eye than its plane of depth
     farthest = std::max(farthest, rays.perspective ? Length((p - camera.eye) * camera.spacing) : at.depth);
   }
-  const auto sample = [&](double distance) { return std::int32_t((distance - double(rays.start_distance)) / double(rays.step)); };
+  const auto sample = [&](double distance) {
+    const double number = (distance - double(rays.start_distance)) / double(rays.step);
+    return std::int32_t(std::clamp(number, -double(kSampleSlack), double(rays.sample_count)));
+  };
   // A pixel counts if its centre is inside.
   const auto first_pixel = [](double x, std::int32_t count) {
     return std::int32_t(std::clamp(std::ceil(x - 0.5 - kPixelSlack), 0.0, double(count)));

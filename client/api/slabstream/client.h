@@ -89,12 +89,12 @@ class SLABSTREAM_API Image {
   std::vector<float> Depth() const;
 
   // The bytes of a PNG file, over the background and under the annotations that options ask for: those of `slabstream render`.
-  // Unavailable: libslabstream-pictures.so or OpenImageIO is missing.
   std::vector<std::byte> Png() const;
   // Likewise of a JPEG file, over black as far as the picture is transparent. `quality` in [1, 100], else InvalidArgument.
   std::vector<std::byte> Jpeg(int quality = 90) const;
-  // Writes a .png file, or an .exr file with the floats and depths. It appears whole or not at all. InvalidArgument: another ending.
-  // Unavailable: it cannot be written.
+  // Writes a .png, .jpg, .webp, .tif, .exr (with the floats and depths), .pdf or .svg file. It appears whole or not at all.
+  // InvalidArgument: another ending. Unavailable: it cannot be written, or libslabstream-pictures.so is missing, which writes the last
+  // four.
   void Save(const std::string& path) const;
 
   bool final() const noexcept;  // false: a preview, of groups_done() of group_count() parts of the volume

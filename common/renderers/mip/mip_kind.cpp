@@ -11,13 +11,22 @@
 namespace slabstream::mip {
 namespace {
 
-// Premultiplied colours of values in [0, 1], interpolated between kMaxBins places.
+// Premultiplied colours of values in [0, 1], interpolated between kMaxBins places among the data values that the function tells apart.
 class ColorTable {
  public:
   explicit ColorTable(const FrameSetup& setup) : entries_(std::size_t{kMaxBins} + 1) {
+    const auto [least, largest] = ProjectedValuesOf(setup);
+    const auto [first, last] = NodesOf(setup.transfer);
+    const double place = (last - first) / (kMaxBins - 3);  // one more beyond each end
+    const double low = std::clamp(first - place, least, largest), high = std::clamp(last + place, low, largest);
+    const double extent = high - low;
+    if (extent > 0) {
+      scale_ = (largest - least) / extent * (kMaxBins - 1);
+      offset_ = (least - low) / extent * (kMaxBins - 1);
+    }
     for (std::size_t i = 0; i < entries_.size(); ++i) {
       const double t = std::min(double(i) / (kMaxBins - 1), 1.0);
-      const double data = double(setup.range.min) + t * (double(setup.range.max) - double(setup.range.min));
+      const double data = low + t * extent;
       const auto opacity = float(setup.transfer.Opacity(data));
       const Rgb color = setup.transfer.Color(data);
       entries_[i] = {opacity * color.r, opacity * color.g, opacity * color.b, opacity};
@@ -25,7 +34,7 @@ class ColorTable {
   }
 
   void Look(double value, float* rgba) const {
-    const double place = value * (kMaxBins - 1);
+    const double place = std::clamp(value * scale_ + offset_, 0.0, double(kMaxBins - 1));
     const auto below = std::size_t(place);
     const auto t = float(place - double(below));
     for (std::size_t c = 0; c < 4; ++c) rgba[c] = entries_[below][c] + t * (entries_[below + 1][c] - entries_[below][c]);
@@ -33,6 +42,7 @@ class ColorTable {
 
  private:
   std::vector<std::array<float, 4>> entries_;
+  double scale_ = 0, offset_ = 0;  // place = value * scale + offset
 };
 
 double ValueOf(const float* pixel, ProjectionMode mode) {

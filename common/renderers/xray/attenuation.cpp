@@ -31,13 +31,27 @@ double WaterAttenuation(double energy) {
   return per_cm / 10;
 }
 
+namespace {
+
+bool OfHounsfield(const FrameSetup& setup) {
+  constexpr double kSurelyAir = -500;
+  const auto scale = Attenuating(int(setup.parameters.at(kAttenuation)));
+  if (scale == Attenuating::kAutomatic) return double(setup.range.min) <= kSurelyAir;
+  return scale == Attenuating::kHounsfield;
+}
+
+}  // namespace
+
+double MostAttenuating(const FrameSetup& setup) {
+  constexpr double kMost = 65535;
+  return OfHounsfield(setup) ? std::min(double(setup.range.max), kMost) : double(setup.range.max);
+}
+
 Attenuation AttenuationOf(const FrameSetup& setup) {
   const double least = double(setup.range.min), largest = double(setup.range.max);
-  constexpr double kAir = -1000, kSurelyAir = -500;  // Hounsfield units
-  auto scale = Attenuating(int(setup.parameters.at(kAttenuation)));
-  if (scale == Attenuating::kAutomatic) scale = least <= kSurelyAir ? Attenuating::kHounsfield : Attenuating::kRange;
+  constexpr double kAir = -1000;  // Hounsfield units
   const double of_water = WaterAttenuation(setup.parameters.at(kEnergy));
-  if (scale == Attenuating::kHounsfield) return {of_water, kAir, 0};
+  if (OfHounsfield(setup)) return {of_water, kAir, 0};
   return {of_water, least, std::midpoint(least, largest)};
 }
 

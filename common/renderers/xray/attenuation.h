@@ -23,6 +23,9 @@ struct Attenuation {
 
   double Of(double value) const { return value > clear && water > clear ? of_water * (value - clear) / (water - clear) : 0; }
 };
+// The value that attenuates most. Beyond 65535 Hounsfield units nothing is known: a fill value far above takes no precision from the
+// others.
+double MostAttenuating(const FrameSetup& setup);
 // `setup`: of this renderer.
 Attenuation AttenuationOf(const FrameSetup& setup);
 

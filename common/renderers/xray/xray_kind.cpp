@@ -61,10 +61,11 @@ class XrayKind : public ProjectionKind {
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
     const std::vector<double>& parameters = setup.parameters;
-    const double step = Least(setup.description.geometry.spacing) / parameters.at(0);  // mm
-    const double integral_of_one = AttenuationOf(setup).Of(double(setup.range.max)) * step;
+    const double step = setup.unit * Least(setup.description.geometry.spacing) / parameters.at(0);  // mm
+    const double integral_of_one = AttenuationOf(setup).Of(MostAttenuating(setup)) * step;
     double window = parameters.at(kWindow);
-    if (window <= 0) window = std::max(LargestSum(frame) * integral_of_one, 1e-6);
+    if (window <= 0) window = LargestSum(frame) * integral_of_one;
+    if (window <= 0) window = 1;  // nothing attenuates
     const double level = parameters.at(kLevel) > 0 ? parameters.at(kLevel) : window / 2;
     const bool dark = parameters.at(kPolarity) != 0;
     return ColorPixels(frame, setup, [=](const float* pixel, float* rgba) {

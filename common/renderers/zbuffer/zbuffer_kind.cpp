@@ -1,5 +1,7 @@
 // The Z-buffer's planning half: the frame is the picture, supersampled where it is minified; only opaque voxels draw.
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "common/calibration/calibration.h"
 #include "common/renderers/renderer_kind.h"
@@ -57,7 +59,7 @@ class ZBufferKind : public RendererKind {
     for (float& opacity : table.opacity) opacity = opacity >= least ? opacity : 0;
     for (const Isosurface& surface : transfer.isosurfaces) {
       for (std::size_t bin = 0; bin < table.opacity.size(); ++bin) {
-        if (table.ValueOf(int(bin), description.mapping) < surface.value) continue;
+        if (table.value[bin] < surface.value) continue;
         table.opacity[bin] = 1;
         table.color[bin] = surface.color;
       }
@@ -68,11 +70,16 @@ class ZBufferKind : public RendererKind {
   std::unique_ptr<AnalyticCost> MakeCost(const CostBasis& basis) const override { return std::make_unique<ZBufferCost>(*basis.drawn); }
 
   LocalImage Finish(const LocalImage& frame, const FrameSetup& setup) const override {
-    if (setup.shading.model != ShadingModel::kDepthGradient) return RendererKind::Finish(frame, setup);
-    return RendererKind::Finish(ShadeByDepth(frame, setup), setup);
+    const bool by_depth = setup.shading.model == ShadingModel::kDepthGradient;
+    LocalImage picture = RendererKind::Finish(by_depth ? ShadeByDepth(frame, setup) : frame, setup);
+    if (setup.unit == 1) return picture;
+    for (float& depth : picture.depth) {
+      if (std::isfinite(depth)) depth = float(std::min(depth * setup.unit, double(std::numeric_limits<float>::max())));
+    }
+    return picture;
   }
   bool FrameIsPicture(const FrameSetup& setup) const override {
-    return setup.shading.model != ShadingModel::kDepthGradient && RendererKind::FrameIsPicture(setup);
+    return setup.shading.model != ShadingModel::kDepthGradient && setup.unit == 1 && RendererKind::FrameIsPicture(setup);
   }
 };
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 #include <vector>
 
 #include "common/view/picture_labels.h"
@@ -51,8 +52,8 @@ struct Drawing {
   }
 };
 
-Drawing Draw(const Annotations& annotations, ImageSize size, const PictureGeometry& geometry = {}, Color background = kBlack) {
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, {&geometry, 1});
+Drawing DrawFormat(const PictureFormat& format, ImageSize size, const PictureGeometry& geometry, Color background) {
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(MarksOf(format, size, {&geometry, 1}).value());
   EXPECT_TRUE(layers.ok()) << layers.status().message();
   Drawing drawing{size, {}, background};
   for (std::int64_t i = 0; i < std::int64_t{size.width} * size.height; ++i)
@@ -60,6 +61,11 @@ Drawing Draw(const Annotations& annotations, ImageSize size, const PictureGeomet
   const std::size_t row = 4 * std::size_t(size.width);
   for (int y = 0; y < size.height; ++y) layers->PutOver(y, std::span(drawing.rgba).subspan(std::size_t(y) * row, row));
   return drawing;
+}
+
+// On a background of which the annotations do not know.
+Drawing Draw(const Annotations& annotations, ImageSize size, const PictureGeometry& geometry = {}, Color background = kBlack) {
+  return DrawFormat({.annotations = annotations}, size, geometry, background);
 }
 
 PictureGeometry OfPatient() {
@@ -147,6 +153,59 @@ TEST(AnnotationsTest, EverythingCanBeReadOnAnyBackground) {
       }
     }
   }
+}
+
+// As codes of a PNG.
+std::array<int, 4> CodesOf(const Color& color) {
+  std::array<int, 4> codes{};
+  std::ranges::transform(color, codes.begin(), [](float channel) { return int(std::lround(255 * channel)); });
+  return codes;
+}
+
+// Black or white, and nothing that is farther from the letters' colour than the background: no outline.
+TEST(AnnotationsTest, LettersStandAloneOnAnOpaqueBackground) {
+  for (const Color& background : {kBlack, kWhite, Color{0.5F, 0.5F, 0.5F, 1}, Color{0.1F, 0.1F, 0.4F, 1}, Color{1, 0.9F, 0.2F, 1}}) {
+    const auto [r, g, b, a] = background;
+    const Drawing drawing =
+        DrawFormat({.background = {r, g, b, a}, .annotations = {.scale_bar = true, .title = "Title"}}, {400, 400}, OfPatient(), background);
+    const bool white = background == kBlack || b == 0.4F;
+    int full = 0;
+    for (int y = 0; y < 400; ++y) {
+      for (int x = 0; x < 400; ++x) {
+        const std::array<int, 4> here = CodesOf(drawing.At(x, y)), ground = CodesOf(background);
+        for (std::size_t c = 0; c < 4; ++c) ASSERT_TRUE(white ? here[c] >= ground[c] : here[c] <= ground[c] || c == 3) << x << " " << y;
+        full += here == (white ? std::array{255, 255, 255, 255} : std::array{0, 0, 0, 255}) ? 1 : 0;
+      }
+    }
+    EXPECT_GT(full, 200);
+  }
+}
+
+// Where the picture lies behind them, letters have an outline of the background's colour.
+TEST(AnnotationsTest, LettersCanBeReadBeforeThePicture) {
+  const Color picture = {0.1F, 0.1F, 0.1F, 1};
+  const Drawing drawing = DrawFormat({.background = {1, 1, 1, 1}, .annotations = {.title = "Title"}}, {400, 400}, OfPatient(), picture);
+  int black = 0, bright = 0;
+  for (int y = 0; y < 400; ++y) {
+    for (int x = 0; x < 400; ++x) {
+      black += drawing.At(x, y)[0] == 0 ? 1 : 0;
+      bright += drawing.At(x, y)[0] > 0.8F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(black, 50);
+  EXPECT_GT(bright, 30);
+}
+
+TEST(AnnotationsTest, TheFontsSizeIsInPoints) {
+  const auto height = [](double points, std::optional<int> dots_per_inch, int side) {
+    const PictureFormat format{.annotations = {.title = "H", .font_size = points}, .dots_per_inch = dots_per_inch};
+    return DrawFormat(format, {side, side}, {}, kBlack).ChangedBounds().height();  // of a capital letter and its halo, which is black
+  };
+  EXPECT_NEAR(height(20, {}, 500), 0.73 * 20, 2);
+  EXPECT_NEAR(height(20, 144, 500), 0.73 * 40, 2);
+  EXPECT_NEAR(height(20, 144, 4000), 0.73 * 40, 2) << "whatever the picture's size is";
+  EXPECT_LT(height(1000, 10000, 500), 250) << "no letter fills the picture";
+  EXPECT_GT(height(1, {}, 8), 0);
 }
 
 TEST(AnnotationsTest, SizesGrowWithThePicture) {
@@ -311,10 +370,11 @@ TEST(AnnotationsTest, AFontThatIsNotThereIsNamed) {
     const Variable variable("SLABSTREAM_FONT", missing);
     EXPECT_EQ(CheckCanDraw({}), Status::Ok()) << "nobody needs it";
     EXPECT_EQ(CheckCanDraw(kAll), Status::NotFound("$SLABSTREAM_FONT names '" + missing + "', which is no file"));
-    EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {&pane, 1}).status().code(), StatusCode::kNotFound);
+    EXPECT_EQ(MarksOf({.annotations = kAll}, {64, 64}, {&pane, 1}).status().code(), StatusCode::kNotFound);
   }
   const Variable variable("SLABSTREAM_FONT", text);
-  EXPECT_EQ(AnnotationLayers::Draw(kAll, {64, 64}, {&pane, 1}).status(), Status::InvalidArgument("the font '" + text + "' cannot be read"));
+  EXPECT_EQ(MarksOf({.annotations = kAll}, {64, 64}, {&pane, 1}).status(),
+            Status::InvalidArgument("the font '" + text + "' cannot be read"));
 }
 
 }  // namespace

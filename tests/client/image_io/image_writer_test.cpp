@@ -9,8 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
+#include <webp/decode.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -81,7 +83,8 @@ TEST_F(ImageWriterTest, PngIsTheSameOfThePictureAndOfItsCodes) {
   const LocalImage floats = TwoPixels(PixelFormat::kRgba);
   StraightImage codes = MakeStraightImage(floats.bounds);
   StraightCodes(floats.rgba.data(), 2, codes.codes.data());
-  EXPECT_EQ(PngFile(codes, kSize, {}).value(), PngFile(floats, kSize, {}).value());
+  const auto png = [](const PictureImage& image) { return PictureFile(PictureFileType::kPng, image, kSize, {}).value(); };
+  EXPECT_EQ(png(codes), png(floats));
   // A background shows through where the picture is translucent, as far as its codes say it.
   const PictureFormat white{.background = {1, 1, 1, 1}};
   ASSERT_EQ(WritePicture(codes, kSize, Path("codes.png"), white), Status::Ok());
@@ -187,10 +190,17 @@ TEST_F(ImageWriterTest, ExrStatesTheSizeOfAPatientsPixels) {
 TEST_F(ImageWriterTest, TheRecordIsTextThatOthersCanRead) {
   PictureNotes notes;
   notes.record = R"({"source": "B\u00fcro \"x\"", "empty": {}})";
-  for (const std::string name : {"a.png", "a.exr"}) {
+  for (const std::string name : {"a.png", "a.exr", "a.jpg", "a.tif", "a.webp", "a.pdf"}) {
     ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}, notes), Status::Ok());
+    if (name == "a.webp" || name == "a.pdf") {
+      const std::string once = Bytes(Path(name));
+      ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}, notes), Status::Ok());
+      EXPECT_EQ(Bytes(Path(name)), once) << name;
+      continue;
+    }
     const FileImage file = Read(Path(name));
-    EXPECT_EQ(file.spec.get_string_attribute("slabstream"), notes.record) << name;
+    const bool own_text = name == "a.png" || name == "a.exr";
+    EXPECT_EQ(file.spec.get_string_attribute(own_text ? "slabstream" : "ImageDescription"), notes.record) << name;
     EXPECT_THAT(std::string(file.spec.get_string_attribute("Software")), testing::StartsWith("slabstream ")) << name;
     // The same request, the same bytes: no time, no host.
     const std::string before = Bytes(Path(name));
@@ -222,6 +232,110 @@ TEST_F(ImageWriterTest, AnnotationsLieOverPictureAndBackground) {
   int white = 0;
   for (int x = 0; x < 200; ++x) white += bar.At(x, 193) == std::vector<float>{1, 1, 1, 1, 7} ? 1 : 0;
   EXPECT_NEAR(white, 50, 2);
+}
+
+// Pixels of all values, some of them translucent.
+LocalImage Noise(int side) {
+  LocalImage noise = MakeLocalImage(PixelFormat::kRgba, {0, 0, side, side});
+  for (std::size_t i = 0; i < noise.rgba.size(); i += 4) {
+    const float alpha = i % 3 == 0 ? 1.0F : float(i * 40503U % 1000U) / 1000;
+    for (std::size_t c = 0; c < 3; ++c) noise.rgba[i + c] = alpha * float((i + c) * 2654435761U % 1000U) / 1000;
+    noise.rgba[i + 3] = alpha;
+  }
+  return noise;
+}
+
+TEST_F(ImageWriterTest, TiffHoldsThePixelsOfThePng) {
+  const LocalImage noise = Noise(40);
+  for (const int bits : {8, 16}) {
+    ASSERT_EQ(WritePicture(noise, {40, 40}, Path("a.png"), {.png_bits = bits}), Status::Ok());
+    ASSERT_EQ(WritePicture(noise, {40, 40}, Path("a.TIFF"), {.png_bits = bits}), Status::Ok());
+    const FileImage png = Read(Path("a.png")), tiff = Read(Path("a.TIFF"));
+    EXPECT_EQ(tiff.spec.format, bits == 16 ? OIIO::TypeDesc::UINT16 : OIIO::TypeDesc::UINT8);
+    EXPECT_EQ(tiff.spec.nchannels, 4);
+    EXPECT_EQ(tiff.samples, png.samples);
+  }
+}
+
+// One colour, which no compression blurs.
+LocalImage Plain(const std::array<float, 4>& color) {
+  LocalImage plain = MakeLocalImage(PixelFormat::kRgba, {0, 0, 32, 32});
+  for (std::size_t i = 0; i < plain.rgba.size(); ++i) plain.rgba[i] = color[i % 4];
+  return plain;
+}
+
+TEST_F(ImageWriterTest, JpegLiesOverItsBackgroundAndThatOverBlack) {
+  const LocalImage plain = Plain({0.25F, 0.1F, 0.3F, 0.5F});
+  const auto expect = [&](const PictureFormat& format, const std::array<float, 3>& color) {
+    ASSERT_EQ(WritePicture(plain, {32, 32}, Path("a.jpeg"), format), Status::Ok());
+    const FileImage file = Read(Path("a.jpeg"));
+    ASSERT_EQ(file.spec.nchannels, 3);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(file.At(9, 7)[c], color[c], 2.01 / 255) << c;
+  };
+  expect({}, {0.25F, 0.1F, 0.3F});
+  expect({.background = {1, 0, 0.2F, 0.5F}}, {0.5F, 0.1F, 0.35F});
+}
+
+TEST_F(ImageWriterTest, WebpKeepsTransparency) {
+  ASSERT_EQ(WritePicture(Plain({0.25F, 0.1F, 0.3F, 0.5F}), {32, 32}, Path("a.webp"), {}), Status::Ok());
+  const std::string bytes = Bytes(Path("a.webp"));
+  int width = 0, height = 0;
+  std::uint8_t* const pixels = WebPDecodeRGBA(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), &width, &height);
+  ASSERT_NE(pixels, nullptr);
+  EXPECT_EQ(width, 32);
+  EXPECT_EQ(height, 32);
+  const std::array<int, 4> expected = {128, 51, 153, 128};
+  for (std::size_t c = 0; c < 4; ++c) EXPECT_NEAR(pixels[4 * 100 + c], expected[c], 4) << c;
+  WebPFree(pixels);
+  const Status large = CheckPictureFile("a.webp", {16384, 10});
+  EXPECT_EQ(large, Status::InvalidArgument("--size 16384x10 is too large for .webp, which has at most 16383 pixels a side"));
+  EXPECT_EQ(CheckPictureFile("a.png", {16384, 10}), Status::Ok());
+}
+
+TEST_F(ImageWriterTest, QualityIsThatOfJpegAndWebp) {
+  const LocalImage noise = Noise(64);
+  for (const std::string name : {"a.jpg", "a.webp"}) {
+    ASSERT_EQ(WritePicture(noise, {64, 64}, Path(name), {.quality = 20}), Status::Ok());
+    const auto coarse = std::filesystem::file_size(Path(name));
+    ASSERT_EQ(WritePicture(noise, {64, 64}, Path(name), {.quality = 95}), Status::Ok());
+    EXPECT_GT(std::filesystem::file_size(Path(name)), 1.5 * double(coarse)) << name;
+  }
+}
+
+// As other programs read it; PDF and SVG: the size of the page.
+TEST_F(ImageWriterTest, FilesStateThePixelsAnInch) {
+  const PictureFormat format{.dots_per_inch = 300};
+  for (const std::string name : {"a.png", "a.jpg", "a.tif", "a.exr"}) {
+    ASSERT_EQ(WritePicture(Noise(32), {32, 32}, Path(name), format, OfPatient(0.5)), Status::Ok());
+    const FileImage file = Read(Path(name));
+    const std::string unit(file.spec.get_string_attribute("ResolutionUnit"));
+    const double inch = unit.starts_with("in") || name == "a.exr" ? 1 : unit == "cm" ? 2.54 : unit == "m" ? 0.0254 : 0;
+    EXPECT_NEAR(file.spec.get_float_attribute("XResolution") * inch, 300, 0.01) << name << " " << unit;
+    EXPECT_NEAR(file.spec.get_float_attribute("YResolution") * inch, 300, 0.01) << name;
+  }
+  for (const std::string name : {"a.jpg", "a.webp"}) {  // Exif: 300 as a fraction
+    ASSERT_EQ(WritePicture(Noise(32), {32, 32}, Path(name), format), Status::Ok());
+    EXPECT_NE(Bytes(Path(name)).find(std::string("\xC0\xC6\x2D\x00\x10\x27\x00\x00", 8)), std::string::npos) << name;
+  }
+  ASSERT_EQ(WritePicture(Noise(300), {300, 300}, Path("a.pdf"), format), Status::Ok());
+  EXPECT_NE(Bytes(Path("a.pdf")).find("/MediaBox [ 0 0 72 72 ]"), std::string::npos);
+  ASSERT_EQ(WritePicture(Noise(300), {300, 300}, Path("a.svg"), format), Status::Ok());
+  EXPECT_NE(Bytes(Path("a.svg")).find("width=\"72pt\" height=\"72pt\""), std::string::npos);
+}
+
+TEST_F(ImageWriterTest, PdfHasLettersAsTextAndSvgAsShapes) {
+  const PictureFormat format{.background = {1, 1, 1, 1}, .annotations = {.scale_bar = true, .orientation_marker = true, .title = "Title"}};
+  ASSERT_EQ(WritePicture(Noise(200), {200, 200}, Path("a.pdf"), format, OfPatient(0.5)), Status::Ok());
+  const std::string pdf = Bytes(Path("a.pdf"));
+  EXPECT_NE(pdf.find("/FontFile2"), std::string::npos) << "the font is in the file";
+  EXPECT_NE(pdf.find("DejaVuSans-Bold"), std::string::npos);
+  EXPECT_NE(pdf.find("/ToUnicode"), std::string::npos) << "text can be found and copied";
+  EXPECT_EQ(pdf.find("CreationDate"), std::string::npos) << "the same request makes the same bytes";
+  ASSERT_EQ(WritePicture(Noise(200), {200, 200}, Path("a.svg"), format, OfPatient(0.5)), Status::Ok());
+  const std::string svg = Bytes(Path("a.svg"));
+  EXPECT_NE(svg.find("<image"), std::string::npos);
+  EXPECT_NE(svg.find("<path"), std::string::npos);
+  EXPECT_EQ(svg.find("<text"), std::string::npos) << "which would need the font";
 }
 
 TEST_F(ImageWriterTest, AnImageWithoutPixelsIsAnEmptyPicture) {
@@ -272,7 +386,7 @@ std::string ErrorOutputOf(Function function) {
 TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
   LocalImage noise = MakeLocalImage(PixelFormat::kRgba, {0, 0, 64, 64});
   for (std::size_t i = 0; i < noise.rgba.size(); ++i) noise.rgba[i] = float(i * 2654435761U % 1000U) / 1000;
-  for (const std::string name : {"a.png", "a.exr"}) {
+  for (const std::string name : {"a.png", "a.exr", "a.jpg", "a.webp", "a.tif", "a.pdf", "a.svg"}) {
     ASSERT_EQ(WritePicture(noise, {64, 64}, Path(name), {}), Status::Ok());
     const auto whole = std::filesystem::file_size(Path(name));
     ASSERT_EQ(WritePicture(TwoPixels(PixelFormat::kRgba), kSize, Path(name), {}), Status::Ok());
@@ -288,7 +402,7 @@ TEST_F(ImageWriterTest, AFullDiskIsToldAndKeepsTheOlderPicture) {
       EXPECT_EQ(std::filesystem::file_size(Path(name)), bytes);
     }
   }
-  EXPECT_EQ(FileCount(), 2U);
+  EXPECT_EQ(FileCount(), 7U);
 }
 
 TEST_F(ImageWriterTest, AFrameOfAMovieLiesOverItsBackgroundAndThatOverBlack) {

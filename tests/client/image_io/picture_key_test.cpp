@@ -39,7 +39,7 @@ struct KeyDrawing {
 
 KeyDrawing DrawKey(const Annotations& annotations, const PictureKey& key, const std::vector<PictureGeometry>& panes = {{}},
                    ImageSize size = kKeySize) {
-  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(annotations, size, panes, key);
+  const Result<AnnotationLayers> layers = AnnotationLayers::Draw(MarksOf({.annotations = annotations}, size, panes, key).value());
   EXPECT_TRUE(layers.ok()) << layers.status().message();
   KeyDrawing drawing{size, {}};
   const std::array<float, 4> black = {0, 0, 0, 1};

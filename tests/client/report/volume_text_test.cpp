@@ -13,6 +13,9 @@ namespace slabstream {
 namespace {
 
 using testing::EndsWith;
+using testing::HasSubstr;
+using testing::StartsWith;
+using Json = nlohmann::ordered_json;
 
 TEST(VolumeText, TellsWholeNumbersToTheLastDigit) {
   const auto texts = [](double value, std::int64_t rest = 0) {
@@ -32,6 +35,41 @@ TEST(VolumeText, TellsWholeNumbersToTheLastDigit) {
   EXPECT_EQ(texts(0.25).second, "0.25");
   EXPECT_EQ(texts(1e300).second, "1e+300");
   EXPECT_THAT(SampleText({.inside = true}), EndsWith("  value not finite"));
+}
+
+TEST(VolumeText, TellsEveryDigitOfAValueAndOfAPoint) {
+  const auto told = [](double value) { return SampleText({.at = {2000000003, 3e22, -0.5}, .inside = true, .value = value}); };
+  EXPECT_THAT(told(double(0.1F)), EndsWith("  value 0.1"));
+  EXPECT_THAT(told(double(1234.5678F)), EndsWith("  value 1234.5677"));
+  EXPECT_THAT(told(double(1e-30F)), EndsWith("  value 1e-30"));
+  EXPECT_THAT(told(0.1), EndsWith("  value 0.1"));
+  EXPECT_THAT(told(1.0 / 3), EndsWith("  value 0.3333333333333333"));
+  EXPECT_THAT(told(1), StartsWith("2000000003 3e+22 -0.5  voxel"));
+}
+
+StatisticsReply TwoLabels(const Orientation& orientation) {
+  const Label left{3, {1, 0.5F, 0}, "left, \"upper\""}, gone{7, {}, ""};
+  const VolumeDescription description{.geometry = {{4, 4, 4}, {2, 2, 0.5}, orientation}};
+  return {.description = description, .labels = {{left, {9, 1, 16777217, 0.25, -1, 0.5}}, {gone, {}}}};
+}
+
+TEST(LabelStatistics, HaveVolumesInMillilitresWhereTheUnitIsKnown) {
+  const Json patient = LabelStatisticsJson(TwoLabels({.world = World::kPatient}));
+  EXPECT_EQ(patient["unit"], "ml");
+  EXPECT_DOUBLE_EQ(patient["labels"][0]["volume"], 10 * 2 * 2 * 0.5 / 1000) << "those that are not finite are of the label, too";
+  EXPECT_EQ(patient["labels"][0]["color"], "#ff8000");
+  EXPECT_TRUE(patient["labels"][1]["mean"].is_null());
+  const Json small = LabelStatisticsJson(TwoLabels({.world = World::kScene, .unit = LengthUnit::kMicrometre}));
+  EXPECT_EQ(small["unit"], "\u00b5m^3");
+  EXPECT_DOUBLE_EQ(small["labels"][0]["volume"], 20);
+}
+
+TEST(LabelStatistics, AreATableWithQuotedNames) {
+  EXPECT_EQ(LabelStatisticsCsv(TwoLabels({.world = World::kPatient})),
+            "value,name,volume (ml),voxels,non_finite,mean,deviation,least,largest\r\n"
+            "3,\"left, \"\"upper\"\"\",0.02,9,1,16777217,0.25,-1,0.5\r\n"
+            "7,,0,0,0,,,,\r\n");
+  EXPECT_THAT(LabelStatisticsText(TwoLabels({})), HasSubstr("none"));
 }
 
 }  // namespace

@@ -35,6 +35,7 @@ const std::vector<PictureFields> kFields = {
     {},
     {{"size", "300x200"}, {"azimuth", "-30.1"}, {"elevation", "20"}, {"zoom", "1e-3"}},
     {{"view", "anterior"}, {"fit", ""}},
+    {{"azimuth", "0"}, {"no-fit", ""}},
     {{"eye", "-1,2,3"}, {"up", "0,1,0"}, {"projection", "perspective"}},
     {{"renderer", "raycast"}, {"isovalue", "300:red:0.5,10"}, {"gradient-opacity", "0:0,5:1"}},
     {{"renderer", "raycast"}, {"isovalue", "300"}, {"transfer", "auto"}, {"sampling-rate", "2"}},
@@ -43,6 +44,7 @@ const std::vector<PictureFields> kFields = {
     {{"background", "#102030"}, {"depth", "16"}, {"title", "A & B = \"C\" --size=1"}, {"scale-bar", ""}},
     {{"color-bar", "K"}, {"legend", "true"}, {"orientation-marker", ""}},
     {{"color-bar", ""}, {"legend", ""}},
+    {{"dpi", "300"}, {"font-size", "9.5"}, {"quality", "40"}, {"title", "x"}},
     {{"renderer", "raycast"}, {"label-mode", "surface"}, {"labels-shown", "1,5-9"}, {"overlay-transfer", "gray-ramp"}},
     {{"decomposition", "kd-tree"}, {"groups", "auto"}, {"combine", "radix-k:2x2"}, {"pixel-error", "1e-4"}},
 };
@@ -55,6 +57,8 @@ TEST(PictureFieldsTest, AskForWhatTheCommandLineAsksFor) {
     EXPECT_EQ(render->frame, typed.request);
     EXPECT_EQ(render->format.background, typed.format.background);
     EXPECT_EQ(render->format.png_bits, typed.format.png_bits);
+    EXPECT_EQ(render->format.quality, typed.format.quality);
+    EXPECT_EQ(render->format.dots_per_inch, typed.format.dots_per_inch);
     EXPECT_EQ(render->format.annotations, typed.format.annotations);
   }
 }
@@ -126,11 +130,18 @@ TEST(PictureFieldsTest, JsonHasNumbersBooleansAndLists) {
   ASSERT_TRUE(render.ok()) << render.status().message();
   EXPECT_EQ(render->frame.view.azimuth_degrees, 30);
   EXPECT_EQ(render->frame.view.zoom, 0.1);
-  EXPECT_TRUE(render->frame.view.fit);
+  EXPECT_EQ(render->frame.view.fit, true);
   EXPECT_FALSE(render->format.annotations.scale_bar);
   EXPECT_EQ(render->frame.shading.lights.size(), 2U);
   for (const char* wrong : {"3", "[]", R"({"zoom": [[1]]})", R"({"light": [null]})"})
     EXPECT_FALSE(FieldsOfJson(Json::parse(wrong)).ok()) << wrong;
+}
+
+TEST(PictureFieldsTest, AFieldOfJsonIsGivenOnce) {
+  for (const char* text : {R"({"size": 30, "azimuth": 1, "size": 40})", R"({"transfer": {"RGBPoints": [], "RGBPoints": []}})"}) {
+    EXPECT_THAT(ParseJson(text).status().message(), HasSubstr("' is given twice")) << text;
+  }
+  EXPECT_TRUE(ParseJson(R"({"a": {"x": 1}, "b": {"x": 1}, "c": [{"x": 1}, {"x": 2}]})").ok());
 }
 
 TEST(PictureFieldsTest, SlicesHaveAFrameForEachPlane) {
@@ -142,6 +153,15 @@ TEST(PictureFieldsTest, SlicesHaveAFrameForEachPlane) {
   ASSERT_EQ(frames->size(), 3U);
   for (const FrameRequest& frame : *frames) EXPECT_EQ(frame.dataset, "head");
   EXPECT_FALSE(ParseSliceFields({{"dataset", "head"}, {"plane", "zyx"}, {"index", "3"}}).ok());
+}
+
+TEST(PictureFieldsTest, AFlagThatIsOnByItselfCanBeTurnedOff) {
+  const auto fit = [](const PictureFields& fields) { return ParseRenderFields(WithDataset(fields)).value().frame.view.fit; };
+  EXPECT_EQ(fit({}), std::nullopt) << "the service decides";
+  EXPECT_EQ(fit({{"fit", "true"}}), true);
+  EXPECT_EQ(fit({{"fit", "false"}}), false);
+  EXPECT_EQ(fit({{"no-fit", "true"}}), false);
+  EXPECT_EQ(fit({{"no-fit", "false"}}), std::nullopt);
 }
 
 }  // namespace

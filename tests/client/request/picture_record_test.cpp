@@ -65,6 +65,9 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--view", "anterior"},
     {"--view", "superior", "--fit"},
     {"--view", "back"},
+    {"--azimuth", "0", "--elevation", "0", "--no-fit"},
+    {"--look-at", "1,2,3", "--no-fit"},
+    {"--eye", "1,2,3", "--fit"},
     {"--look-at", "-1,2.5,1e-7", "--eye", "-100,-200,3"},
     {"--eye", "1,2,3", "--up", "0,-1,0", "--projection", "perspective"},
     {"--renderer", "mip", "--projection-mode", "minimum"},
@@ -97,6 +100,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--title=-x"},
     {"--color-bar", "--legend"},
     {"--color-bar=velocity (m/s)"},
+    {"--title", "x", "--font-size", "9.5", "--dpi", "300", "--quality", "75"},
     {"--previews"},
 };
 
@@ -114,6 +118,8 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       ExpectSame(record.request, typed.request);
       EXPECT_EQ(record.format.background, typed.format.background);
       EXPECT_EQ(record.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(record.format.quality, typed.format.quality);
+      EXPECT_EQ(record.format.dots_per_inch, typed.format.dots_per_inch);
       EXPECT_EQ(record.format.annotations, typed.format.annotations);
 
       std::vector<std::string> again = RenderArguments(record, "b.png");
@@ -127,6 +133,8 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
       ExpectSame(parsed.request, typed.request);
       EXPECT_EQ(parsed.format.background, typed.format.background);
       EXPECT_EQ(parsed.format.png_bits, typed.format.png_bits);
+      EXPECT_EQ(parsed.format.quality, typed.format.quality);
+      EXPECT_EQ(parsed.format.dots_per_inch, typed.format.dots_per_inch);
       EXPECT_EQ(parsed.format.annotations, typed.format.annotations);
     }
   }
@@ -135,7 +143,7 @@ TEST(PictureRecordTest, TheCommandLineAsksForTheSamePicture) {
 TEST(PictureRecordTest, TheCommandLineHoldsWhatDiffersFromTheDefaults) {
   EXPECT_EQ(Joined(RenderArguments(RecordOf(Parse({"-o", "a.png", "brain"})), "b.png")), "render brain -o b.png");
   EXPECT_EQ(Joined(RenderArguments(RecordOf(Parse({"-o", "a.png", "./b.nrrd", "--local=3", "--view", "left", "--zoom", "2"})), "b.png")),
-            "render ./b.nrrd --local --azimuth 270 --zoom 2 -o b.png");
+            "render ./b.nrrd --local --azimuth 270 --elevation 0 --zoom 2 -o b.png");
 }
 
 TEST(PictureRecordTest, ATransferFunctionOfAFileIsKeptWhole) {
@@ -219,6 +227,29 @@ TEST(PictureRecordTest, BadRecordsAreNamed) {
     EXPECT_THAT(record.status().message(), HasSubstr(message));
     EXPECT_EQ(record.status().message().find('\n'), std::string::npos);
   }
+}
+
+// Whatever the request left to the service.
+TEST(PictureRecordTest, TheRecordHasTheViewAndTheRendererThatWereUsed) {
+  const FrameRequest asked = Parse({"-o", "a.png", "brain"}).request;
+  FrameStatistics statistics;
+  statistics.renderer = "mip";
+  statistics.view = ViewParameters{.azimuth_degrees = 180, .zoom = 1.1, .look_at = Vec3{0.1, 2, -3}};
+  const FrameRequest made = AsMade(asked, statistics);
+  EXPECT_EQ(made.view, *statistics.view);
+  const Result<PictureRecord> record = ParseRecord(RecordText("brain", made, {}, SomeGeometry()));
+  ASSERT_TRUE(record.ok()) << record.status().message();
+  EXPECT_EQ(Joined(RenderArguments(*record, "b.png")),
+            "render brain --azimuth 180 --elevation 0 --look-at 0.1,2,-3 --no-fit --zoom 1.1 --renderer mip -o b.png");
+}
+
+// Records of version 0.1 state every number of the view: those pictures had no default view.
+TEST(PictureRecordTest, OlderRecordsKeepTheirView) {
+  FrameRequest plain;
+  plain.dataset = "brain";
+  const Result<PictureRecord> record = ParseRecord(RecordText("brain", plain, {}, SomeGeometry()));
+  ASSERT_TRUE(record.ok()) << record.status().message();
+  EXPECT_EQ(Joined(RenderArguments(*record, "b.png")), "render brain --azimuth 0 --elevation 0 --no-fit -o b.png");
 }
 
 }  // namespace

@@ -6,12 +6,16 @@
 #include <google/protobuf/descriptor.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 #include <set>
 
 #include "client/cli/option_groups.h"
 #include "client/request/picture_fields.h"
 #include "client/request/picture_record.h"
+#include "common/renderers/registry.h"
+#include "common/renderers/renderer_choice.h"
+#include "common/view/default_view.h"
 #include "common/wire/about.h"
 #include "common/wire/request_fields.h"
 #include "common/wire/request_json.h"
@@ -28,6 +32,7 @@ using testing::HasSubstr;
 FrameRequest Standard() {
   FrameRequest request;
   request.dataset = "head";
+  request.view = kUnstatedView;
   return request;
 }
 
@@ -54,8 +59,8 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"transfer", {"gray-ramp", {}}},
     {"scalar-range", {"2%:98%", {}}},
     {"opacity-distance", {"0.25", {}}},
-    {"isovalue", {"300:1,0.5,0:0.25", {{"renderer", "raycast"}, {"transfer", "auto"}}}},
-    {"gradient-opacity", {"0:0.5,3:1", {{"renderer", "raycast"}}}},
+    {"isovalue", {"300:1,0.5,0:0.25", {{"transfer", "auto"}}}},
+    {"gradient-opacity", {"0:0.5,3:1", {}}},
     {"shading", {"none", {}}},
     {"light", {"0,0,1", {}}},
     {"ambient", {"0.2", {}}},
@@ -69,13 +74,13 @@ const std::map<std::string, std::pair<std::string, PictureFields>> kOthers = {
     {"detail", {"2.5", {}}},
     {"level", {"3", {}}},
     {"brightness", {"1.5", {}}},
-    {"label-mode", {"surface", {{"renderer", "raycast"}}}},
-    {"label-tint", {"0.25", {{"renderer", "raycast"}}}},
-    {"label-opacity", {"3=0.5", {{"renderer", "raycast"}}}},
-    {"labels-shown", {"1,5-9", {{"renderer", "raycast"}}}},
-    {"overlay-transfer", {"gray-ramp", {{"renderer", "raycast"}}}},
-    {"overlay-range", {"-1:2", {{"renderer", "raycast"}}}},
-    {"overlay-weight", {"0.5", {{"renderer", "raycast"}}}},
+    {"label-mode", {"surface", {}}},
+    {"label-tint", {"0.25", {}}},
+    {"label-opacity", {"3=0.5", {}}},
+    {"labels-shown", {"1,5-9", {}}},
+    {"overlay-transfer", {"gray-ramp", {}}},
+    {"overlay-range", {"-1:2", {}}},
+    {"overlay-weight", {"0.5", {}}},
     {"decomposition", {"kd-tree", {}}},
     {"axis", {"view", {}}},
     {"balance-by", {"voxels", {}}},
@@ -171,6 +176,26 @@ TEST(RequestOptionsTest, EveryOptionReachesRequestRecordAndKey) {
   }
 }
 
+// A renderer makes the picture of an option if it has the ability that the schema names, or the parameter; the service chooses by the same.
+TEST(RequestOptionsTest, AbilitiesOfTheSchemaDecideWhichRenderersCanDoIt) {
+  const std::map<std::string, std::string> by_value = {{"projection", "perspective"}};  // the value that kOthers has needs it
+  for (const RequestOption& option : RequestOptions()) {
+    if (!IsCompared(option) || option.path == "renderer") continue;
+    const bool labels = option.path.starts_with("labels."), overlay = option.path.starts_with("overlay.");
+    const std::string ability = labels                           ? "labels"
+                                : overlay                        ? "overlay"
+                                : by_value.contains(option.name) ? by_value.at(option.name)
+                                                                 : option.ability;
+    FrameRequest request = Standard();
+    ASSERT_TRUE(SetOption(option, option.name, std::vector{kOthers.at(option.name).first}, ColorMaps::kTexts, request).ok());
+    for (const RendererKind* kind : Renderers()) {
+      request.renderer = kind->name();
+      const bool able = ability.empty() || std::ranges::count(kind->AbilityNames(), ability) != 0;
+      EXPECT_EQ(RenderersFor(request).ok(), able) << option.name << " by " << kind->name();
+    }
+  }
+}
+
 TEST(RequestOptionsTest, LimitsHoldForTextsAndForRequests) {
   for (const RequestOption& option : RequestOptions()) {
     if (!IsCompared(option) || !option.range) continue;
@@ -183,8 +208,9 @@ TEST(RequestOptionsTest, LimitsHoldForTextsAndForRequests) {
     const auto& [least, most, above] = *option.range;
     EXPECT_EQ(refused(least), above);
     EXPECT_FALSE(refused(most));
-    EXPECT_TRUE(refused(least - 1));
-    EXPECT_TRUE(refused(most + 1));
+    // The next number may be the same one, far from 0.
+    EXPECT_TRUE(refused(std::nextafter(least - 1, -HUGE_VAL)));
+    EXPECT_TRUE(refused(std::nextafter(most + 1, HUGE_VAL)));
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "client/request/value_window.h"
 #include "common/cli/parse.h"
+#include "common/view/world_limits.h"
 
 namespace slabstream {
 namespace {
@@ -50,17 +51,25 @@ TEST(ParseGradientOpacities, TakesPointsThatAscend) {
 }
 
 TEST(ParseClipBox, TakesBoundsInThreeUnits) {
+  constexpr double kEnd = kMaxCoordinate;
   const ClipBox world = *ParseClipBox("--clip-box", "-1.5:2,:,0:");
-  EXPECT_EQ(world, (ClipBox{{-1.5, -1e9, 0}, {2, 1e9, 1e9}, ClipUnit::kWorld}));
+  EXPECT_EQ(world, (ClipBox{{-1.5, -kEnd, 0}, {2, kEnd, kEnd}, ClipUnit::kWorld}));
   EXPECT_EQ(*ParseClipBox("--clip-box", "0:10,5:6,0:1v"), (ClipBox{{0, 5, 0}, {10, 6, 1}, ClipUnit::kVoxels}));
-  EXPECT_EQ(*ParseClipBox("--clip-box", ":50,:,:%"), (ClipBox{{-1e9, -1e9, -1e9}, {50, 1e9, 1e9}, ClipUnit::kPercent}));
-  EXPECT_EQ(*ParseClipBox("--clip-box", ":50%,:,:"), (ClipBox{{-1e9, -1e9, -1e9}, {50, 1e9, 1e9}, ClipUnit::kPercent}));
+  EXPECT_EQ(*ParseClipBox("--clip-box", ":50,:,:%"), (ClipBox{{-kEnd, -kEnd, -kEnd}, {50, kEnd, kEnd}, ClipUnit::kPercent}));
+  EXPECT_EQ(*ParseClipBox("--clip-box", ":50%,:,:"), (ClipBox{{-kEnd, -kEnd, -kEnd}, {50, kEnd, kEnd}, ClipUnit::kPercent}));
   EXPECT_EQ(ParseClipBox("--clip-box", "10%:50%,2v:,:").status().message(),
             "--clip-box '10%:50%,2v:,:' has bounds in voxels (v) and in percent (%): all must have one unit");
-  EXPECT_EQ(*ParseClipBox("--clip-box", "1v:5v,:7,2:v"), (ClipBox{{1, -1e9, 2}, {5, 7, 1e9}, ClipUnit::kVoxels}));
+  EXPECT_EQ(*ParseClipBox("--clip-box", "1v:5v,:7,2:v"), (ClipBox{{1, -kEnd, 2}, {5, 7, kEnd}, ClipUnit::kVoxels}));
   for (const char* text : {"", ":", ":,:", "0:1,0:1,0:1,0:1", "1%%:,:,:", "0:1,0:1,1:0", "0:1,0:1,1:1", "0-1,0:1,0:1",
-                           "0:1:2,:,:", "a:1,:,:", ":,:,:x", "nan:1,:,:", "0:2e9,:,:"}) {
+                           "0:1:2,:,:", "a:1,:,:", ":,:,:x", "nan:1,:,:", "0:2e300,:,:"}) {
     EXPECT_EQ(ParseClipBox("--clip-box", text).status().code(), StatusCode::kInvalidArgument) << text;
+  }
+}
+
+TEST(ParsePoint, TakesAnyPlaceOfAWorld) {
+  EXPECT_EQ(*ParsePoint("--at", "3e22,-1e-30,2000000003"), (Vec3{3e22, -1e-30, 2000000003}));
+  for (const char* text : {"inf,0,0", "nan,0,0", "1e301,0,0", "1,2"}) {
+    EXPECT_EQ(ParsePoint("--at", text).status().code(), StatusCode::kInvalidArgument) << text;
   }
 }
 
@@ -80,7 +89,7 @@ TEST(ParseValueWindow, TakesAWidthOrAName) {
   EXPECT_EQ(*ParseValueWindow("--window", "80"), (ValueWindow{80, 40}));
   EXPECT_EQ(*ParseValueWindow("--window", "lung"), (ValueWindow{1500, -600}));
   EXPECT_EQ(ParseValueWindow("--window", "lungs").status().message(),
-            "--window 'lungs' is neither a number nor one of bone, lung, mediastinum, soft-tissue, brain, liver");
+            "--window 'lungs' is neither a number nor one of bone, lung, mediastinum, soft-tissue, brain, liver; did you mean 'lung'?");
   EXPECT_EQ(ParseValueWindow("--window", "0").status().message(), "--window 0 is out of range (0, 1e+30]");
   for (const char* text : {"", "-5", "1x", "nan"}) EXPECT_FALSE(ParseValueWindow("--window", text).ok()) << text;
 }

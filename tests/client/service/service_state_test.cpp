@@ -69,6 +69,16 @@ TEST_F(ServiceStateTest, ALinkInItsPlaceIsRefused) {
   EXPECT_EQ(StateDirectory().status().code(), StatusCode::kUnavailable);
 }
 
+TEST_F(ServiceStateTest, OfTwoWithinASecondTheLaterOneIsMeantAndNeverAnUnlistedOne) {
+  const ServiceState first{"tcp://127.0.0.1:5000", 100.25, ::getpid(), {}, "", ""},
+      second{"tcp://127.0.0.1:4000", 100.5, ::getpid(), {}, "", ""};
+  ServiceState unlisted{"tcp://127.0.0.1:6000", 200, ::getpid(), {}, "", ""};
+  unlisted.unlisted = true;
+  for (const ServiceState& state : {second, unlisted, first}) ASSERT_EQ(SaveState(state), Status::Ok());
+  EXPECT_EQ(FindRemains(""), second);
+  EXPECT_EQ(FindRemains(unlisted.endpoint), unlisted);
+}
+
 TEST_F(ServiceStateTest, AServiceWhoseCoordinatorIsGoneLeavesRemains) {
   const ServiceState state{"tcp://127.0.0.1:5000", 100, ::getpid(), {1, 2}, "", ""};  // this process runs, but is no coordinator
   ASSERT_EQ(SaveState(state), Status::Ok());

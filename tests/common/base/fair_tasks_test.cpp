@@ -58,6 +58,23 @@ TEST(FairTasks, WithOneThreadOwnersTakeTurns) {
   EXPECT_LE(std::find(order.begin(), order.end(), 2) - order.begin(), 1) << "it waits for the turn at hand";
 }
 
+TEST(FairTasks, SomeOfOneOwnerMayRunAtATime) {
+  std::counting_semaphore<> begun{0}, may_end{0}, ended{0};
+  FairTasks tasks(3, 2);
+  const auto task = [&] {
+    begun.release();
+    may_end.acquire();
+    ended.release();
+  };
+  for (int i = 0; i < 4; ++i) tasks.Post(1, task);
+  for (int i = 0; i < 2; ++i) begun.acquire();
+  tasks.Post(2, task);
+  begun.acquire();  // the third thread is left for another owner
+  EXPECT_FALSE(begun.try_acquire());
+  may_end.release(5);
+  for (int i = 0; i < 5; ++i) ended.acquire();
+}
+
 TEST(FairTasks, EveryTaskRunsOnce) {
   constexpr int kTasks = 2000;
   std::atomic<int> runs = 0;

@@ -1,7 +1,9 @@
 #include "common/base/files.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 
@@ -65,6 +67,17 @@ TEST_F(FilesTest, ALinkGoesOnPointingAtTheFile) {
   ASSERT_EQ(WriteTextFile(Path("link"), "new"), Status::Ok());
   EXPECT_TRUE(std::filesystem::is_symlink(Path("link")));
   EXPECT_EQ(*ReadTextFile(Path("a"), kMax), "new");
+}
+
+// In a folder that others may write, such as /tmp, somebody may guess the name of the temporary file.
+TEST_F(FilesTest, ALinkInPlaceOfTheTemporaryFileIsNotFollowed) {
+  ASSERT_EQ(WriteTextFile(Path("victim"), "old"), Status::Ok());
+  constexpr int kNames = 1000;
+  for (int i = 0; i < kNames; ++i) std::filesystem::create_symlink("victim", fmt::format("{}.{}-{}.tmp", Path("a"), ::getpid(), i));
+  ASSERT_EQ(WriteTextFile(Path("a"), "new"), Status::Ok());
+  EXPECT_EQ(*ReadTextFile(Path("a"), kMax), "new");
+  EXPECT_FALSE(std::filesystem::is_symlink(Path("a")));
+  EXPECT_EQ(*ReadTextFile(Path("victim"), kMax), "old");
 }
 
 TEST_F(FilesTest, WhatCannotBeWrittenIsToldBeforehandWithTheReason) {

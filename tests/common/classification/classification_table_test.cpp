@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -26,11 +27,12 @@ TEST(ClassificationTable, HoldsTheTransferFunctionAtEveryStoredInteger) {
     const auto a = float(mapping.FromStored(first)), b = float(mapping.FromStored(last));
     const ClassificationTable table =
         Classify(transfer, Description(bytes ? ScalarType::kUint8 : ScalarType::kUint16, mapping), {std::min(a, b), std::max(a, b)});
-    ASSERT_EQ(table.size(), last - first + 1);
+    ASSERT_LE(table.size(), last - first + 1);
+    EXPECT_EQ(table.bin_from_stored_scale, 1);
     EXPECT_EQ(table.opacity_distance, transfer.opacity_distance);
     for (int stored = first; stored <= last; ++stored) {
       const int bin = table.BinOf(stored);
-      ASSERT_EQ(bin, stored - first);
+      ASSERT_EQ(bin, std::clamp(stored - int(table.stored_origin), 0, table.size() - 1));
       EXPECT_EQ(table.opacity[std::size_t(bin)], float(transfer.Opacity(mapping.FromStored(stored))));
       EXPECT_EQ(table.color[std::size_t(bin)], transfer.Color(mapping.FromStored(stored)));
     }
@@ -47,19 +49,62 @@ TEST(ClassificationTable, EightBitVolumesHaveTheSameBinsWhateverTheirRange) {
 TEST(ClassificationTable, OfFloatsTakesTheNearestCentre) {
   Random random(5);
   SCOPED_TRACE(random.trace());
-  const ValueRange range = {-3, 97};
-  const double width = 100.0 / (kMaxBins - 1);
   for (int i = 0; i < 20; ++i) {
     const TransferFunction transfer = RandomTransfer(random);
-    const ClassificationTable table = Classify(transfer, Description(ScalarType::kFloat32), range);
+    const ClassificationTable table = Classify(transfer, Description(ScalarType::kFloat32), {-3, 97});
     ASSERT_EQ(table.size(), kMaxBins);
+    const double width = 1 / table.bin_from_stored_scale, first = table.stored_origin, last = first + (kMaxBins - 1) * width;
+    EXPECT_TRUE(first >= -3 && last <= 97 + 1e-9);
     for (int sample = 0; sample < 500; ++sample) {
       const double stored = random.Real(-3, 97);
       const int bin = table.BinOf(stored);
-      const double centre = -3 + bin * width;
-      EXPECT_LE(std::abs(stored - centre), width / 2 + 1e-9);
-      EXPECT_FLOAT_EQ(table.opacity[std::size_t(bin)], float(transfer.Opacity(centre)));
+      const double centre = first + bin * width;
+      EXPECT_LE(std::abs(std::clamp(stored, first, last) - centre), width / 2 + 1e-9);
+      EXPECT_LE(std::abs(table.value[std::size_t(bin)] - centre), width / 2 + 1e-9);
+      EXPECT_EQ(table.opacity[std::size_t(bin)], float(transfer.Opacity(table.value[std::size_t(bin)])));
     }
+  }
+}
+
+// One voxel far away from the others, such as a hot pixel or a fill value, takes no bin from them.
+TEST(ClassificationTable, CoversWhatTheFunctionTellsApart) {
+  Random random(7);
+  SCOPED_TRACE(random.trace());
+  for (int i = 0; i < 40; ++i) {
+    const TransferFunction transfer = RandomTransfer(random);
+    const auto [first, last] = NodesOf(transfer);
+    const bool mapped = random.Chance(0.5);
+    const VolumeDescription description = Description(ScalarType::kFloat32, {mapped ? -0.5 : 1, mapped ? 20.0 : 0});
+    const ClassificationTable narrow = Classify(transfer, description, {float(first) - 10, float(last) + 10});
+    for (const ValueRange& wide : {ValueRange{float(first) - 10, 9.96921e36F}, ValueRange{-3e38F, 3e38F}}) {
+      const ClassificationTable table = Classify(transfer, description, wide);
+      EXPECT_EQ(table.opacity, narrow.opacity);
+      EXPECT_EQ(table.color, narrow.color);
+      EXPECT_EQ(table.stored_origin, narrow.stored_origin);
+      EXPECT_EQ(table.bin_from_stored_scale, narrow.bin_from_stored_scale);
+      for (const double value : {-1e38, first - 1, last + 1, 1e38}) {
+        const double stored = (value - description.mapping.offset) / description.mapping.scale;
+        EXPECT_EQ(table.opacity[std::size_t(table.BinOf(stored))], float(transfer.Opacity(value)));
+      }
+    }
+  }
+  // Each value of 16 bits between the points has its own bin, although all of them have not.
+  const TransferFunction ramp{{{1000, {1, 1, 1}}}, {{1000, 0}, {3000, 1}}};
+  const ClassificationTable table = Classify(ramp, Description(ScalarType::kUint16), {0, 65535});
+  EXPECT_EQ(table.bin_from_stored_scale, 1);
+  for (int value : {0, 999, 1000, 1001, 2999, 3000, 3001, 65535}) {
+    EXPECT_EQ(table.opacity[std::size_t(table.BinOf(value))], float(ramp.Opacity(value))) << value;
+  }
+}
+
+TEST(ClassificationTable, AStepStandsWhereTheFunctionHasIt) {
+  for (const double edge : {0.0, 5.0, 1e-20, -3e6, 1e30}) {
+    const TransferFunction step{{{edge, {1, 1, 1}}}, {{edge, 0}, {edge, 1}}};
+    const ClassificationTable table = Classify(step, Description(ScalarType::kFloat32), {-3e38F, 3e38F});
+    const double near = std::max(std::abs(edge) * 0x1p-19, 1e-37);
+    EXPECT_EQ(table.opacity[std::size_t(table.BinOf(edge - near))], 0) << edge;
+    EXPECT_EQ(table.opacity[std::size_t(table.BinOf(edge))], 1) << edge;
+    EXPECT_EQ(table.opacity[std::size_t(table.BinOf(edge + near))], 1) << edge;
   }
 }
 

@@ -39,9 +39,9 @@ TEST(Presets, AreValidAndNamedOnceEach) {
 }
 
 // Published colours of the maps: their ends and one between.
-TEST(Presets, ColourMapsSpanAllValues) {
-  const VolumeSummary summary = Summarize(MakeSphere({}).value());
-  const double least = double(summary.range.min), most = double(summary.range.max);
+TEST(Presets, ColourMapsSpanWhatShows) {
+  const VolumeSummary summary = Summarize(MakeTestVolume({64, 64, 64}, ScalarType::kUint8, [](const Index3& v) { return 2 * v.x; }));
+  const std::vector<OpacityPoint> shown = MakePreset("auto", summary)->opacities;
   const struct {
     const char* name;
     std::array<std::uint32_t, 3> codes;  // at 0, 1/2 and 1
@@ -51,13 +51,16 @@ TEST(Presets, ColourMapsSpanAllValues) {
                {"coolwarm", {0x3b4cc0, 0xdddddd, 0xb40426}}, {"jet", {0x000080, 0x80ff80, 0x800000}}};
   for (const auto& [name, codes] : cases) {
     const TransferFunction transfer = MakePreset(name, summary).value();
+    const double least = transfer.colors.front().value, most = transfer.colors.back().value;
+    EXPECT_NEAR(least, 3, 2) << name;
+    EXPECT_NEAR(most, 123, 2) << name;
     for (int i = 0; i < 3; ++i) {
       const Rgb color = transfer.Color(std::lerp(least, most, 0.5 * i));
       EXPECT_NEAR(color.r, (codes[std::size_t(i)] >> 16) / 255.0, 0.01) << name << i;
       EXPECT_NEAR(color.g, (codes[std::size_t(i)] >> 8 & 0xFF) / 255.0, 0.01) << name << i;
       EXPECT_NEAR(color.b, (codes[std::size_t(i)] & 0xFF) / 255.0, 0.01) << name << i;
     }
-    EXPECT_EQ(transfer.opacities, MakePreset("auto", summary)->opacities) << name;
+    EXPECT_EQ(transfer.opacities, shown) << name;
   }
   for (const ColorMap& map : NamedColorMaps()) {
     EXPECT_FALSE(map.source.empty()) << map.name;
@@ -163,15 +166,106 @@ TEST(AutoPreset, ShowsWhatLiesBelowTheBackgroundToo) {
   EXPECT_GT(OpacityAt(below, 30), 0.05);
 }
 
-TEST(AutoPreset, ShowsMasksAndVolumesOfOneValue) {
+TEST(AutoPreset, ShowsMasks) {
   for (const double share : {0.05, 0.5, 0.8}) {
     const Volume mask = MakeTestVolume({20, 20, 20}, ScalarType::kUint8, [&](const Index3& v) { return v.x < share * 20 ? 1 : 0; });
     const TransferFunction transfer = MakePreset("auto", Summarize(mask)).value();
     EXPECT_EQ(OpacityAt(transfer, 0), 0) << share;
     EXPECT_GT(OpacityAt(transfer, 1), 0.2) << share;
+    const Volume floats = MakeTestVolume({20, 20, 20}, ScalarType::kFloat32, [&](const Index3& v) { return v.x < share * 20 ? 1 : 0; });
+    EXPECT_EQ(MakePreset("auto", Summarize(floats))->Color(1), transfer.Color(1)) << "a mask has no values to tell apart";
   }
-  const Volume constant = MakeTestVolume({20, 20, 20}, ScalarType::kFloat32, [](const Index3&) { return -3.5F; });
-  EXPECT_GT(OpacityAt(MakePreset("auto", Summarize(constant)).value(), -3.5), 0.01);
+}
+
+TEST(AutoPreset, HasNothingToShowOfVolumesOfOneValue) {
+  for (const ScalarType type : {ScalarType::kUint8, ScalarType::kFloat32}) {
+    for (const double value : {0, 3, 200}) {
+      const VolumeSummary summary = Summarize(MakeTestVolume({20, 20, 20}, type, [&](const Index3&) { return value; }));
+      for (const char* name : {"auto", "viridis", "grey"}) {
+        const TransferFunction transfer = MakePreset(name, summary).value();
+        EXPECT_EQ(OpacityAt(transfer, value), 0) << name << " " << value;
+        EXPECT_GT(OpacityAt(Stretched(transfer, {-10, 250}), value), 0) << name << " " << value << " is in the range that is asked for";
+      }
+    }
+  }
+}
+
+// A plume: thin where values are low, in air of none.
+double PlumeAt(const Index3& v) {
+  const Vec3 p = ToVec3(v) - Vec3{31.5, 31.5, 0};
+  return std::exp(-(p.x * p.x + p.y * p.y) / (4 + 3.0 * v.z)) * (0.7 + 0.3 * std::sin(0.7 * v.x) * std::cos(0.5 * v.z));
+}
+
+TEST(AutoPreset, TellsValuesOfSimulationsByAColourMap) {
+  const Volume plume = MakeTestVolume({64, 64, 64}, ScalarType::kFloat32, PlumeAt);
+  VolumeSummary summary = Summarize(plume);
+  const TransferFunction simulated = MakePreset("auto", summary).value();
+  const auto brightness = [&](double value) {
+    const Rgb color = simulated.Color(value);
+    return 0.2126 * color.r + 0.7152 * color.g + 0.0722 * color.b;
+  };
+  const double low = simulated.colors.front().value, high = simulated.colors.back().value;
+  EXPECT_GE(low, 0);
+  EXPECT_LT(low, 0.2);
+  EXPECT_GT(high, 0.4);
+  EXPECT_LE(high, 1);
+  for (double share = 0; share < 0.95; share += 0.1) {
+    EXPECT_LT(brightness(std::lerp(low, high, share)), brightness(std::lerp(low, high, share + 0.1)))
+        << "each value has a colour of its own";
+  }
+  EXPECT_EQ(simulated.Color(high), MakePreset("viridis", summary)->Color(summary.range.max));
+  // A patient, CT and integers look as ever.
+  const auto warm = [](const VolumeSummary& of) { return MakePreset("auto", of)->colors.front().color.r > 0.5; };
+  EXPECT_FALSE(warm(summary));
+  VolumeSummary patient = summary;
+  patient.description.geometry.orientation.world = World::kPatient;
+  EXPECT_TRUE(warm(patient));
+  EXPECT_EQ(MakePreset("auto", patient)->opacities, simulated.opacities);
+  const auto of_type = [](ScalarType type, double scale, double offset) {
+    return Summarize(MakeTestVolume({64, 64, 64}, type, [=](const Index3& v) { return offset + scale * PlumeAt(v); }));
+  };
+  EXPECT_TRUE(warm(of_type(ScalarType::kUint8, 250, 0)));
+  EXPECT_TRUE(warm(of_type(ScalarType::kFloat32, 2000, -1000))) << "Hounsfield units";
+  EXPECT_FALSE(warm(of_type(ScalarType::kFloat32, 2e6, -1e6)));
+}
+
+// Whatever the unit, the sign and a few voxels that say nothing, the same shows.
+TEST(Presets, ShowSomethingOfEveryVolume) {
+  const struct {
+    const char* what;
+    double scale, offset, outlier;
+  } cases[] = {{"plain", 1, 0, 0},           {"tiny", 1e-25, 0, 0},         {"huge", 1e25, 0, 0},      {"negative", 1, -40, 0},
+               {"thin band", 1, 100000, 0},  {"a hot pixel", 1, 0, 1e4},    {"no data", 1, 0, 1e20},   {"no data below", 1, 0, -9999},
+               {"far outlier", 1, 50, 1e30}, {"low outlier", 1, 50, -1e30}, {"near outlier", 1, 0, 50}};
+  for (const auto& [what, scale, offset, outlier] : cases) {
+    const auto value_at = [&](const Index3& v) { return outlier != 0 && v == Index3{5, 60, 5} ? outlier : offset + scale * PlumeAt(v); };
+    const VolumeSummary summary = Summarize(MakeTestVolume({64, 64, 64}, ScalarType::kFloat32, value_at));
+    std::vector<std::string> names = {"auto", "simulation", "mri-brain"};
+    for (const ColorMap& map : NamedColorMaps()) names.emplace_back(map.name);
+    for (const std::string& name : names) {
+      const TransferFunction transfer = MakePreset(name, summary).value();
+      EXPECT_EQ(OpacityAt(transfer, offset), 0) << what << ", " << name << ": air";
+      EXPECT_GT(OpacityAt(transfer, offset + scale * 0.7), 0.02) << what << ", " << name << ": the core of the plume";
+      EXPECT_NE(transfer.Color(offset + 0.3 * scale), transfer.Color(offset + 0.7 * scale)) << what << ", " << name;
+    }
+    const ScalarRange range = InDataValues({2, 98, true}, summary);
+    EXPECT_GT(range.max - range.min, 0.2 * scale) << what;
+    EXPECT_LT(range.max - range.min, 1.1 * scale) << what;
+  }
+}
+
+TEST(WithoutOutliers, LeavesOtherVolumesAsTheyAre) {
+  Random random(12);
+  SCOPED_TRACE(random.trace());
+  const auto expect_same = [](const VolumeSummary& summary) {
+    const VolumeSummary usual = WithoutOutliers(summary);
+    EXPECT_EQ(usual.range, summary.range);
+    EXPECT_EQ(usual.histogram, summary.histogram);
+  };
+  expect_same(Summarize(NoisyHead(random, ScalarType::kUint8)));
+  expect_same(Summarize(NoisyHead(random, ScalarType::kFloat32)));
+  expect_same(Summarize(MakeTestVolume({32, 32, 32}, ScalarType::kUint8, [](const Index3& v) { return v == Index3{9, 9, 9} ? 1 : 0; })));
+  expect_same(Summarize(MakeTestVolume({32, 32, 32}, ScalarType::kFloat32, [](const Index3&) { return 7; })));
 }
 
 TEST(OpaquePreset, MakesExactlyTheSphereSolid) {

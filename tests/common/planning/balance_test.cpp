@@ -63,7 +63,7 @@ TEST(Assignments, GreedyKeepsWithinGrahamsBound) {
 }
 
 // A volume where every cell is occupied, with true costs that the occupancy does not tell.
-struct World {
+struct DividedWorld {
   Index3 size{128, 128, 256};
   VolumeSummary summary = FullSummary(size);
   ClassifiedVolume volume{1, std::get<TransferFunction>(SomeRequest().transfer.choice), &DefaultRenderer()};
@@ -145,7 +145,7 @@ struct World {
 
 TEST(Balance, ConvergesWithinFiveFrames) {
   for (const std::string decomposition : {"slab", "beam", "subcube", "kd-tree"}) {
-    World world;
+    DividedWorld world;
     world.policy.decomposition = decomposition;
     EXPECT_GT(world.Play(0, 0).imbalance, 1.3) << decomposition;
     EXPECT_LT(world.Play(5, 0).imbalance, 1.05) << decomposition;
@@ -158,7 +158,7 @@ TEST(Balances, ImproveWhatIsMeasuredExactly) {
     if (balance.change == nullptr) continue;
     for (const std::string decomposition : {"slab", "kd-tree"}) {
       SCOPED_TRACE(testing::Message() << balance.name << ", " << decomposition);
-      World world;
+      DividedWorld world;
       world.policy.decomposition = decomposition;
       world.policy.balance = balance.name;
       if (balance.hands_over) world.policy.groups = 16;  // a box alone has nobody to go to
@@ -168,7 +168,7 @@ TEST(Balances, ImproveWhatIsMeasuredExactly) {
 }
 
 TEST(Balance, HandsOverBoxesWhereTheyCannotBeCutAnew) {
-  World world;
+  DividedWorld world;
   world.policy.decomposition = "octree";
   world.policy.groups = 6;  // 64 boxes
   const double before = world.Play(0, 0).imbalance, after = world.Play(5, 0).imbalance;
@@ -177,16 +177,16 @@ TEST(Balance, HandsOverBoxesWhereTheyCannotBeCutAnew) {
 }
 
 TEST(Balance, DoesNotOscillateUnderNoise) {
-  World world;
+  DividedWorld world;
   SCOPED_TRACE(world.random.trace());
-  const World::Outcome outcome = world.Play(200, 0.03);
+  const DividedWorld::Outcome outcome = world.Play(200, 0.03);
   EXPECT_LE(outcome.changes, 6);
   EXPECT_LT(outcome.imbalance, 1.08);
 }
 
 // Times that scatter as on busy machines: what is even is left alone.
 TEST(Balance, FollowsNoChance) {
-  World world;
+  DividedWorld world;
   SCOPED_TRACE(world.random.trace());
   world.even = true;
   EXPECT_LE(world.Play(200, 0.6).changes, 1);
@@ -215,7 +215,7 @@ TEST(FrameNoise, IsTheDeviationOfMostBoxes) {
 }
 
 TEST(Balance, MovesNothingWhereItDoesNotPay) {
-  World world;
+  DividedWorld world;
   world.seconds_a_cell = 1e-9;  // what could be won is less than the voxels cost
   EXPECT_EQ(world.Play(20, 0).changes, 0);
 
@@ -228,7 +228,7 @@ TEST(Balance, MovesNothingWhereItDoesNotPay) {
 }
 
 TEST(Balance, ReassigningNeverMakesAFrameSlower) {
-  World world;
+  DividedWorld world;
   world.policy.decomposition = "subcube";
   world.policy.groups = 5;
   for (const AssignmentEntry& assignment : Assignments()) {
@@ -257,7 +257,7 @@ TEST(MovedVoxels, AreThoseThatASlotDidNotHoldWithTheirHalo) {
 }
 
 TEST(MeasuredCost, AddsUpToWhatFramesTook) {
-  World world;
+  DividedWorld world;
   MeasuredCost learnt(world.grid);
   EXPECT_FALSE(learnt.any());
   const Layout layout = MakeLayout(world.Request(nullptr));

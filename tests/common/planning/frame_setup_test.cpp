@@ -6,6 +6,7 @@
 #include "common/combining/travel.h"
 #include "common/renderers/registry.h"
 #include "common/view/clip_corners.h"
+#include "common/view/default_view.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/planning/plan_support.h"
 #include "tests/support/random.h"
@@ -28,13 +29,40 @@ TEST(ResolveRequest, TheAutomaticRendererDrawsTheCellsOfGridsAndTheVoxelsOfVolum
   }
 }
 
-TEST(ResolveRequest, ParametersMustBeThoseOfTheRendererThatTheDatasetGets) {
+TEST(ResolveRequest, TheAutomaticRendererHasTheParametersThatAreGiven) {
   FrameRequest request = SomeRequest();
   request.parameters = {{"sampling-rate", "2.5"}};
-  ASSERT_TRUE(Validate(request).ok()) << "grids have it";
   EXPECT_EQ(SetupOf(request, FullGridSummary({20, 20, 20})).parameters, std::vector{2.5});
-  const auto of_volume = ResolveRequest(request, 1, std::make_shared<const VolumeSummary>(FullSummary({20, 20, 20})));
-  EXPECT_EQ(of_volume.status(), Status::InvalidArgument("sampling-rate is '2.5', but the renderer 'splat' has no such parameter"));
+  EXPECT_EQ(SetupOf(request, FullSummary({20, 20, 20})).parameters.front(), 2.5);
+}
+
+TEST(ResolveRequest, TheViewIsTheDefaultOneAsFarAsNothingElseIsSaid) {
+  for (const World world : {World::kVoxels, World::kScene, World::kPatient}) {
+    const bool patient = world == World::kPatient;
+    VolumeSummary summary = FullSummary({64, 64, 64});
+    summary.description.geometry.orientation = {world, {5, -6, 7}};
+    const VolumeGeometry& geometry = summary.description.geometry;
+    FrameRequest request = SomeRequest();
+    request.view = kUnstatedView;
+    const ResolvedRequest resolved = Resolved(request, summary);
+    const ViewParameters& view = resolved.frame.view;
+    EXPECT_EQ(view.azimuth_degrees, patient ? 180 : 30);
+    EXPECT_EQ(view.elevation_degrees, patient ? 0 : 20);
+    EXPECT_EQ(view.fit, false) << "it has been done";
+    ASSERT_TRUE(view.look_at && resolved.framed);
+    EXPECT_EQ(*view.look_at, resolved.framed->centre);
+    EXPECT_LT(Length(*view.look_at - geometry.ToWorld(geometry.centre())), 1e-9) << "all of it shows";
+
+    // Asked for again, it stays as it is, and so does the picture.
+    request.view = view;
+    EXPECT_EQ(Resolved(request, summary).frame.view, view);
+    EXPECT_EQ(MakeFrameSetup(Resolved(request, summary)).value(), MakeFrameSetup(resolved).value());
+
+    request.view = kUnstatedView;
+    request.view.fit = false;
+    EXPECT_EQ(Resolved(request, summary).frame.view.look_at, std::nullopt);
+    EXPECT_EQ(Resolved(request, summary).frame.view.zoom, 1);
+  }
 }
 
 TEST(PlanFrame, SetupHoldsWhatTheRequestAsksFor) {
@@ -93,16 +121,37 @@ TEST(PlanFrame, TheFrameIsWhatThePipelineRenders) {
   EXPECT_EQ(WholeFrame(zbuffer).end, std::uint64_t(zbuffer.camera.width) * std::uint64_t(zbuffer.camera.height));
 }
 
-// Seen obliquely, slices that lie far apart for the width of their voxels need absurdly wide images.
-TEST(PlanFrame, RefusesViewsThatCannotBeRendered) {
+// Seen obliquely, slices that lie far apart for the width of their voxels would need absurdly wide images: other slices are taken.
+TEST(PlanFrame, TakesSlicesThatLieCloseEnough) {
   FrameRequest request = SomeRequest();
   request.view.elevation_degrees = -50;
   VolumeSummary summary = FullSummary({64, 64, 600});
-  EXPECT_TRUE(PlanFrame(request, 7, summary, FullRoster(1)).ok());
+  EXPECT_EQ(SetupOf(request, summary).camera.traversal_axis, Axis::kZ);
   summary.description.geometry.spacing = {1, 1, 3000};
-  const Status status = PlanFrame(request, 7, summary, FullRoster(1)).status();
-  EXPECT_EQ(status.code(), StatusCode::kInvalidArgument);
-  EXPECT_NE(status.message().find("at most 131072 a side"), std::string::npos) << status.message();
+  const FrameSetup setup = SetupOf(request, summary);
+  EXPECT_EQ(setup.camera.traversal_axis, Axis::kY);
+  EXPECT_LE(std::max(setup.sheets.width, setup.sheets.height), 4000);
+}
+
+// Renderers work in single precision.
+TEST(PlanFrame, LengthsAreCountedInAUnitNearToTheVolumes) {
+  for (const double spacing : {1e-36, 1e-9, 1e-3, 0.1, 1.0, 50.0, 1e9, 1e36}) {
+    VolumeSummary summary = FullSummary({64, 64, 60});
+    VolumeGeometry& geometry = summary.description.geometry;
+    geometry.spacing = {spacing, spacing, 2 * spacing};
+    geometry.orientation = {.world = World::kScene, .origin = {100 * spacing, 0, -spacing}};
+    const FrameSetup setup = SetupOf(SomeRequest(), summary);
+    const double radius = BoundingRadius(setup.description.geometry);
+    EXPECT_TRUE(radius >= 0.5 && radius <= 0x1p20) << spacing;
+    EXPECT_EQ(setup.unit == 1, spacing > 0.01 && spacing < 1e4) << spacing;
+    EXPECT_EQ(WorldGeometryOf(setup), geometry);
+    // Whoever has the picture sees the world's lengths.
+    const PictureGeometry shown = PictureGeometryOf(setup), expected = GeometryOf(MakeCamera({}, SomeRequest().size, geometry), geometry);
+    EXPECT_DOUBLE_EQ(shown.pixel_size, expected.pixel_size);
+    EXPECT_DOUBLE_EQ(shown.target_depth, expected.target_depth);
+    EXPECT_NEAR(Length(shown.target - expected.target), 0, 1e-9 * radius * setup.unit);
+    EXPECT_EQ(shown.unit, expected.unit);
+  }
 }
 
 // The cut of a volume that lies askew in its world touches two opposite borders of the picture and crosses none, however thick it is.

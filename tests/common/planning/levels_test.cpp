@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/view/world_limits.h"
 #include "tests/common/view/random_view.h"
 
 namespace slabstream {
@@ -109,8 +110,8 @@ Clipping RandomClipping(Random& random, const VolumeGeometry& finest) {
       const double side = box.unit == ClipUnit::kVoxels ? finest.size[axis] : 100;
       const double one = box.unit == ClipUnit::kWorld ? a[axis] : random.Real(0, side);
       const double other = box.unit == ClipUnit::kWorld ? b[axis] : random.Real(0, side);
-      box.low[axis] = random.Chance(0.2) ? -kMaxWorldCoordinate : std::min(one, other);
-      box.high[axis] = random.Chance(0.2) ? kMaxWorldCoordinate : std::max(one, other);
+      box.low[axis] = random.Chance(0.2) ? -kMaxCoordinate : std::min(one, other);
+      box.high[axis] = random.Chance(0.2) ? kMaxCoordinate : std::max(one, other);
     }
     clipping.box = box;
   }

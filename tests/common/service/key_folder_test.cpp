@@ -76,6 +76,37 @@ TEST_F(KeyFolderTest, RotationMakesANewKeyAndRevocationEndsTheOldOne) {
   EXPECT_EQ(KeyFolder::Open(path())->admitted().size(), 3U);
 }
 
+TEST_F(KeyFolderTest, KeysOfPeopleHaveNamesAndAreRevokedOneByOne) {
+  Result<KeyFolder> folder = KeyFolder::Open(path());
+  ASSERT_TRUE(folder.ok() && folder->Publish(service_).ok());
+  const KeyPair anna = MakeKeyPair(), zoe = MakeKeyPair();
+  ASSERT_TRUE(folder->Issue(anna.public_key, Role::kClient, "anna").ok());
+  ASSERT_TRUE(folder->Issue(zoe.public_key, Role::kAdmin, "Zo\u00eb B.").ok());
+  EXPECT_EQ(KeyFolder::Open(path())->Find(zoe.public_key)->name, "Zo\u00eb B.");
+  EXPECT_TRUE(folder->KeysOf({Role::kClient}).contains(anna.public_key));
+  EXPECT_EQ(folder->Revoke("anna").value(), anna.public_key);
+  EXPECT_EQ(folder->Revoke("anna").status().code(), StatusCode::kNotFound);
+  EXPECT_EQ(KeyFolder::Open(path())->Find(anna.public_key), nullptr);
+  EXPECT_EQ(folder->Revoke("").status().code(), StatusCode::kNotFound) << "not that of the keys without names";
+  EXPECT_EQ(folder->admitted().size(), 4U);
+}
+
+TEST_F(KeyFolderTest, KeysThatCannotBeIssuedAreRefused) {
+  Result<KeyFolder> folder = KeyFolder::Open(path());
+  ASSERT_TRUE(folder.ok());
+  const std::string key = MakeKeyPair().public_key;
+  for (const std::string& name : {std::string(), std::string(kMaxHolderNameBytes + 1, 'a'), std::string("a/b"), std::string("../a"),
+                                  std::string(".hidden"), std::string("a\nb"), std::string(" a"), std::string("a ")}) {
+    EXPECT_THAT(folder->Issue(key, Role::kClient, name).status().message(), HasSubstr("printable text that can name a file")) << name;
+  }
+  EXPECT_THAT(folder->Issue(key, Role::kWorker, "anna").status().message(), HasSubstr("of role client or admin"));
+  EXPECT_FALSE(folder->Issue("short", Role::kClient, "anna").ok());
+  ASSERT_TRUE(folder->Issue(key, Role::kClient, "anna").ok());
+  EXPECT_FALSE(folder->Issue(key, Role::kClient, "bert").ok()) << "one name a key";
+  EXPECT_THAT(folder->Issue(MakeKeyPair().public_key, Role::kClient, "anna").status().message(), HasSubstr("'anna' has the key"));
+  EXPECT_EQ(folder->admitted().size(), 1U);
+}
+
 TEST_F(KeyFolderTest, AFileWhoseKeyIsNotAdmittedGetsANewOne) {
   Result<KeyFolder> folder = KeyFolder::Open(path());
   ASSERT_TRUE(folder.ok() && folder->Publish(service_).ok());

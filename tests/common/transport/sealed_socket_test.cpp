@@ -80,6 +80,27 @@ TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgain) {
   EXPECT_FALSE(Receive(milliseconds(300)));
 }
 
+// What ended connections needed is given back; what was heard of them is still known.
+TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgainAfterConnectionsWereEnded) {
+  TcpRelay network(port());
+  Socket dealer = ConnectedTo(network);
+  ExpectHeard(dealer, "once");
+  const std::vector<std::string> once = network.Pieces();
+  router_->EndConnections(friend_.public_key);
+  std::atomic<bool> over = false;
+  std::jthread again([&] {
+    EXPECT_TRUE(network.Replay(once));
+    over = true;
+  });
+  while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
+  again.join();
+  EXPECT_TRUE(Until(*router_, [&] {
+    EXPECT_FALSE(router_->TryReceive());
+    return network.connections() >= 2;
+  }));
+  ExpectHeard(dealer, "and this");
+}
+
 TEST_F(SealedSocketTest, AnAlteredMessageEndsTheConnectionAndLaterOnesArrive) {
   TcpRelay network(port());
   Socket dealer = ConnectedTo(network);

@@ -33,14 +33,19 @@ Frames FramesOf(Sealer& sealer, std::span<const std::byte> header, std::span<con
   return frames;
 }
 
-bool IsForged(Unsealer& unsealer, std::span<const std::byte> frame) {
-  return std::holds_alternative<Unsealer::Forged>(unsealer.Open(frame));
+auto Open(Unsealer& unsealer, std::span<const std::byte> frame) {
+  static std::vector<std::byte> scratch;
+  return unsealer.Open(frame, scratch);
 }
-bool IsMore(Unsealer& unsealer, std::span<const std::byte> frame) { return std::holds_alternative<Unsealer::More>(unsealer.Open(frame)); }
+
+bool IsForged(Unsealer& unsealer, std::span<const std::byte> frame) {
+  return std::holds_alternative<Unsealer::Forged>(Open(unsealer, frame));
+}
+bool IsMore(Unsealer& unsealer, std::span<const std::byte> frame) { return std::holds_alternative<Unsealer::More>(Open(unsealer, frame)); }
 // Of the last frame; the earlier ones must not make one.
 std::optional<Unsealer::Message> OpenAll(Unsealer& unsealer, const Frames& frames) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    auto opened = unsealer.Open(frames[i]);
+    auto opened = Open(unsealer, frames[i]);
     if (auto* message = std::get_if<Unsealer::Message>(&opened); message != nullptr && i + 1 == frames.size()) return std::move(*message);
     if (!std::holds_alternative<Unsealer::More>(opened)) return std::nullopt;
   }
@@ -106,7 +111,7 @@ TEST_F(SealingTest, AlteredFramesAreForgedAndTheRightOnesStillCount) {
     const bool last = &frame == &frames.back();
     ASSERT_TRUE(last || IsMore(unsealer_, frame));
   }
-  auto opened = unsealer_.Open(frames.back());
+  auto opened = Open(unsealer_, frames.back());
   const auto* message = std::get_if<Unsealer::Message>(&opened);
   ASSERT_NE(message, nullptr);
   EXPECT_TRUE(std::ranges::equal((*message)[1].span(), payload_));
@@ -132,8 +137,16 @@ TEST_F(SealingTest, FramesCountOnce) {
   EXPECT_TRUE(IsForged(unsealer_, frames[0]));
   ASSERT_TRUE(IsMore(unsealer_, frames[1]));
   EXPECT_TRUE(IsForged(unsealer_, frames[1]));
-  EXPECT_TRUE(std::holds_alternative<Unsealer::Message>(unsealer_.Open(frames[2])));
+  EXPECT_TRUE(std::holds_alternative<Unsealer::Message>(Open(unsealer_, frames[2])));
   for (const Frame& frame : frames) EXPECT_TRUE(IsForged(unsealer_, frame));
+}
+
+TEST_F(SealingTest, AnotherUnsealerGoesOnWhereThisOneEnded) {
+  const Frames earlier = ThreeFrames(), frames = ThreeFrames();
+  ASSERT_TRUE(Arrives(earlier));
+  Unsealer next(*Seal::Read(seal_.ticket, worker_.public_key, peer_), kMaxPayload, unsealer_.last());
+  for (const Frame& frame : earlier) EXPECT_TRUE(IsForged(next, frame));
+  EXPECT_TRUE(OpenAll(next, frames));
 }
 
 // The cipher's key changes every 65536 messages.

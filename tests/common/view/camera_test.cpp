@@ -1,11 +1,13 @@
 #include "common/view/camera.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <numbers>
 
+#include "common/view/supersampled_voxel.h"
 #include "common/wire/validate_request.h"
 #include "tests/common/view/random_view.h"
 #include "tests/common/view/view_limits.h"
@@ -14,6 +16,8 @@
 
 namespace slabstream {
 namespace {
+
+using testing::HasSubstr;
 
 const VolumeGeometry kGeometry = {{40, 31, 17}, {1, 0.5, 2}};
 
@@ -201,6 +205,34 @@ TEST(Camera, SupersamplingOnlyDividesPixels) {
   }
 }
 
+// Not by the shortest side of very flat voxels, which would take as many pixels as if there were cubes of that side.
+TEST(Camera, SupersamplesFlatVoxelsLikeCubes) {
+  EXPECT_EQ(SupersampledVoxel({{30, 40, 50}, {0.5, 0.5, 0.5}}), 0.5);
+  EXPECT_EQ(SupersampledVoxel({{512, 512, 60}, {0.5, 0.5, 5}}), 0.5) << "a usual scan";
+  const VolumeGeometry flat = {{24, 24, 24}, {300, 300, 1}};
+  EXPECT_EQ(SupersampledVoxel(flat), 6) << "a quarter of the thinnest side";
+  EXPECT_LE(MakeCamera({}, {256, 256}, flat, SupersampledVoxel(flat)).supersample, 4);
+}
+
+// Slices along the nearest axis lie too far apart for their voxels.
+TEST(Camera, TraversesCloseSlices) {
+  const VolumeGeometry flat = {{24, 24, 24}, {300, 300, 1}};
+  const auto axis = [&](double elevation, Projection projection = Projection::kOrthographic) {
+    return MakeCamera({.projection = projection, .azimuth_degrees = 20, .elevation_degrees = elevation}, {64, 64}, flat).traversal_axis;
+  };
+  EXPECT_EQ(axis(0), Axis::kY);
+  EXPECT_EQ(axis(20), Axis::kZ);
+  EXPECT_EQ(axis(-20), Axis::kZ);
+  EXPECT_EQ(axis(90), Axis::kZ);
+  EXPECT_EQ(axis(20, Projection::kPerspective), Axis::kZ);
+  // Not slices that the eye is next to.
+  const VolumeGeometry high = {{24, 24, 2400}, {300, 300, 1}};
+  ViewParameters view = {.azimuth_degrees = 20, .elevation_degrees = 3};
+  EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kZ);
+  view.projection = Projection::kPerspective;
+  EXPECT_EQ(MakeCamera(view, {64, 64}, high).traversal_axis, Axis::kY);
+}
+
 TEST(Camera, SupersamplingIsBounded) {
   ViewParameters view;
   view.zoom = kMinZoom;
@@ -350,8 +382,8 @@ TEST(Camera, FitsABall) {
     ViewParameters view = RandomView(random);
     view.zoom = 1;
     view.fit = true;
-    const ViewParameters fitted = FitView(view, geometry, centre, radius);
-    EXPECT_FALSE(fitted.fit);
+    const ViewParameters fitted = FitView(view, geometry, {geometry.ToWorld(centre), radius});
+    EXPECT_EQ(fitted.fit, false);
     if (!CheckView(fitted, geometry).ok()) continue;
     ++seen;
     const Camera camera = MakeCamera(fitted, {200, 150}, geometry);
@@ -368,6 +400,21 @@ TEST(Camera, FitsABall) {
   EXPECT_EQ(seen, 40);
 }
 
+TEST(Camera, PointsOfALargeWorldAreLikeThoseOfASmallOne) {
+  for (const double scale : {1e-20, 1e22, 1e120}) {
+    const VolumeGeometry scaled = {kGeometry.size, scale * kGeometry.spacing};
+    for (const Projection projection : {Projection::kOrthographic, Projection::kPerspective}) {
+      const ViewParameters view{.projection = projection, .look_at = Vec3{3, 4, 5}, .eye = Vec3{100, -200, 300}};
+      ViewParameters large = view;
+      large.look_at = scale * *view.look_at;
+      large.eye = scale * *view.eye;
+      ASSERT_TRUE(Validate(large).ok() && CheckView(large, scaled).ok()) << CheckView(large, scaled).message();
+      const Camera expected = MakeCamera(view, {64, 48}, kGeometry), found = MakeCamera(large, {64, 48}, scaled);
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(found.eye[int(i)], expected.eye[int(i)], 1e-9);
+    }
+  }
+}
+
 TEST(Camera, SaysWhichViewsCannotBeHad) {
   const auto refusal = [](const ViewParameters& view) {
     Status status = Validate(view);
@@ -382,7 +429,10 @@ TEST(Camera, SaysWhichViewsCannotBeHad) {
   EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .eye = Vec3{1, 2, 3}}), "view.eye is at the point that it looks at");
   EXPECT_EQ(refusal({.look_at = Vec3{0, 0, 0}, .eye = Vec3{0, 0, 90}, .up = Vec3{0, 0, -2}}), "view.up points along the direction of view");
   EXPECT_EQ(refusal({.look_at = Vec3{1, std::numeric_limits<double>::quiet_NaN(), 3}}),
-            "view.look_at.y is nan, but must lie in [-1000000000, 1000000000]");
+            "view.look_at.y is nan, but must lie in [-1e+300, 1e+300]");
+  EXPECT_THAT(refusal({.look_at = Vec3{1e300, 0, 0}}), HasSubstr("view.look_at is 1e+300 from the volume's centre, but must be at most"));
+  EXPECT_THAT(refusal({.eye = Vec3{0, 0, 1e13}}), HasSubstr("view.eye is 1e+13 from the point that it looks at, but must be at most"));
+  EXPECT_THAT(refusal({.projection = Projection::kPerspective, .distance = 1e200}), HasSubstr("view.distance: the eye is 1e+200 from"));
   EXPECT_EQ(refusal({.look_at = Vec3{1, 2, 3}, .fit = true}), "view.fit and view.look_at cannot both be given");
   // The volume is 15.5 deep along y, so its middle must be more than 7.75 away.
   EXPECT_EQ(

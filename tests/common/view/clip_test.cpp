@@ -175,6 +175,22 @@ TEST(Clip, DistancesArePhysical) {
   EXPECT_NEAR(Length(region.sides[0].normal / geometry.spacing), 1, 1e-12);
 }
 
+// Renderers compute with it in single precision.
+TEST(Clip, APlaneFarAwayClipsAsOneNearby) {
+  for (const double spacing : {1e-30, 1.0, 1e22}) {
+    const VolumeGeometry geometry{{10, 20, 30}, {spacing, spacing, spacing}};
+    for (const double at : {1e30, 1e300}) {
+      const ClipRegion gone = MakeClipRegion({.planes = {{{1, 0, 0}, -at}}}, geometry).value();
+      ASSERT_EQ(gone.sides.size(), 1U);
+      EXPECT_FALSE(gone.MayKeep(geometry.bounds()));
+      EXPECT_TRUE(std::isfinite(float(gone.sides[0].offset / spacing)));
+      EXPECT_TRUE(MakeClipRegion({.planes = {{{1, 0, 0}, at}}}, geometry).value().empty());
+      const ClipSlab slab{.normal = {0, 0, 1}, .through = Vec3{0, 0, at}};
+      EXPECT_FALSE(MakeClipRegion({.slab = slab}, geometry).value().MayKeep(geometry.bounds()));
+    }
+  }
+}
+
 TEST(Clip, ABoxAroundTheVolumeLeavesNothingToDo) {
   const VolumeGeometry geometry{{10, 20, 30}, {1, 2, 3}};
   EXPECT_TRUE(MakeClipRegion({.box = ClipBox{{0, 0, 0}, {100, 100, 100}, ClipUnit::kPercent}}, geometry).value().empty());
@@ -194,7 +210,7 @@ TEST(Clip, InvalidOnesAreErrorsThatNameTheField) {
   } kCases[] = {
       {box({0, 5, 0}, {1, 5, 1}), "clipping.box is 5:5 along y"},
       {box({0, kNan, 0}, {1, 5, 1}), "clipping.box.low.y"},
-      {box({0, 0, -2e9}, {1, 5, 1}), "clipping.box.low.z"},
+      {box({0, 0, -2e300}, {1, 5, 1}), "clipping.box.low.z"},
       {{.planes = {{{0, 0, 0}, 1}}}, "clipping.clip_planes[0].normal"},
       {{.planes = {{{1, 0, 0}, 1}, {{kNan, 0, 0}, 1}}}, "clipping.clip_planes[1].normal.x"},
       {{.planes = {{{1, 0, 0}, kNan}}}, "clipping.clip_planes[0].offset"},

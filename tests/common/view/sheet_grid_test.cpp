@@ -47,10 +47,10 @@ std::string Describe(const Scene& scene) {
   return ::testing::PrintToString(geometry.size.x) + " x " + std::to_string(geometry.size.y) + " x " + std::to_string(geometry.size.z) +
          " spacing " + std::to_string(geometry.spacing.x) + ' ' + std::to_string(geometry.spacing.y) + ' ' +
          std::to_string(geometry.spacing.z) + " picture " + std::to_string(size.width) + " x " + std::to_string(size.height) +
-         (view.projection == Projection::kPerspective ? " perspective " : " orthographic ") + std::to_string(view.azimuth_degrees) + ' ' +
-         std::to_string(view.elevation_degrees) + ' ' + std::to_string(view.roll_degrees) + " zoom " + std::to_string(view.zoom) + " fov " +
-         std::to_string(view.fov_degrees) + " footprint " + std::to_string(grid.footprint) + " grid " + std::to_string(grid.width) + " x " +
-         std::to_string(grid.height);
+         (view.projection == Projection::kPerspective ? " perspective " : " orthographic ") + std::to_string(*view.azimuth_degrees) + ' ' +
+         std::to_string(*view.elevation_degrees) + ' ' + std::to_string(view.roll_degrees) + " zoom " + std::to_string(view.zoom) +
+         " fov " + std::to_string(view.fov_degrees) + " footprint " + std::to_string(grid.footprint) + " grid " +
+         std::to_string(grid.width) + " x " + std::to_string(grid.height);
 }
 
 struct GridPoint {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/view/default_view.h"
 #include "tests/common/view/random_view.h"
 
 namespace slabstream {
@@ -15,12 +16,12 @@ Camera::ImagePoint Shown(const ViewParameters& view) { return MakeCamera(view, {
 TEST(ViewAhead, ATurnAndAZoomGoOn) {
   const ViewParameters before{.azimuth_degrees = 10, .elevation_degrees = 20, .roll_degrees = 5, .zoom = 2};
   ViewParameters now = before;
-  now.azimuth_degrees += 4;
-  now.elevation_degrees -= 2;
+  *now.azimuth_degrees += 4;
+  *now.elevation_degrees -= 2;
   now.zoom = 2.2;
   const ViewParameters ahead = ViewAhead(before, now, 2);
-  EXPECT_NEAR(ahead.azimuth_degrees, 22, 1e-9);
-  EXPECT_NEAR(ahead.elevation_degrees, 14, 1e-9);
+  EXPECT_NEAR(*ahead.azimuth_degrees, 22, 1e-9);
+  EXPECT_NEAR(*ahead.elevation_degrees, 14, 1e-9);
   EXPECT_NEAR(ahead.roll_degrees, 5, 1e-9);
   EXPECT_NEAR(ahead.zoom, 2.2 * 1.1 * 1.1, 1e-9);
 }
@@ -28,6 +29,12 @@ TEST(ViewAhead, ATurnAndAZoomGoOn) {
 TEST(ViewAhead, ATurnPastAFullCircleIsNoTurnBack) {
   const ViewParameters before{.azimuth_degrees = 359}, now{.azimuth_degrees = 2};
   EXPECT_NEAR(Shown(ViewAhead(before, now, 1)).x, Shown({.azimuth_degrees = 5}).x, 1e-6);
+}
+
+TEST(ViewAhead, AnglesThatTheVolumeDecidesStayItsOwn) {
+  const ViewParameters ahead = ViewAhead(kUnstatedView, {.azimuth_degrees = 4, .elevation_degrees = std::nullopt}, 2);
+  EXPECT_EQ(ahead.azimuth_degrees, 4);
+  EXPECT_EQ(ahead.elevation_degrees, std::nullopt);
 }
 
 TEST(ViewAhead, PointsMoveOn) {

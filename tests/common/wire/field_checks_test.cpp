@@ -99,6 +99,7 @@ TEST(FieldChecks, Groups) {
        "GroupAssignment.setup.sheets: not expected by this renderer"},
       {[&](E& e) { setup(e)->set_halo(65536); }, "GroupAssignment.setup.halo: 65536 is not in [0, 65535]"},
       {[&](E& e) { setup(e)->set_termination(0.6); }, "GroupAssignment.setup.termination: 0.6 is not in [0, 0.5]"},
+      {[&](E& e) { setup(e)->set_unit(0); }, "GroupAssignment.setup.unit: 0 is not in [1e-300, 1e+300]"},
       {[&](E& e) { setup(e)->set_termination(-1e-9); }, "GroupAssignment.setup.termination: -1e-09 is not in [0, 0.5]"},
       {[&](E& e) { setup(e)->mutable_description()->mutable_size()->set_x(0); },
        "GroupAssignment.setup.description.size.x: 0 is not in [1, 65535]"},

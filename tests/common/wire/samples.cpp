@@ -1,4 +1,5 @@
 #include "tests/common/wire/samples.h"
+#include "common/view/world_limits.h"
 #include "tests/common/view/view_limits.h"
 #include "tests/support/renderers.h"
 
@@ -6,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "common/view/default_view.h"
 #include "common/volume/light_volume.h"
 #include "common/wire/limits.h"
 
@@ -66,6 +68,7 @@ GroupAssignment Assignment(Rank ranks, const ViewParameters& view, const Rendere
   message.display = kMax32;
   FrameSetup& setup = message.setup;
   setup.dataset = kMax64;
+  setup.unit = 0x1p-40;
   setup.description = Description();
   setup.range = {-1, 1e30F};
   SetRenderer(*renderer, setup);
@@ -342,8 +345,8 @@ std::vector<SubmitFrame> SamplesOf() {
   full.parameters = {{"projection-mode", "minimum"}};
   full.size = {kMaxImageSide, 1};
   full.view = {Projection::kPerspective, kMaxAngleDegrees, -kMaxAngleDegrees, -0.0, kMinZoom, kMinFovDegrees};
-  full.clipping = {.box = ClipBox{{-kMaxWorldCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
-                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxWorldCoordinate},
+  full.clipping = {.box = ClipBox{{-kMaxCoordinate, -1, 0}, {-1e8, 0, 1e-3}, ClipUnit::kPercent},
+                   .slab = ClipSlab{.normal = {-1, 1e-3, 0}, .through = {}, .index = kMaxVolumeSide - 1, .thickness = kMaxCoordinate},
                    .planes = std::vector<ClipPlane>(kMaxClipPlanes, {{0, -1, 1e9}, -1e18}),
                    .mode = ClipMode::kCutAway};
   full.transfer = {Curve(), 1e-6, ScalarRange{-1e300, 1e-300}};
@@ -365,10 +368,14 @@ std::vector<SubmitFrame> SamplesOf() {
                               .opacities = {{1, 0}, {kMaxLabelValue, 0.25}},
                               .shown = {{1, kMaxLabelValue}, {7, 7}, {.name = kUmlaut}}};
   layers.overlay = OverlayChoice{.choice = "grayscale", .scalar_range = ScalarRange{-1, 2}, .weight = 0.5};
+  FrameRequest unstated = Request();
+  unstated.view = kUnstatedView;
   FrameRequest highlights = layers;
   highlights.labels->mode = LabelMode::kHighlight;
-  return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}}, {1, 2, sliced}, {1, 2, surfaces}, {1, 2, layers},
-          {1, 2, highlights}};
+  return {{0, 1, Request()}, {kMax64, 86400000, full, PicturesDoor{65535, kKey}},
+          {1, 2, sliced},    {1, 2, surfaces},
+          {1, 2, layers},    {1, 2, highlights},
+          {1, 2, unstated}};
 }
 
 template <>
@@ -384,6 +391,7 @@ std::vector<FrameReply> SamplesOf() {
   predicted.predicted = FramePrediction{0.25, 0, 1e-9, 1e9, 1.5};
   predicted.levels = {{0, 1, 1}, {kMaxLevels - 1, kMax32, kMax64}};
   predicted.lowered = kUmlaut;
+  predicted.view = Request().view;
   const PictureGeometry of_patient{World::kPatient,
                                    LengthUnit::kMillimetre,
                                    Projection::kPerspective,
@@ -462,15 +470,16 @@ std::vector<KeysOrder> SamplesOf() {
   return {{},
           {kMax64, KeysAction::kRotate, Role::kAdmin, ""},
           {1, KeysAction::kRevoke, Role::kClient, std::string(kKeyTextBytes, 'a')},
-          {1, KeysAction::kRevoke, Role::kClient, ""}};
+          {1, KeysAction::kRevoke, Role::kClient, ""},
+          {1, KeysAction::kIssue, Role::kAdmin, std::string(kKeyTextBytes, 'a'), "Zo\u00eb"}};
 }
 
 template <>
 std::vector<KeysReply> SamplesOf() {
-  return {
-      {},
-      {kMax64,
-       {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"}, {std::string(kKeyTextBytes, 'b'), Role::kAdmin, ""}}}};
+  return {{},
+          {kMax64,
+           {{std::string(kKeyTextBytes, 'a'), Role::kWorker, "2026-11-21T10:00:00Z"},
+            {std::string(kKeyTextBytes, 'b'), Role::kAdmin, "", kUmlaut, kMax64}}}};
 }
 
 template <>
@@ -527,12 +536,14 @@ std::vector<SampleReply> SamplesOf() {
 
 template <>
 std::vector<StatisticsQuery> SamplesOf() {
-  return {{.dataset = "a", .box = {{}, {1, 1, 1}}}, {kMax64, kLongName, {{-1e9, 0, 1}, {1e9, 0.5, 2}, ClipUnit::kPercent}}};
+  return {{.dataset = "a", .box = {{}, {1, 1, 1}}}, {kMax64, kLongName, {{-1e9, 0, 1}, {1e9, 0.5, 2}, ClipUnit::kPercent}, true}};
 }
 
 template <>
 std::vector<StatisticsReply> SamplesOf() {
-  return {{}, {kMax64, {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300}}};
+  const BoxStatistics full = {kMax64, kMax64, -1e300, 1e300, -1e300, 1e300};
+  const Label first{1, {1, 0, 0.5F}, "left"}, last{kMaxLabelValue, {}, std::string(kMaxLabelNameBytes, 'n')};
+  return {{.statistics = {}, .description = Description()}, {kMax64, full, Description(), {{first, {}}, {last, full}}}};
 }
 
 std::vector<std::uint64_t> LargeCounts() {
@@ -563,6 +574,16 @@ std::vector<PickReply> SamplesOf() {
 }
 
 template <>
+std::vector<ViewQuery> SamplesOf() {
+  return {{.frame = Request()}, {kMax64, Request(), Ball{{-1e9, 0.5, 1e300}, 1e-300}}};
+}
+
+template <>
+std::vector<ViewReply> SamplesOf() {
+  return {{}, {kMax64, Request().view, Ball{{1, 2, 3}, 4}}, {.view = kUnstatedView}};
+}
+
+template <>
 std::vector<PrefetchQuery> SamplesOf() {
   return {{.frame = Request()}, {kMax64, Request()}};
 }
@@ -579,7 +600,8 @@ std::vector<AddVolume> SamplesOf() {
            kLongName,
            Description(),
            {ScalarType::kUint16, ScalarType::kFloat32},
-           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}}};
+           {{1, "", {}}, {kMaxLabelValue, std::string(kMaxLabelNameBytes, 'n'), std::array<float, 3>{0, 0.5F, 1}}}},
+          {.name = "a", .description = {}, .layers = {}, .labels = {}, .file = SentFile{"a.nii.gz", kMaxSentFileBytes}}};
 }
 
 template <>

@@ -34,8 +34,8 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
   const Wrong cases[] = {
       {[](auto& r) { r.dataset = ""; }, "dataset has 0 bytes, but must have 1 to 256"},
       {[&](auto& r) { r.dataset = long_name; }, "dataset has 257 bytes"},
-      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: auto, splat, zbuffer"},
-      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but the renderer 'auto' has no such parameter"},
+      {[](auto& r) { r.renderer = "teapot"; }, "renderer is 'teapot', but must be one of: auto, splat, raycast"},
+      {[](auto& r) { r.parameters.emplace("fineness", "1"); }, "fineness is '1', but no renderer has such a parameter"},
       {[](auto& r) { r.parameters.emplace("sampling-rate", "17"); }, "sampling-rate is '17', but must be a number in [0.1, 16]"},
       {[](auto& r) { r.size.width = 0; }, "size.width is 0"},
       {[](auto& r) { r.view.zoom = kNan; }, "view.zoom is nan"},
@@ -48,8 +48,12 @@ TEST(ValidateFrameRequest, NamesFieldValueAndLimit) {
          r.renderer = "shear";
          r.view.projection = Projection::kPerspective;
        },
-       "renderer is 'shear', but projection 'perspective' needs one of: splat, zbuffer, raycast, mip"},
-      {[](auto& r) { r.labels.emplace(); }, "renderer is 'auto', but labels needs one of: zbuffer, raycast"},
+       "renderer is 'shear', but projection 'perspective' needs one of: splat, raycast, zbuffer, mip"},
+      {[](auto& r) {
+         r.labels.emplace();
+         r.parameters.emplace("footprint", "2");
+       },
+       "no renderer does all that is asked: labels needs one of: raycast, zbuffer; footprint needs one of: splat"},
       {[&](auto& r) {
          r.renderer = "raycast";
          r.labels = LabelChoice{.shown = {{2, 5}, {.name = long_name}}};

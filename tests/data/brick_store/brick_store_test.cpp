@@ -221,8 +221,32 @@ TEST_F(BrickStoreTest, APlaceThatCannotBeWrittenIsNamed) {
   WriteFile(directory_ / "cache", "a file");
   const Status status = Open(file).status();
   EXPECT_EQ(status.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(status.message(),
-              AllOf(HasSubstr("'" + stores_ + "' cannot hold the voxels of"), HasSubstr("need about 1 MiB"), HasSubstr("Not a directory")));
+  EXPECT_THAT(status.message(), AllOf(HasSubstr(file + ": cannot make the folder '" + stores_ + "': Not a directory")));
+}
+
+// The file may be one that nobody else may read.
+TEST_F(BrickStoreTest, NobodyElseReadsWhatIsStored) {
+  ASSERT_TRUE(Open(Scan("v.nii.gz")).ok());
+  int files = 0;
+  for (const auto& each : fs::recursive_directory_iterator(directory_ / "cache")) {
+    EXPECT_EQ(each.status().permissions() & (fs::perms::group_all | fs::perms::others_all), fs::perms::none) << each.path();
+    files += each.is_regular_file() ? 1 : 0;
+  }
+  EXPECT_GT(files, 2);
+}
+
+TEST_F(BrickStoreTest, ALockThatSomebodyKeepsIsNamed) {
+  const std::string file = Scan("v.nii.gz");
+  ASSERT_TRUE(Open(file).ok());
+  const std::string lock = stores_ + "/" + Stores().front() + ".lock";
+  const Result<FileDescriptor> held = LockFile(lock, LockMode::kAlone);
+  const StoreFolder impatient(stores_, kBudget, std::chrono::milliseconds(10));
+  const Status status = OpenStored(file, impatient, ProcessReadContext(), {}).status();
+  EXPECT_EQ(status.code(), StatusCode::kUnavailable);
+  EXPECT_THAT(status.message(), HasSubstr(file + ": another process holds the lock '" + lock + "'"));
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(Open(file, {.stop = stop.get_token()}).status().code(), StatusCode::kCancelled);
 }
 
 TEST_F(BrickStoreTest, ThoseUsedLongestAgoLeaveUnlessTheyAreInUse) {

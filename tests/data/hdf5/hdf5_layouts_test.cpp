@@ -289,7 +289,7 @@ TEST_F(Hdf5LayoutsTest, SeveralVolumesAreListed) {
   EXPECT_THAT(many.message(), HasSubstr("more"));
   EXPECT_LT(many.message().size(), 2000U);
   Hdf5Writer(path).Write("/line", {.size = {60}}, samples.data());
-  ExpectRefused(path, {}, "several.h5: has no dataset of three axes or more");
+  ExpectRefused(path, {}, "several.h5: has no dataset of two axes or more");
 }
 
 TEST_F(Hdf5LayoutsTest, AnAxisBeforeTheLastThreeIsTime) {
@@ -314,7 +314,7 @@ TEST_F(Hdf5LayoutsTest, AnAxisBeforeTheLastThreeIsTime) {
 TEST_F(Hdf5LayoutsTest, OtherFilesAreNotOpened) {
   ExpectRefused(external_link.path, {.dataset = "/group/linked"},
                 "'/group/linked' lies in another file: '/group/linked' is an external link");
-  ExpectRefused(external_link.path, {}, "has no dataset of three axes");
+  ExpectRefused(external_link.path, {}, "has no dataset of two axes");
 
   const std::string path = directory_ / "outward.h5";
   const hsize_t size[3] = {2, 2, 2};

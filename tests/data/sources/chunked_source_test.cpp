@@ -5,8 +5,10 @@
 #include <atomic>
 #include <cstring>
 #include <future>
+#include <limits>
 #include <thread>
 
+#include "common/volume/memory_budget.h"
 #include "tests/data/sources/memory_array.h"
 #include "tests/data/sources/opened_source.h"
 #include "tests/support/random.h"
@@ -323,6 +325,25 @@ TEST(ChunkedSourceTest, ManyChunksWithRoomForOneDoNotNest) {
   EXPECT_EQ(array->most_under_way(), 1U);
 }
 
+// Metadata of a few bytes may say that a chunk has a gigabyte.
+TEST(ChunkedSourceTest, ALargeChunkIsAskedForIfThereIsMemoryForIt) {
+  constexpr std::uint64_t kLarge = std::uint64_t{1} << 28;
+  const ArrayShape shape = {.size = {64, 2048, 2048}, .chunk = {64, 2048, 2048}, .type = SampleType::kUint8, .fill = {std::byte{7}}};
+  const auto array = std::make_shared<MemoryArray>(shape, std::vector<std::byte>());
+  array->missing = {0};
+  const auto source = *MakeChunkedSource("block", {.levels = {{.array = array, .at = {0, 0, 0}}}}, Context());
+  std::vector<std::byte> out(8);
+  const Box box = {{0, 0, 0}, {8, 1, 1}};
+  LimitMemory(kLarge);
+  const Status refused = source->ReadNow(0, box, out);
+  LimitMemory(std::numeric_limits<std::int64_t>::max());
+  EXPECT_EQ(refused.code(), StatusCode::kResourceExhausted);
+  EXPECT_THAT(refused.message(), testing::HasSubstr("block: a chunk needs 512 MiB of memory"));
+  EXPECT_TRUE(array->asked().empty());
+  EXPECT_TRUE(source->ReadNow(0, box, out).ok());
+  EXPECT_EQ(out[0], std::byte{7});
+}
+
 TEST(ChunkedSourceTest, TheFirstFailureIsTheEnd) {
   const std::shared_ptr<MemoryArray> array = SmallCube();
   array->held = true;
@@ -442,6 +463,9 @@ TEST(ChunkedSourceTest, RefusesPyramidsThatAreNoVolume) {
   EXPECT_EQ(refusal({.levels = {{.array = good, .at = {0, 0, 0}},
                                 {.array = array({.size = {4, 4, 4}, .chunk = {4, 4, 4}, .type = SampleType::kInt8}), .at = {0, 0, 0}}}}),
             Status::InvalidArgument("it: level 1: samples of type int8, but uint8 at level 0"));
+  EXPECT_EQ(refusal({.levels = {{.array = array({.size = {512, 512, 512}, .chunk = {1, 1, 1}}), .at = {0, 0, 0}}}}),
+            Status::InvalidArgument("it: 134217728 chunks of 1 byte: of chunks of less than 64 bytes at most 1048576 are read"));
+  EXPECT_TRUE(refusal({.levels = {{.array = array({.size = {100, 100, 100}, .chunk = {1, 1, 1}}), .at = {0, 0, 0}}}}).ok());
   const std::uint64_t huge = std::uint64_t{1} << 40;
   EXPECT_THAT(refusal({.levels = {{.array = array({.size = {4, 4, 4}, .chunk = {huge, huge, huge}}), .at = {0, 0, 0}}}}).message(),
               HasSubstr("more than 1024 MiB"));

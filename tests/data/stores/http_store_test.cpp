@@ -315,17 +315,56 @@ TEST_F(HttpStoreTest, QueryAndHeadersGoToThisServerAlone) {
   }
 }
 
-TEST_F(HttpStoreTest, ASilentServerIsLeftInTime) {
-  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .patience = seconds(1)});
+// More requests than may be under way at a time: those that wait do not wait for a turn each.
+TEST_F(HttpStoreTest, ASilentServerIsLeftInTimeByAllWhoWait) {
+  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .silence = seconds(1), .rest = std::chrono::hours(1)});
   std::promise<void> end;
   const std::shared_future<void> ended(end.get_future());
   const ScriptedServer server([&](const ServerRequest&) {
     ended.wait();
     return std::string();
+  }),
+      other([](const ServerRequest&) { return AnswerText("200 OK", kTen); });
+  const std::shared_ptr<Store> store = HttpStore(server.url(), impatient).value();
+  constexpr std::size_t kReads = 10 * HttpTransfers::kMostOfAHost;
+  std::vector<std::promise<Status>> ends(kReads);
+  for (std::size_t i = 0; i < kReads; ++i) {
+    store->Read(fmt::format("{}", i), {}, 1000, [&, i](const Result<Bytes>& bytes) { ends[i].set_value(bytes.status()); });
+  }
+  for (std::promise<Status>& each : ends) {
+    const Status failure = each.get_future().get();
+    EXPECT_EQ(failure.code(), StatusCode::kUnavailable);
+    EXPECT_THAT(failure.message(), testing::AllOf(HasSubstr(fmt::format("no answer from 127.0.0.1:{} within 1 s", server.port())),
+                                                  HasSubstr("less than 1024 bytes a second")));
+  }
+  const std::size_t requests = server.requests().size();
+  EXPECT_LE(requests, HttpTransfers::kMostOfAHost);
+  EXPECT_EQ(Read(*store, "later").status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(server.requests().size(), requests) << "it is not asked again at once";
+  EXPECT_EQ(Read(**HttpStore(other.url(), impatient), "object").value(), kTen) << "another server is";
+  end.set_value();
+}
+
+TEST_F(HttpStoreTest, AServerThatSaysWhenToComeBackIsNotSilentUntilThen) {
+  HttpTransfers impatient({.first_pause = milliseconds(1), .silence = milliseconds(100)});
+  std::atomic<int> count = 0;
+  const ScriptedServer server(
+      [&](const ServerRequest&) { return ++count == 1 ? AnswerText("503 x", "", "Retry-After: 1\r\n") : AnswerText("200 OK", kTen); });
+  EXPECT_EQ(Read(**HttpStore(server.url(), impatient), "object").value(), kTen);
+}
+
+TEST_F(HttpStoreTest, AServerThatWasSilentIsAskedAgain) {
+  HttpTransfers impatient({.first_pause = milliseconds(1), .stalled = seconds(20), .silence = seconds(1), .rest = milliseconds(0)});
+  std::promise<void> end;
+  const std::shared_future<void> ended(end.get_future());
+  std::atomic<int> count = 0;
+  const ScriptedServer server([&](const ServerRequest&) {
+    if (++count == 1) ended.wait();
+    return AnswerText("200 OK", kTen);
   });
-  const Status failure = Read(**HttpStore(server.url(), impatient), "object").status();
-  EXPECT_EQ(failure.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(failure.message(), HasSubstr("no answer within 1 s, or less than 1024 bytes a second; 1 try"));
+  const std::shared_ptr<Store> store = HttpStore(server.url(), impatient).value();
+  EXPECT_EQ(Read(*store, "object").status().code(), StatusCode::kUnavailable);
+  EXPECT_EQ(Read(*store, "object").value(), kTen);
   end.set_value();
 }
 
@@ -340,13 +379,65 @@ TEST_F(HttpStoreTest, RedirectsAreFollowedWhereTheyMayLead) {
   EXPECT_THAT(Read(*StoreAt(here.url()), "circle").status().message(), HasSubstr("more than 5 times"));
   EXPECT_THAT(FailureOf([&](const ServerRequest&) { return leads_to("ftp://127.0.0.1/x"); }).message(), HasSubstr("a ftp address"));
   EXPECT_THAT(FailureOf([](const ServerRequest&) { return AnswerText("302 Found", ""); }).message(), HasSubstr("leads nowhere"));
-  // localhost was named, 127.0.0.1 was not.
+  // localhost was named, 127.0.0.1 was not; but both are this machine.
   const ScriptedServer elsewhere([&](const ServerRequest&) { return leads_to(here.url() + "/moved"); });
-  const std::string named = fmt::format("http://localhost:{}", elsewhere.port());
-  HttpTransfers fresh({.first_pause = milliseconds(1), .connecting = seconds(20), .stalled = seconds(1)});  // without kept connections
-  const Status refused = Read(**HttpStore(named, fresh), "object").status();
-  EXPECT_EQ(refused.code(), StatusCode::kUnavailable);
-  EXPECT_THAT(refused.message(), HasSubstr("an address of this machine"));
+  EXPECT_EQ(Read(*StoreAt(fmt::format("http://localhost:{}", elsewhere.port())), "object").value(), kTen);
+  for (const char* const address : {"10.0.0.1", "192.168.1.1", "100.64.0.1", "100.100.100.200", "169.254.169.254", "192.0.0.192", "0.0.0.0",
+                                    "[fd00:ec2::254]", "[fd12::1]", "[fe80::1]", "[::ffff:10.0.0.1]"}) {
+    const Status refused = FailureOf([&](const ServerRequest&) { return leads_to(fmt::format("http://{}:1/x", address)); });
+    EXPECT_EQ(refused.code(), StatusCode::kUnavailable);
+    EXPECT_THAT(refused.message(),
+                testing::AllOf(HasSubstr(fmt::format("leads to {}:1, which is an address of", address)), HasSubstr("was not named")));
+    EXPECT_EQ(asked(), 1U);
+  }
+}
+
+// ---- answers without an end
+
+// What an answer sends again and again, and never ends.
+class EndlessServer : public ScriptedServer {
+ public:
+  EndlessServer(std::string begin, std::string more) : ScriptedServer([=](const ServerRequest&) { return begin + Repeated(more); }) {}
+
+ private:
+  // More than anybody takes.
+  static std::string Repeated(const std::string& text) {
+    constexpr std::size_t kBytes = 4 << 20;
+    std::string all;
+    while (all.size() < kBytes) all += text;
+    return all;
+  }
+};
+
+TEST_F(HttpStoreTest, AnswersWithoutAnEndAreLeft) {
+  const std::string chunked = "Transfer-Encoding: chunked\r\n\r\n", chunk = "400\r\n" + std::string(1024, 'z') + "\r\n";
+  const std::string field = "X-More: " + std::string(1000, 'x') + "\r\n";
+  const std::tuple<const char*, std::string, std::string, const char*> answers[] = {
+      {"a page of an error", "HTTP/1.1 403 Forbidden\r\n" + chunked, chunk, "HTTP 403, with a page of more than 1048576 bytes"},
+      {"a page of what is not there", "HTTP/1.1 404 Not Found\r\n" + chunked, chunk, "HTTP 404, with a page of more than"},
+      {"a page of what may pass", "HTTP/1.1 503 x\r\n" + chunked, chunk, "HTTP 503, with a page of more than"},
+      {"a redirect", "HTTP/1.1 302 Found\r\nLocation: /other\r\n" + chunked, chunk, "HTTP 302, with a page of more than"},
+      {"headers", "HTTP/1.1 200 OK\r\n", field, "headers"},
+      {"answers before the answer", "", "HTTP/1.1 103 Early Hints\r\n" + field + "\r\n", "headers"},
+      {"trailers", "HTTP/1.1 200 OK\r\n" + chunked + "1\r\nx\r\n0\r\n", field, "headers"}};
+  for (const auto& [what, begin, more, reason] : answers) {
+    const EndlessServer server(begin, more);
+    const Status left = Read(*StoreAt(server.url()), "object").status();
+    EXPECT_EQ(left.code(), StatusCode::kUnavailable) << what;
+    EXPECT_THAT(left.message(), HasSubstr(reason)) << what;
+    EXPECT_EQ(server.requests().size(), 1U) << what;
+  }
+}
+
+TEST_F(HttpStoreTest, AVersionThatIsTooLongToRememberIsNone) {
+  const ScriptedServer server(
+      [](const ServerRequest& request) { return AnswerPart(request, kTen, fmt::format("ETag: \"{}\"\r\n", std::string(10'000, 'x'))); });
+  std::promise<Result<HttpObject>> answer;
+  transfers_.Get({.url = server.url() + "/object", .span = {}, .most = 100},
+                 [&](Result<HttpObject> object) { answer.set_value(std::move(object)); });
+  const Result<HttpObject> object = answer.get_future().get();
+  ASSERT_TRUE(object.ok());
+  EXPECT_EQ(object->version, "");
 }
 
 // While all of the host's requests are under way, random parts of two objects wait. Then they need few requests.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -109,6 +110,33 @@ TEST_F(ObjectCacheTest, WhatWasUsedLongestAgoLeavesWithinTheBudget) {
   // One that opens the folder with a smaller budget makes room at once.
   EXPECT_TRUE(ObjectCache::Open(folder_, kBudget / 8).ok());
   EXPECT_LE(Size(), kBudget / 8);
+}
+
+// Of sparse volumes: many objects of few bytes. Each takes a block of the disk, and a file.
+TEST_F(ObjectCacheTest, SmallObjectsStayWithinTheBudgetOfTheDisk) {
+  ObjectCache cache = Open();
+  constexpr std::uint64_t kLeastBlock = 4096, kUnit = 512;
+  for (int i = 0; i < 2000; ++i) cache.Keep(fmt::format("object {}", i), {"\"v\"", 1, BytesOf(fmt::format("{}", i))});
+  std::uint64_t bytes = 0;
+  for (const fs::path& file : Files()) {
+    struct stat found {};
+    ASSERT_EQ(::stat(file.c_str(), &found), 0);
+    bytes += std::max(kUnit * std::uint64_t(found.st_blocks), std::uint64_t(found.st_size));
+  }
+  EXPECT_LE(bytes, kBudget);
+  EXPECT_LE(Files().size(), kBudget / kLeastBlock);
+  EXPECT_GT(Files().size(), kBudget / kLeastBlock / 2);
+  EXPECT_EQ(TextOf(cache.Find("object 1999")->bytes), "1999");
+}
+
+TEST_F(ObjectCacheTest, NobodyElseReadsWhatIsKept) {
+  Open().Keep("a", {"\"v\"", 1, BytesOf("voxels")});
+  fs::permissions(folder_, fs::perms::owner_all | fs::perms::group_all);
+  Open();
+  for (const auto& each : fs::recursive_directory_iterator(temporary_.path())) {
+    EXPECT_EQ(each.status().permissions() & (fs::perms::group_all | fs::perms::others_all), fs::perms::none) << each.path();
+  }
+  EXPECT_EQ(Files().size(), 1U);
 }
 
 TEST_F(ObjectCacheTest, AFolderThatCannotBeWrittenIsNamed) {

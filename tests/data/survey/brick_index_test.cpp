@@ -1,6 +1,8 @@
 #include "data/survey/brick_index.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 
 #include <atomic>
 #include <cstdlib>
@@ -9,6 +11,7 @@
 #include <limits>
 #include <thread>
 
+#include "common/base/file_descriptor.h"
 #include "data/sources/memory_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"
@@ -225,6 +228,23 @@ TEST_F(IndexFileTest, WhatSeveralKnowIsMerged) {
   }
   writers.clear();
   EXPECT_EQ(file.Read(name, source_->info()).value(), all);
+}
+
+TEST_F(IndexFileTest, ALockOfSomebodyElseOnTheFolderHoldsUpNobody) {
+  const IndexFile file = IndexFile::Of(directory_ / "a.nrrd", "").value();
+  ASSERT_TRUE(file.Write("name", IndexOf(*source_), source_->info()).ok());
+  const FileDescriptor folder(::open(std::filesystem::path(file.path()).parent_path().c_str(), O_RDONLY | O_CLOEXEC));
+  ASSERT_EQ(::flock(folder.number(), LOCK_EX), 0);
+  EXPECT_TRUE(file.Merge("name", IndexOf(*source_), source_->info()).ok());
+}
+
+TEST_F(IndexFileTest, OneInAFolderThatOthersMayWriteIsNotUsed) {
+  const IndexFile file = IndexFile::Of(directory_ / "a.nrrd", "").value();
+  ASSERT_TRUE(file.Write("name", IndexOf(*source_), source_->info()).ok());
+  std::filesystem::permissions(std::filesystem::path(file.path()).parent_path(), std::filesystem::perms::all);
+  const Status read = file.Read("name", source_->info()).status();
+  EXPECT_EQ(read.code(), StatusCode::kUnavailable);
+  EXPECT_NE(read.message().find("can be written by all users"), std::string::npos) << read.message();
 }
 
 TEST_F(IndexFileTest, ACacheFolderThatCannotBeMadeIsNamed) {

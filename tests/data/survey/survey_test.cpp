@@ -100,6 +100,21 @@ TEST(SurveyTest, OfALargeVolumeWithoutLevelsIsThatOfASample) {
   EXPECT_THAT(survey->summary->bricks, IsEmpty()) << "any value";
 }
 
+// A list of its blocks would take 6 GiB.
+TEST(SurveyTest, OfAVolumeOfAnySizeTakesLittle) {
+  ComputedSource source({{65535, 65535, 65535}}, {32, 32, 32});
+  const Result<Survey> survey = SurveySource(source, kFarSurvey);
+  ASSERT_TRUE(survey.ok()) << survey.status().message();
+  EXPECT_LE(2 * source.voxels_read()[0], kFarSurvey.coarse);
+  EXPECT_TRUE(source.starts_at_blocks());
+}
+
+TEST(SurveyTest, OfBlocksOfAnySizeTakesLittle) {
+  ComputedSource source({{4096, 4096, 4096}}, {4096, 4096, 64});
+  ASSERT_TRUE(SurveySource(source, kFarSurvey).ok());
+  EXPECT_LE(2 * source.voxels_read()[0], 32 << 20) << "a part of a block of 2 GiB";
+}
+
 TEST(SurveyTest, BehindAnAddressLittleIsRead) {
   ComputedSource levels({{512, 512, 512}, {256, 256, 256}, {128, 128, 128}, {64, 64, 64}}, {64, 64, 64});
   const Result<Survey> survey = SurveySource(levels, kFarSurvey);

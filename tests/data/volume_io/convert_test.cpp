@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <numbers>
 #include <optional>
 
@@ -129,6 +130,21 @@ TEST(Convert, SaysWhatAFormatDoesNotKeep) {
   EXPECT_EQ(lost("v.nii", scene), "that the axes are not a patient's");
   EXPECT_EQ(lost("v.vti", scene), "");
   EXPECT_EQ(lost("v.vti", patient), "that the axes are a patient's: right, anterior, superior");
+}
+
+// The samples of one volume never lie beside the header of another.
+TEST(Convert, AHeaderThatCannotTakeItsPlaceLeavesNone) {
+  const TemporaryDirectory directory;
+  const Volume small = MakeTestVolume({2, 2, 2}, ScalarType::kUint8, [](const Index3&) { return 1; }),
+               large = MakeTestVolume({4, 4, 4}, ScalarType::kUint8, [](const Index3&) { return 2; });
+  ASSERT_TRUE(WriteVolume(small, directory / "v.mhd").ok());
+  ASSERT_TRUE(WriteVolume(large, directory / "v.mhd").ok());
+  EXPECT_EQ(ReadVolume(directory / "v.mhd")->volume->description.geometry.size, (Index3{4, 4, 4}));
+  // A folder in place of the samples is as good as a program that ends between the two files.
+  std::filesystem::remove(directory / "v.raw");
+  std::filesystem::create_directories(directory / "v.raw/in the way");
+  EXPECT_FALSE(WriteVolume(small, directory / "v.mhd").ok());
+  EXPECT_FALSE(std::filesystem::exists(directory / "v.mhd"));
 }
 
 TEST(Convert, KeepsTheUnitWhereAFileCanStateIt) {

@@ -110,7 +110,23 @@ TEST(ExactSamples, AreRoundedOnlyWhereTheVolumeDoesNotHoldThem) {
   EXPECT_FALSE(rounded({0, 1 << 24}));
   EXPECT_TRUE(rounded({0, (1 << 24) + 1}));
   EXPECT_FALSE(rounded({1 << 30, (1 << 30) + 65535})) << "uint16 with an offset";
+  EXPECT_TRUE(rounded({(std::uint64_t{1} << 53) + 1, (std::uint64_t{1} << 53) + 1})) << "the offset itself is rounded";
   EXPECT_TRUE(rounded({std::uint64_t{1} << 60, (std::uint64_t{1} << 60) + 1})) << "an offset that double does not add to";
+}
+
+// Pictures do not show what lies beyond float32: somebody must say so, and what to do.
+TEST(ExactSamples, ValuesBeyondFloat32AreCountedInWords) {
+  const auto text = [](const std::vector<double>& values) {
+    ExactSamples samples{.of = {SampleType::kFloat64}, .bytes = AlignedVector<std::byte>(values.size() * sizeof(double))};
+    std::memcpy(samples.bytes.data(), values.data(), samples.bytes.size());
+    return RoundingText(SampleType::kFloat64, &samples);
+  };
+  EXPECT_EQ(text({0, 3e40, -1e39, 1}),
+            "2 of 4 values are beyond those of float32 (3.4e38) and are not shown: divide the values, by 1e40 for example");
+  EXPECT_EQ(text({0, 2e-45}), "the largest value, 2e-45, is too small for float32 (1.2e-38): multiply the values, by 1e45 for example");
+  for (const std::vector<double>& fitting : {std::vector<double>{0.1, 3e38}, {std::numeric_limits<double>::infinity(), 0.1}, {1e-300, 1}}) {
+    EXPECT_THAT(text(fitting), testing::HasSubstr("rounded to float32, and none beyond 3.4e38"));
+  }
 }
 
 TEST(ExactSamples, ADataValueIsExactToItsLastBit) {

@@ -164,8 +164,7 @@ TEST(Malformed, NamesThatAreNoVolumesFail) {
   ExpectFailure(ReadVolume(directory.path()).status(), StatusCode::kInvalidArgument, directory.path(), "not a volume");
   EXPECT_FALSE(LooksLikeVolume(directory.path()));
   WriteFile(directory / "v.png", "x");
-  ExpectFailure(ReadVolume(directory / "v.png").status(), StatusCode::kInvalidArgument, directory / "v.png", "must end in .nii");
-  EXPECT_FALSE(LooksLikeVolume(directory / "v.png"));
+  ExpectFailure(ReadVolume(directory / "v.png").status(), StatusCode::kInvalidArgument, directory / "v.png", "not a PNG");
   ExpectFailure(ReadVolume("/dev/zero").status(), StatusCode::kInvalidArgument, "/dev/zero", "not a file");
   std::vector<std::string> endings;
   for (const VolumeFormat& format : VolumeFormats()) {
@@ -189,7 +188,7 @@ TEST(Malformed, OtherNumbersOfDimensionsAndComponentsFail) {
     WriteFile(directory / file, bytes);
     ExpectFailure(ReadVolume(directory / file).status(), StatusCode::kInvalidArgument, directory / file, why);
   };
-  expect("v.nii", NiftiHeader({.dimensions = {4, 6}}) + Samples(24), "has 2 dimensions");
+  expect("v.nii", NiftiHeader({.dimensions = {24}}) + Samples(24), "has 1 dimensions");
   expect("v.nii", NiftiHeader({.dimensions = {4, 3, 2, 5}}) + Samples(120), "holds 5 volumes, of which --time takes one: 0 to 4");
   expect("v.nii", NiftiHeader({.dimensions = {4, 3, -2}}) + Samples(24), "size along z is -2");
   FileBytes complex = NiftiHeader({});
@@ -197,7 +196,7 @@ TEST(Malformed, OtherNumbersOfDimensionsAndComponentsFail) {
   expect("v.nii", complex + Samples(192), "data type 32");
 
   const auto nrrd = [](const std::string& fields) { return "NRRD0004\ntype: uchar\n" + fields + "encoding: raw\n\n" + Samples(240); };
-  expect("v.nrrd", nrrd("dimension: 2\nsizes: 4 6\n"), "has 2 axes of space");
+  expect("v.nrrd", nrrd("dimension: 1\nsizes: 24\n"), "has 1 axes of space");
   expect("v.nrrd", nrrd("dimension: 4\nsizes: 5 3 2 4\n"), "holds 4 volumes");
   expect("v.nrrd", nrrd("dimension: 4\nsizes: 3 4 3 2\nkinds: vector domain domain domain\n"), "3 components");
   WriteFile(directory / "v.nrrd", nrrd("dimension: 4\nsizes: 5 3 2 1\n"));
@@ -206,15 +205,27 @@ TEST(Malformed, OtherNumbersOfDimensionsAndComponentsFail) {
   const auto meta = [](const std::string& fields) {
     return "ObjectType = Image\n" + fields + "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n" + Samples(240);
   };
-  expect("v.mha", meta("NDims = 2\nDimSize = 4 6\n"), "has 2 dimensions");
+  expect("v.mha", meta("NDims = 1\nDimSize = 24\n"), "has 1 dimensions");
   expect("v.mha", meta("NDims = 4\nDimSize = 4 3 2 5\n"), "holds 5 volumes");
   expect("v.mha", meta("NDims = 3\nDimSize = 4 3 2\nElementNumberOfChannels = 3\n"), "3 components");
   expect("v.mha", meta("NDims = 3\nDimSize = 4 3\n"), "DimSize is '4 3'");
   expect("v.mha", meta("NDims = 50\nDimSize = 4 3 2\n"), "NDims is '50'");
   expect("v.mha", meta("NDims = 3\n"), "DimSize is missing");
+}
 
-  WriteTiff(directory / "one.tif", {.size = {4, 3, 1}}, Samples(12));
-  ExpectFailure(ReadVolume(directory / "one.tif").status(), StatusCode::kInvalidArgument, "one.tif", "has 2 dimensions");
+TEST(Slices, AFileOfOneIsAVolume) {
+  const TemporaryDirectory directory;
+  WriteFile(directory / "v.nii", NiftiHeader({.dimensions = {4, 6}}) + Samples(24));
+  WriteFile(directory / "v.mha",
+            "ObjectType = Image\nNDims = 2\nDimSize = 4 6\nElementSpacing = 0.5 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n" +
+                Samples(24));
+  WriteTiff(directory / "v.tif", {.size = {4, 6, 1}}, Samples(24));
+  for (const char* file : {"v.nii", "v.mha", "v.tif"}) {
+    const Result<LoadedVolume> loaded = ReadVolume(directory / file);
+    ASSERT_TRUE(loaded.ok()) << loaded.status().message();
+    EXPECT_EQ(loaded->info.description.geometry.size, (Index3{4, 6, 1})) << file;
+  }
+  EXPECT_EQ(ReadVolume(directory / "v.mha")->info.description.geometry.spacing, (Vec3{0.5, 2, 0.5}));
 }
 
 TEST(Malformed, HeadersCannotMakeItTakeMemory) {

@@ -46,7 +46,9 @@ TEST_F(PicturesTest, FoldersOfPicturesAreVolumes) {
   EXPECT_EQ(ValuesIn(loaded), counted);
   WritePng(directory_ / "s7.png", {4, 3, 1}, 16, 0, slice(0) + slice(1));
   EXPECT_THAT(ReadVolume(directory_.path()).status().message(), testing::AllOf(HasSubstr("s7.png is 4 x 3 uint16, must be 4 x 3 uint8")));
-  // One picture is none, nor are pictures of several names, nor those beside a volume.
+  // A picture alone is a volume of one slice.
+  EXPECT_EQ(ReadPath(directory_ / "s5.png").info.description.geometry.size, (Index3{4, 3, 1}));
+  // A folder of one picture is none, nor are pictures of several names, nor those beside a volume.
   std::filesystem::remove(directory_ / "s7.png");
   WritePng(directory_ / "t8.png", {4, 3, 1}, 8, 0, slice(0));
   EXPECT_FALSE(LooksLikeVolume(directory_.path()));

@@ -310,9 +310,17 @@ TEST_F(ReadersTest, NumPyHasEveryTypeAndVersion) {
   EXPECT_EQ(ValuesOf(Read("v.npy", NpyHeader("|u1", "(2L, 1L, 1L)") + "ab")), (std::vector<double>{'a', 'b'}));
 }
 
+TEST_F(ReadersTest, ANumPyArrayOfTwoAxesIsASlice) {
+  const LoadedVolume c = Read("v.npy", NpyHeader("|u1", "(2, 3)") + "abcdef"),
+                     fortran = Read("v.npy", NpyHeader("|u1", "(2, 3)", true) + "adbecf");
+  for (const LoadedVolume* const loaded : {&c, &fortran}) {
+    EXPECT_EQ(loaded->info.description.geometry.size, (Index3{3, 2, 1}));
+    EXPECT_EQ(ValuesOf(*loaded), (std::vector<double>{'a', 'b', 'c', 'd', 'e', 'f'}));
+  }
+}
+
 TEST_F(ReadersTest, NumPySaysWhatItIsNot) {
   const std::pair<FileBytes, const char*> files[] = {
-      {NpyHeader("|u1", "(4, 6)"), "has 2 dimensions"},
       {NpyHeader("|u1", "(24,)"), "has 1 dimensions"},
       {NpyHeader("|u1", "()"), "has 0 dimensions"},
       {NpyHeader("|u1", "(2, 3, -4)"), "size along x is -4"},

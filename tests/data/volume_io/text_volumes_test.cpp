@@ -159,6 +159,19 @@ TEST_F(TextVolumes, NrrdAxesThatAreNoneOfSpaceAreComponentsOrVolumes) {
       17);
 }
 
+// As ITK writes pictures.
+TEST_F(TextVolumes, AFileOfTwoDimensionsIsASlice) {
+  const auto geometry = [&](const LoadedVolume& loaded) { return loaded.info.description.geometry; };
+  const VolumeGeometry plain = geometry(Read("v.nrrd", Nrrd("dimension: 2\nsizes: 4 6\nspacings: 0.5 2\n", Numbers(24))));
+  EXPECT_EQ(plain.size, (Index3{4, 6, 1}));
+  EXPECT_EQ(plain.spacing, (Vec3{0.5, 2, 0.5}));
+  const VolumeGeometry placed = geometry(Read(
+      "v.nrrd", Nrrd("dimension: 2\nsizes: 4 6\nspace dimension: 2\nspace directions: (0.5,0) (0,2)\nspace origin: (7,8)\n", Numbers(24))));
+  EXPECT_EQ(placed.size, (Index3{4, 6, 1}));
+  EXPECT_EQ(placed.spacing, (Vec3{0.5, 2, 0.5}));
+  EXPECT_EQ(placed.orientation.origin, (Vec3{7, 8, 0}));
+}
+
 TEST_F(TextVolumes, NrrdDirectionsThatDoNotSuitAreNamed) {
   const auto why = [&](const std::string& directions) {
     return WhyNot("v.nrrd", Nrrd("dimension: 3\nspace: RAS\nsizes: 4 3 2\nspace directions: " + directions + "\n", Numbers(24)));
@@ -167,7 +180,7 @@ TEST_F(TextVolumes, NrrdDirectionsThatDoNotSuitAreNamed) {
   EXPECT_THAT(why("(1,0,0) (0,1,0) (0,0,x)"), HasSubstr("must have a vector or none"));
   EXPECT_THAT(why("(1,0,0) (0,1,0) (0,0,1"), HasSubstr("must have a vector or none"));
   EXPECT_THAT(why("(1,0) (0,1) (1,1)"), HasSubstr("must have vectors of 3 numbers"));
-  EXPECT_THAT(why("(1,0,0) (0,1,0) none"), HasSubstr("has 2 axes of space, must have 3"));
+  EXPECT_THAT(why("(1,0,0) (0,1,0) none"), HasSubstr("has 2 axes of space, must have 3, or 2 of a slice"));
   EXPECT_THAT(why("(1,0,0,0) (0,1,0,1) (0,0,1,0)"), HasSubstr("an axis that runs along space and time"));
 }
 

@@ -59,7 +59,7 @@ TEST(BenchCases, TheSideOfACubeFillsThePicture) {
 }
 
 TEST(BenchCases, ATurnIsEvenlySpaced) {
-  for (int i = 0; i < 12; ++i) EXPECT_DOUBLE_EQ(BenchView(Projection::kPerspective, i, 12).azimuth_degrees, 30.0 * i);
+  for (int i = 0; i < 12; ++i) EXPECT_DOUBLE_EQ(*BenchView(Projection::kPerspective, i, 12).azimuth_degrees, 30.0 * i);
 }
 
 class BenchFilesTest : public testing::Test {

@@ -95,8 +95,8 @@ Changes<TransferChoice> ChangesOfTransfer() {
 Changes<ViewParameters> ChangesOfView() {
   return {
       {"projection", [](auto& v) { v.projection = Projection::kOrthographic; }},
-      {"azimuth", [](auto& v) { v.azimuth_degrees += 1; }},
-      {"elevation", [](auto& v) { v.elevation_degrees += 1; }},
+      {"azimuth", [](auto& v) { *v.azimuth_degrees += 1; }},
+      {"elevation", [](auto& v) { *v.elevation_degrees += 1; }},
       {"roll", [](auto& v) { v.roll_degrees += 45; }},
       {"zoom", [](auto& v) { v.zoom += 0.1; }},
       {"fov", [](auto& v) { v.fov_degrees += 1; }},

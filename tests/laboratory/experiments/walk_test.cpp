@@ -46,8 +46,8 @@ TEST_F(Walks, TurntablesTurnByTwoDegreesAStepAndJumpsJumpOnce) {
   const Walk turntable = On("turntable", EqualSlabs().policy, kPathFrames), jump = On("jump", EqualSlabs().policy, kPathFrames);
   int jumps = 0;
   for (int step = 1; step < kPathFrames; ++step) {
-    EXPECT_DOUBLE_EQ(FrameOf(turntable, step).view.azimuth_degrees - FrameOf(turntable, step - 1).view.azimuth_degrees, 2);
-    const double jumped = FrameOf(jump, step).view.azimuth_degrees - FrameOf(jump, step - 1).view.azimuth_degrees;
+    EXPECT_DOUBLE_EQ(*FrameOf(turntable, step).view.azimuth_degrees - *FrameOf(turntable, step - 1).view.azimuth_degrees, 2);
+    const double jumped = *FrameOf(jump, step).view.azimuth_degrees - *FrameOf(jump, step - 1).view.azimuth_degrees;
     if (jumped != 0) {
       EXPECT_EQ(step, kPathFrames / 2);
       EXPECT_DOUBLE_EQ(jumped, 90);

@@ -13,6 +13,23 @@ namespace {
 
 float Lerp(float t, float a, float b) { return a + t * (b - a); }
 
+// From the finite ones of eight voxels, x fastest, by their weights; not a number if the nearest one is not among them.
+float SampleOfFinite(const std::array<float, 8>& voxels, const Float3& fraction) {
+  float sum = 0, weights = 0, least = std::numeric_limits<float>::max(), largest = std::numeric_limits<float>::lowest();
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < 3; ++i) nearest += fraction[i] >= 0.5F ? std::size_t{1} << i : 0;
+  for (std::size_t corner = 0; corner < 8; ++corner) {
+    if (!std::isfinite(voxels[corner])) continue;
+    float weight = 1;
+    for (std::size_t i = 0; i < 3; ++i) weight *= (corner >> i & 1) != 0 ? fraction[i] : 1 - fraction[i];
+    weights += weight;
+    sum += voxels[corner] * weight;
+    least = std::min(least, voxels[corner]);
+    largest = std::max(largest, voxels[corner]);
+  }
+  return std::isfinite(voxels[nearest]) ? std::clamp(sum / weights, least, largest) : std::numeric_limits<float>::quiet_NaN();
+}
+
 template <class T>
 float SampleAt(const RayBox& box, const Float3& p, bool nearest) {
   const Float3 floor = {std::floor(p[0]), std::floor(p[1]), std::floor(p[2])};
@@ -22,16 +39,19 @@ float SampleAt(const RayBox& box, const Float3& p, bool nearest) {
   const auto fraction = [&](std::size_t i) { return nearest ? float(p[i] - floor[i] >= 0.5F) : p[i] - floor[i]; };
   const float u = fraction(0), v = fraction(1), w = fraction(2);
   float least = std::numeric_limits<float>::max(), largest = std::numeric_limits<float>::lowest();
+  std::array<float, 8> corners{};
   const auto row = [&](std::int64_t dy, std::int64_t dz) {
     const T* const voxels = reinterpret_cast<const T*>(box.samples) + first + dy * box.row + dz * box.slice;
     const auto a = float(voxels[0]), b = float(voxels[1]);
+    const auto at = std::size_t(2 * dy + 4 * dz);
+    corners[at] = a, corners[at + 1] = b;
     least = std::min({least, a, b});
     largest = std::max({largest, a, b});
     return Lerp(u, a, b);
   };
   const float low = Lerp(v, row(0, 0), row(1, 0)), high = Lerp(v, row(0, 1), row(1, 1));
   const float sample = Lerp(w, low, high);
-  return std::isfinite(sample) ? std::clamp(sample, least, largest) : sample;
+  return std::isfinite(sample) ? std::clamp(sample, least, largest) : SampleOfFinite(corners, {u, v, w});
 }
 
 template <class T>

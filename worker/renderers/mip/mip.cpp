@@ -48,7 +48,8 @@ class MipRenderer : public Renderer {
     clock.Charge(Stage::kPrepare);
 
     const ViewRays rays = MakeViewRays(setup.camera, setup.description.geometry, SamplesPerVoxel(setup), setup.clip);
-    const ValueScale values = MakeValueScale(double(setup.range.min), double(setup.range.max), mapping);
+    const auto [least, largest_value] = ProjectedValuesOf(setup);
+    const ValueScale values = MakeValueScale(least, largest_value, mapping);
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t piece, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,

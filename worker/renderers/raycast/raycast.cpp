@@ -161,7 +161,8 @@ class RegionCache : public BoxCache {
   const RegionTable* Of(const FrameSetup& setup, const ClassificationTable& classification, const RayLook& look) {
     const TransferFunction& transfer = setup.transfer;
     if (transfer.regions.empty()) return nullptr;
-    Key key = {transfer.regions, transfer.gradient_opacities, setup.range, setup.description.mapping, look.step_exponent};
+    Key key = {transfer.regions, transfer.isosurfaces,      transfer.gradient_opacities,
+               setup.range,      setup.description.mapping, look.step_exponent};
     if (key != key_) {
       table_ = MakeRegionTable(transfer, classification, setup.description.mapping);
       table_.ReplaceOpacities([&](double opacity) { return -std::expm1(double(look.step_exponent) * std::log1p(-opacity)); });
@@ -173,7 +174,8 @@ class RegionCache : public BoxCache {
   std::size_t bytes() const override { return table_.entries.capacity() * sizeof(float); }
 
  private:
-  using Key = std::tuple<std::vector<TransferRegion>, std::vector<GradientOpacityPoint>, ValueRange, ValueMapping, float>;
+  using Key = std::tuple<std::vector<TransferRegion>, std::vector<Isosurface>, std::vector<GradientOpacityPoint>, ValueRange, ValueMapping,
+                         float>;  // all that the classification and the table are made from
   std::optional<Key> key_;
   RegionTable table_;
 };

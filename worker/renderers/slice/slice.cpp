@@ -45,8 +45,9 @@ class SliceRenderer : public Renderer {
     const Mesh& mesh = *data.layers().cells;
     const double planes_per_voxel = setup.parameters.at(0);
     const VolumeGeometry& geometry = setup.description.geometry;
-    const RayLook look =
-        MakeRayLook(data.Classification(setup), setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
+    ClassificationTable table = data.Classification(setup);
+    table.stored_extent = 1;  // meshes have gradients of their own scale (point_gradients.h)
+    const RayLook look = MakeRayLook(table, setup.transfer, setup.description, setup.camera, setup.shading, planes_per_voxel);
     const std::span<const std::uint32_t> shown = data.CacheOf<ShownCells>().Of(mesh, VisibleSamples(look));
     clock.Charge(Stage::kPrepare);
     if (shown.empty()) {

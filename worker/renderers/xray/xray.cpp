@@ -19,7 +19,7 @@ class XrayRenderer : public Renderer {
 
     const VolumeDescription& volume = setup.description;
     const ViewRays rays = MakeViewRays(setup.camera, volume.geometry, setup.parameters.at(0), setup.clip);
-    const auto values = MakeValueScale(AttenuationOf(setup).clear, double(setup.range.max), volume.mapping);
+    const auto values = MakeValueScale(AttenuationOf(setup).clear, MostAttenuating(setup), volume.mapping);
     LocalImage image = RenderPieces(
         pieces, {at, setup, rays, hidden, control, report}, [&](std::size_t /*piece*/) { return kEverywhere; },
         [&](std::size_t /*piece*/, const RayBox& ray_box, const PixelBounds& tile, std::uint8_t /*steps*/, float* pixels,

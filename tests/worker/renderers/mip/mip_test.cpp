@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "common/renderers/mip/projection_mode.h"
 #include "tests/support/renderers.h"
@@ -62,6 +63,35 @@ TEST(Mip, ShowsTheExtremeOrTheMeanOfItsRay) {
   EXPECT_NEAR(alpha(ProjectionMode::kMinimum), 0, 0.02);
   EXPECT_NEAR(alpha(ProjectionMode::kMean), 0.5, 0.02);
   EXPECT_EQ(PixelOf(RenderPicture(volume, ProjectionSetup(volume, options, ProjectionMode::kMinimum)), 1, 1)[3], 0);
+}
+
+// A voxel without a value leaves a hole of its own size, and what lies beside it stays.
+TEST(Mip, AMissingVoxelIsAHoleOfOneVoxel) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Volume volume = MakeVolume({{16, 16, 16}, {1, 1, 1}}, ScalarType::kFloat32, [&](const Index3& v) {
+    return v == Index3{8, 8, 8} || v.y < 4 || v.y > 9 ? nan : 200.0F;
+  });
+  for (const double interpolation : {0.0, 1.0}) {
+    for (const ProjectionMode mode : kModes) {
+      for (const int slice : {3, 4, 7, 8, 9, 10}) {
+        SetupOptions options;
+        options.renderer = FindRenderer("mip");
+        options.transfer = Gray();
+        options.size = {128, 128};
+        options.clipping.slab = ClipSlab{.normal = {0, 1, 0}, .index = slice};
+        FrameSetup setup = MakeSetup(volume, options);
+        SetParameters({1, double(mode), interpolation}, setup);
+        const LocalImage picture = RenderPicture(volume, setup);
+        double area = 0;  // of the picture's pixels that show a value
+        for (int y = 0; y < 128; ++y) {
+          for (int x = 0; x < 128; ++x) area += PixelOf(picture, x, y)[3] > 0 ? 1 : 0;
+        }
+        const double pixel = setup.camera.PixelSizeAt(1), whole = 16 * 16;
+        const double expected = slice < 4 || slice > 9 ? 0 : slice == 8 ? whole - 1 : whole;
+        EXPECT_NEAR(area * pixel * pixel, expected, slice == 8 ? 0.6 : 6) << slice << ' ' << interpolation << ' ' << int(mode);
+      }
+    }
+  }
 }
 
 // Where data values fall as stored samples rise, the largest value is that of the least sample.

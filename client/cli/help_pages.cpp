@@ -1,0 +1,102 @@
+#include "client/cli/help_pages.h"
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/base/check.h"
+#include "common/cli/help_formatter.h"
+
+namespace slabstream {
+namespace {
+
+struct CommandPage {
+  std::string_view command;
+  HelpPage page;
+};
+
+std::vector<CommandPage> CommandPages() {
+  return {
+      {"render",
+       {.options = {"output", "size", "view", "azimuth", "elevation", "zoom", "renderer", "transfer", "scalar-range", "isovalue",
+                    "clip-box", "background", "color-bar", "time", "channel"},
+        .examples = {{"slabstream render head.nii.gz -o head.png", "A picture of a file, on all cores of this machine"},
+                     {"slabstream render head.nii.gz -o left.png --view left --size 1200x900", "The same head from its left side"},
+                     {"slabstream render ct.nrrd:ct-bone -o bones.png --renderer raycast --background white", "The bones of a CT"},
+                     {"slabstream render t1.nii.gz -o atlas.png --labels atlas.nii.gz --legend", "A brain with the structures of an atlas"},
+                     {"slabstream render brain -o brain.png", "A dataset of the service that `slabstream up` started"}}}},
+      {"turntable",
+       {.options = {"output", "frames", "turns", "fps", "time", "size", "view", "elevation", "zoom", "renderer", "transfer", "scalar-range",
+                    "clip-box", "background", "color-bar"},
+        .examples = {{"slabstream turntable head.nii.gz -o head.mp4 --frames 100", "A movie of a turn, which the program ffmpeg encodes"},
+                     {"slabstream turntable head.nii.gz -o 'head_%02d.png' --frames 36", "The same turn as numbered pictures"},
+                     {"slabstream turntable heart.nii.gz -o beat.mp4 --time 0:19 --turns 0", "The first 20 times of a file, from one side"},
+                     {"slabstream turntable ct.nrrd:ct-bone -o bones.webm --frames 100 --size 1280x720", "The bones of a CT, in HD"},
+                     {"slabstream turntable brain -o brain.gif --frames 50", "A dataset of the service that `slabstream up` started"}}}},
+      {"slice",
+       {.options = {"output", "plane", "at", "index", "thickness", "size", "window", "level", "transfer", "scalar-range", "background",
+                    "color-bar", "orientation-marker", "time", "channel"},
+        .examples = {{"slabstream slice head.nii.gz -o planes.png --plane anatomical", "An axial, a coronal and a sagittal plane"},
+                     {"slabstream slice ct.nrrd -o lung.png --plane coronal --window lung", "A CT in the window of lungs"},
+                     {"slabstream slice head.nii.gz -o z40.png --plane z --index 40", "Slice 40 along z"},
+                     {"slabstream slice ct.nrrd -o mip.png --plane axial --thickness 20", "The largest values of 20 mm"},
+                     {"slabstream slice t1.nii.gz -o map.png --overlay zstat.nii.gz --color-bar", "A statistical map over a brain"}}}},
+      {"info",
+       {.options = {"json", "transfer", "labels", "overlay", "time", "channel", "series", "array", "dataset"},
+        .examples = {{"slabstream info head.nii.gz", "Size, spacing, orientation, times, channels and values"},
+                     {"slabstream info study/ --series 2", "The second series of a folder of DICOM files"},
+                     {"slabstream info brain.png", "How Slabstream made this picture"}}}},
+      {"value",
+       {.options = {"at", "labels", "overlay", "json", "time", "channel", "endpoint", "service"},
+        .examples = {{"slabstream value head.nii.gz --at 10,-22,35", "Voxel and value at a point of the world"},
+                     {"slabstream value t1.nii.gz --labels atlas.nii.gz --at 10,-22,35 --json", "The structure there, too, as JSON"}}}},
+      {"convert",
+       {.options = {"type", "level", "box", "memory", "zarr-version", "progress", "time", "channel", "series", "array", "dataset"},
+        .examples = {{"slabstream convert study/ head.nii.gz", "A folder of DICOM files as one NIfTI file"},
+                     {"slabstream convert brain.tif brain.ome.zarr --memory 2G --progress",
+                      "A large volume with levels, for fast pictures"},
+                     {"slabstream convert head.nrrd part.nrrd --box 10:60,:,:", "A part of a volume"}}}},
+      {"transfer",
+       {.options = {"list", "preview", "scalar-range"},
+        .examples = {{"slabstream transfer --list", "The names of all presets"},
+                     {"slabstream transfer ct-bone ct.nrrd > bone.json", "A preset as a file to change, for --transfer bone.json"}}}},
+      {"up",
+       {.examples = {{"slabstream up --data head=head.nii.gz", "A service of one volume, until Ctrl-C"},
+                     {"slabstream up --detach --data scans/", "A service of all volumes in a folder, in the background"},
+                     {"slabstream up --listen tcp://192.168.1.7:7420 --data scans/", "A service for other hosts, with keys"}}}},
+      {"view",
+       {.options = {"no-browser", "listen", "labels", "overlay", "endpoint", "service", "cache", "time", "channel", "series", "array",
+                    "dataset"},
+        .examples = {{"slabstream view head.nii.gz", "A file in the browser, by a service of its own"},
+                     {"slabstream view t1.nii.gz --labels atlas.nii.gz", "A brain with the structures of an atlas"},
+                     {"slabstream view head --service client.json", "A dataset of another host's service"}}}},
+      {"data",
+       {.examples = {{"slabstream data list", "The datasets of the service"},
+                     {"slabstream data add foot=/scans/foot.nrrd", "One more dataset, until the service ends"}}}},
+      {"bench", {.examples = {{"slabstream bench head.nii.gz", "How fast this machine renders a volume"}}}},
+      {"experiment",
+       {.examples = {{"slabstream experiment paper -o paper --quick", "The tables and figures of the paper on this machine, in short"},
+                     {"slabstream experiment combining -o combining", "Schemes to combine images, compared"}}}},
+  };
+}
+
+HelpPage ProgramPage() {
+  return {.examples = {{"slabstream view head.nii.gz", "Turn a volume in the browser"},
+                       {"slabstream render head.nii.gz -o head.png", "A picture of it"},
+                       {"slabstream turntable head.nii.gz -o head.mp4 --frames 100", "A movie of it"},
+                       {"slabstream up --detach --data scans/", "A service of all volumes in a folder"},
+                       {"slabstream render --help", "The options of a command"}}};
+}
+
+}  // namespace
+
+void AddHelpPages(CLI::App& program) {
+  const auto formatter = std::dynamic_pointer_cast<HelpFormatter>(program.get_formatter());
+  CHECK(formatter != nullptr);
+  formatter->SetPage(program, ProgramPage());
+  for (CommandPage& each : CommandPages()) formatter->SetPage(*program.get_subcommand(std::string(each.command)), std::move(each.page));
+}
+
+}  // namespace slabstream

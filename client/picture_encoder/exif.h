@@ -1,0 +1,16 @@
+// The block of metadata that JPEG and WebP files hold: the size of a pixel, the program and the record, as Exif 2.3 has them (CIPA DC-008).
+#pragma once
+
+#include <string>
+
+#include "client/picture_encoder/picture_encoder.h"
+
+namespace slabstream {
+
+// Whether there is anything to say.
+bool HasExif(const EncodedFormat& format);
+
+// A TIFF header and one directory: XResolution and YResolution; Software, and the record as ImageDescription.
+std::string ExifBlock(const EncodedFormat& format);
+
+}  // namespace slabstream

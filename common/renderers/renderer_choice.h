@@ -1,0 +1,22 @@
+// RenderersFor(): which renderers can make the picture of a request. Each part of a request that not all of them can do is a need; the
+// schema names the ability of each field, too, for those who offer it (About::ability).
+#pragma once
+
+#include <vector>
+
+#include "common/base/status.h"
+#include "common/frame/frame_request.h"
+#include "common/renderers/renderer_kind.h"
+
+namespace slabstream {
+
+// The renderer that the request names, or if that is kAutomatic, all that have what it needs, in order of preference (Renderers()); never
+// none. InvalidArgument: no renderer has this name, or has such a parameter; a parameter's text is no valid value; the renderer lacks what
+// the request needs, or no renderer has all of it: the error then names what cannot be had together.
+Result<std::vector<const RendererKind*>> RenderersFor(const FrameRequest& request);
+
+// The first of `able` that draws the cells of an unstructured grid, if the dataset is one, or that draws voxels; else the first one.
+// `able` is not empty.
+const RendererKind& PreferredRenderer(const std::vector<const RendererKind*>& able, bool has_cells);
+
+}  // namespace slabstream

@@ -1,0 +1,9 @@
+// How far away points of the world may be named.
+#pragma once
+
+namespace slabstream {
+
+// Of points and distances, either sign: practically any. A bound of a clip box there does not clip.
+inline constexpr double kMaxCoordinate = 1e300;
+
+}  // namespace slabstream
