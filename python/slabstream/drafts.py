@@ -4,16 +4,13 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import functools
-import json
-import os
-import pathlib
 import unicodedata
 from typing import Any, Callable, Iterable, Mapping
 
 from google.protobuf.descriptor import FieldDescriptor
 
 from . import schema, transfer, values
-from .errors import InvalidArgument, NotFound, UnknownOption
+from .errors import InvalidArgument, UnknownOption
 from .image import PictureFormat
 from .options import COMMANDS, Option
 
@@ -206,15 +203,7 @@ def _view(draft: Draft, option: Option, value: Any) -> None:
 
 def _camera(draft: Draft, option: Option, value: Any) -> None:
     """A file that --save-camera wrote, or its contents: whatever options it stands for, and excludes."""
-    if isinstance(value, (str, os.PathLike)):
-        try:
-            fields = json.loads(pathlib.Path(value).read_bytes())
-        except FileNotFoundError:
-            raise NotFound(f"{option.name} '{value}' does not exist") from None
-        except (OSError, ValueError) as error:
-            raise InvalidArgument(f"{option.name} '{value}' cannot be read: {error}") from None
-    else:
-        fields = value
+    fields = values.json_of(option.name, value)
     if not isinstance(fields, Mapping):
         raise InvalidArgument(f"{option.name} {value!r} is no camera: it is not one JSON object")
     for field, inner in fields.items():

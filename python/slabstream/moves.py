@@ -6,15 +6,12 @@ from __future__ import annotations
 
 import bisect
 import dataclasses
-import json
 import math
-import os
-import pathlib
 from typing import Any, Iterator, Mapping, Sequence, Tuple
 
 from . import schema
-from .errors import InvalidArgument, NotFound
-from .values import number
+from .errors import InvalidArgument
+from .values import json_of, number
 
 LEAST_CAMERAS, MOST_CAMERAS = 2, 1000
 _LEAST_ZOOM, _MOST_ZOOM = 1e-3, 1e4
@@ -37,13 +34,7 @@ def turned_views(first: Any, frames: int, turns: int) -> Iterator[Any]:
 
 def cameras_of(path: Any) -> tuple[list[float], list[dict[str, Any]]]:
     """Times and cameras of a file, or of a list of cameras."""
-    if isinstance(path, (str, os.PathLike)):
-        try:
-            path = json.loads(pathlib.Path(path).read_bytes())
-        except FileNotFoundError:
-            raise NotFound(f"path '{path}' does not exist") from None
-        except (OSError, ValueError) as error:
-            raise InvalidArgument(f"path '{path}' cannot be read: {error}") from None
+    path = json_of("path", path)
     if not isinstance(path, Sequence) or isinstance(path, str) or not LEAST_CAMERAS <= len(path) <= MOST_CAMERAS:
         raise InvalidArgument(f"path must be a list of {LEAST_CAMERAS} to {MOST_CAMERAS} cameras")
     times: list[float] = []

@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import math
 import operator
+import os
 import pathlib
 from typing import Any, Iterable, Sequence
 
 import numpy
 
-from .errors import InvalidArgument
+from .errors import InvalidArgument, NotFound
 
 Vector = tuple[float, float, float]
 Color = tuple[float, float, float, float]  # straight, each in [0, 1], with the precision of a float32
@@ -33,6 +34,18 @@ _ISOSURFACE_COLORS: list[Vector] = [
     (0.92, 0.84, 0.72), (0.80, 0.30, 0.26), (0.38, 0.60, 0.86), (0.95, 0.78, 0.35),
     (0.45, 0.72, 0.48), (0.66, 0.48, 0.78), (0.88, 0.55, 0.70), (0.60, 0.60, 0.60),
 ]
+
+
+def json_of(name: str, value: Any) -> Any:
+    """What the JSON file of this path holds; what is no path, as it is."""
+    if not isinstance(value, (str, os.PathLike)):
+        return value
+    try:
+        return json.loads(pathlib.Path(value).read_bytes())
+    except FileNotFoundError:
+        raise NotFound(f"{name} '{value}' does not exist") from None
+    except (OSError, ValueError) as error:
+        raise InvalidArgument(f"{name} '{value}' cannot be read: {error}") from None
 
 
 def text_of(number: float) -> str:

@@ -25,6 +25,14 @@ class SealedSocketTest : public KeyedSocketTest {
     context_.authenticator().AdmitOnly(kPlane, {friend_.public_key});
   }
   Socket ConnectedTo(const TcpRelay& network) { return Connected(network.endpoint(), {.client_keys = KeysOf(friend_)}); }
+  void ExpectNotHeardAgain(const TcpRelay& network, const std::vector<std::string>& pieces) {
+    std::atomic<bool> over = false;
+    std::jthread again([&] {
+      EXPECT_TRUE(network.Replay(pieces));
+      over = true;
+    });
+    while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
+  }
 };
 
 TEST_F(SealedSocketTest, MessagesArriveInOrderWithTheirSendersKey) {
@@ -63,13 +71,7 @@ TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgain) {
   ExpectHeard(dealer, "once");
   const std::vector<std::string> once = network.Pieces();
   // The ticket is still that of the seal: the connection comes about, and ends at the first frame.
-  std::atomic<bool> over = false;
-  std::jthread again([&] {
-    EXPECT_TRUE(network.Replay(once));
-    over = true;
-  });
-  while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
-  again.join();
+  ExpectNotHeardAgain(network, once);
   ExpectHeard(dealer, "and this");
   // Later seals make the ticket void.
   Socket later = ConnectedAs(friend_);
@@ -87,13 +89,7 @@ TEST_F(SealedSocketTest, WhatWasRecordedIsNotHeardAgainAfterConnectionsWereEnded
   ExpectHeard(dealer, "once");
   const std::vector<std::string> once = network.Pieces();
   router_->EndConnections(friend_.public_key);
-  std::atomic<bool> over = false;
-  std::jthread again([&] {
-    EXPECT_TRUE(network.Replay(once));
-    over = true;
-  });
-  while (!over) EXPECT_FALSE(Receive(milliseconds(10))) << "it was heard again";
-  again.join();
+  ExpectNotHeardAgain(network, once);
   EXPECT_TRUE(Until(*router_, [&] {
     EXPECT_FALSE(router_->TryReceive());
     return network.connections() >= 2;
