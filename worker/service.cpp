@@ -134,11 +134,10 @@ struct WorkerService::Impl {
   std::atomic<bool> registered = false;  // at least once, or stopped
   std::atomic<bool> leave_requested = false, stop_requested = false;
   std::atomic<bool> stopped = false;
-  Status ended;                                // set before `stopped`
-  bool stop_now = false;                       // set by the machine
-  std::optional<std::uint32_t> other_version;  // of the coordinator's messages, if it is not ours
-  LimitedLog complaints;                       // about messages
-  std::optional<Status> wrong_endpoint;        // nobody registers workers there
+  Status ended;                             // set before `stopped`
+  bool stop_now = false;                    // set by the machine
+  LimitedLog complaints;                    // about messages
+  std::optional<Status> wrong_coordinator;  // why nobody at its endpoint can have this worker
   WorkerMetrics metrics{options.machine.memory_bytes};
   Mailbox<ExecutorOutput> outbox;  // its wakeup also signals stop_requested
   StoredVoxels stored_voxels{[this](WorkerEvent event) { outbox.Post(std::move(event)); }};
@@ -194,12 +193,7 @@ Status WorkerService::Impl::Loop() {
     peers.CloseIdle(now);
     pictures.CloseIdle(now);
     executor->peer_memory().CloseIdle(now);
-    if (other_version) {
-      return Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " " + TextOfOtherVersion(*other_version));
-    }
-    if (wrong_endpoint) {
-      return Status(wrong_endpoint->code(), "--coordinator " + options.coordinator_endpoint + ": " + wrong_endpoint->message());
-    }
+    if (wrong_coordinator) return *wrong_coordinator;
     if (control.refused() && !options.keys) {
       return Status::InvalidArgument("the coordinator at " + options.coordinator_endpoint +
                                      " has keys: name its service file, worker.json (--service)");
@@ -226,8 +220,12 @@ void WorkerService::Impl::Receive(Socket& socket, Plane plane) {
     Result<Messages> decoded = Guarded("decoding", [&] { return Decode<Messages>(incoming->header(), payload.size()); });
     if (!decoded.ok()) {
       if (plane == Plane::kControl) {
-        other_version = OtherVersion(incoming->header());
-        wrong_endpoint = RefusalIn(incoming->header());
+        if (const auto version = OtherVersion(incoming->header())) {
+          wrong_coordinator =
+              Status::Unavailable("the coordinator at " + options.coordinator_endpoint + " " + TextOfOtherVersion(*version));
+        } else if (const std::optional<Status> refusal = RefusalIn(incoming->header())) {
+          wrong_coordinator = Status(refusal->code(), "--coordinator " + options.coordinator_endpoint + ": " + refusal->message());
+        }
       }
       complaints.Warning(std::string(NameOf(plane)) + " plane: dropped a message: " + decoded.status().message());
       continue;
