@@ -223,15 +223,13 @@ Status RunAll(const Options& options) {
 int main(int argc, char** argv) {
   using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
   Options options;
-  CLI::App app("The choice of `auto`, beside the fixed policy and the best one", "auto_bench");
+  const BenchProgram app("The choice of `auto`, beside the fixed policy and the best one", "auto_bench");
   AddSubjectOptions(app, options.subject);
-  AddList(app, "--workers", options.workers, CLI::Range(1, 4096), "Numbers of workers");
-  AddParsed(app, "--link", options.link, ParseLink, "Between workers, each with a host of its own")
-      ->type_name("LINK")
-      ->default_str(kDefaultLink);
-  app.add_flag("--one-host", options.one_host, "Workers of one host with a core each instead");
-  app.add_flag("--service", options.service, "Measure the embedded service instead of simulating");
+  AddList(app, "--workers", options.workers, Integers(1, 4096), "Numbers of workers");
+  AddParsed(app, "--link", options.link, ParseLink, "Between workers, each with a host of its own").TypeName("LINK").Default(kDefaultLink);
+  app.AddFlag("--one-host", options.one_host, "Workers of one host with a core each instead");
+  app.AddFlag("--service", options.service, "Measure the embedded service instead of simulating");
   AddInteger(app, "--repeats", options.repeats, 1, 1000, "Renderings of each box");
   AddInteger(app, "--frames", options.frames, 1, 1000, "Of a turn, with --service");
-  return RunProgram(app, argc, argv, [&options] { return RunAll(options); });
+  return app.Run(argc, argv, [&options] { return RunAll(options); });
 }

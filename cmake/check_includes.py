@@ -6,7 +6,8 @@
 TARGETS is written by SlabstreamIncludeCheck.cmake. A file may use what its target links, what those targets link publicly, and so
 on. A header that other targets include may use only what its target links publicly. A header belongs to the target that compiles
 the source of the same name; if none does, to the targets of its folder, or of the next folder above that has any. Headers without
-a source below tests/ belong to whoever includes them. A renderer is a folder of common/renderers or worker/renderers. Prints a line for each violation; exit status 1 if there is any.
+a source below tests/ belong to whoever includes them. A renderer is a folder of common/renderers or worker/renderers. A library that is dear to
+compile (CONFINED) may be included only by targets that link it themselves. Prints a line for each violation; exit status 1 if there is any.
 """
 import re
 import sys
@@ -14,6 +15,8 @@ from pathlib import Path
 
 INCLUDE = re.compile(r'\s*#\s*include\s*"([^"]+)"')
 GENERATED = "slabstream/v1/"  # headers made from the folder proto
+CONFINED = {"CLI": "CLI11_CLI11"}  # folder of headers: library
+CONFINED_INCLUDE = re.compile(rf"\s*#\s*include\s*<({'|'.join(CONFINED)})/")
 
 
 class Target:
@@ -22,7 +25,8 @@ class Target:
         self.folder = Path(folder).relative_to(root)
         self.sources = {self.folder / source for source in sources.split(";") if source and not Path(source).is_absolute()}
         self.public = names(interface)  # without $<LINK_ONLY:...>, the private links of a static library
-        self.links = names(links) | self.public
+        self.direct = names(links)
+        self.links = self.direct | self.public
 
     def renderer(self):
         """None: the target is no half of a renderer."""
@@ -71,6 +75,15 @@ class Check:
             elif match and (self.root / match.group(1)).is_file():
                 yield number, match.group(1), self.owners(Path(match.group(1)))
 
+    def confined(self):
+        for file in self.files:
+            for number, line in enumerate((self.root / file).read_text().splitlines(), 1):
+                match = CONFINED_INCLUDE.match(line)
+                library = match and CONFINED[match.group(1)]
+                for name in self.owners(file) if library else ():
+                    if library not in self.targets[name].direct:
+                        yield f"{file}:{number}: {name} does not link {library} itself"
+
     def linked_renderers(self):
         halves = {name: target for name, target in self.targets.items() if target.renderer()}
         for name, target in halves.items():
@@ -80,6 +93,7 @@ class Check:
 
     def violations(self):
         yield from self.linked_renderers()
+        yield from self.confined()
         shared = {text for file in self.files for _, text, of in self.includes(file) if not self.owners(file) & of}
         for file in self.files:
             own = self.owners(file)

@@ -1,12 +1,9 @@
 #include "client/cli/help_pages.h"
 
-#include <memory>
-#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "common/base/check.h"
 #include "common/cli/help_formatter.h"
 
 namespace slabstream {
@@ -92,11 +89,9 @@ HelpPage ProgramPage() {
 
 }  // namespace
 
-void AddHelpPages(CLI::App& program) {
-  const auto formatter = std::dynamic_pointer_cast<HelpFormatter>(program.get_formatter());
-  CHECK(formatter != nullptr);
-  formatter->SetPage(program, ProgramPage());
-  for (CommandPage& each : CommandPages()) formatter->SetPage(*program.get_subcommand(std::string(each.command)), std::move(each.page));
+void AddHelpPages(const Command& program) {
+  SetHelpPage(program, ProgramPage());
+  for (CommandPage& each : CommandPages()) SetHelpPage(program.FindCommand(each.command), std::move(each.page));
 }
 
 }  // namespace slabstream

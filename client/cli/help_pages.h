@@ -2,11 +2,11 @@
 // too. client_commands.cpp declares the options.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "common/cli/command.h"
 
 namespace slabstream {
 
 // Of the program and its commands, which are declared already.
-void AddHelpPages(CLI::App& program);
+void AddHelpPages(const Command& program);
 
 }  // namespace slabstream

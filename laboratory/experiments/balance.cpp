@@ -163,7 +163,7 @@ void RunAtService(ExperimentContext& context, Results& results) {
 
 }  // namespace
 
-void DeclareBalance(CLI::App& app, OwnOptions& options) {
+void DeclareBalance(const Command& app, OwnOptions& options) {
   DeclareSubjects(app, options, "16,64: 16 on all paths, 64 on the first one; with --quick 16");
   std::vector<std::string_view> names;
   for (const Path& path : Paths()) names.push_back(path.name);
@@ -174,8 +174,8 @@ void DeclareBalance(CLI::App& app, OwnOptions& options) {
   for (const NamedPolicy& method : methods) method_names.push_back(method.name);
   AddParsedList(app, "--methods", options.methods, OneOf(method_names), "Ways to balance (default: all)");
   AddService(app, options.service)
-      ->description("Lead a service at this endpoint along the paths, with its workers and datasets; simulate nothing")
-      ->default_str("none: boxes are rendered alone on this machine");
+      .Description("Lead a service at this endpoint along the paths, with its workers and datasets; simulate nothing")
+      .Default("none: boxes are rendered alone on this machine");
   AddParsedList(
       app, "--transfer", options.transfers,
       [](const std::string& option, const std::string& text) -> Result<TransferChoice> {
@@ -185,7 +185,7 @@ void DeclareBalance(CLI::App& app, OwnOptions& options) {
       },
       "Two transfer functions, as for `slabstream render`: the first on all paths; on the path `transfer` the second from the middle on. "
       "Files need them for that path")
-      ->type_name("A,B");
+      .TypeName("A,B");
 }
 
 void CheckBalance(const ExperimentOptions& options) {

@@ -182,7 +182,7 @@ Cases CasesOf(const ExperimentContext& context) {
 
 }  // namespace
 
-void DeclareCombining(CLI::App& app, OwnOptions& options) {
+void DeclareCombining(const Command& app, OwnOptions& options) {
   static const std::vector<std::string> schemes = AllSchemes();
   AddParsedList(app, "--schemes", options.methods, OneOf({schemes.begin(), schemes.end()}),
                 fmt::format("Schemes to compare, as --combine takes them: {} (default: all)", fmt::join(schemes, ", ")));

@@ -177,7 +177,7 @@ void AddAssignments(ExperimentContext& context, const Comparison& comparison, co
 
 }  // namespace
 
-void DeclarePartitions(CLI::App& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
+void DeclarePartitions(const Command& app, OwnOptions& options) { DeclareSubjects(app, options, "2,16,64; with --quick 2,16"); }
 
 void CheckPartitions(const ExperimentOptions& options) {
   CheckSubjects(SubjectsOf(options, kLeastScaledSide), BenchView(Projection::kOrthographic, 1, 12));

@@ -9,7 +9,7 @@
 namespace slabstream {
 
 // VOLUME, --workers and --renderer. `workers`: the default, for --help.
-void DeclareSubjects(CLI::App& app, OwnOptions& options, const std::string& workers);
+void DeclareSubjects(const Command& app, OwnOptions& options, const std::string& workers);
 
 // What the user named, or else sparse volumes that are made here, `size` voxels a side, and in a run that is not quick the real ones.
 std::vector<BenchCase> SubjectsOf(const ExperimentOptions& options, int size);

@@ -1,4 +1,3 @@
-#include <CLI/CLI.hpp>
 #include <algorithm>
 
 #include "client/cli/option_groups.h"
@@ -87,10 +86,10 @@ SweepPlace PlaceOf(const ExperimentOptions& options) { return options.own.at_ser
 
 }  // namespace
 
-void DeclareSweep(CLI::App& app, OwnOptions& options) {
+void DeclareSweep(const Command& app, OwnOptions& options) {
   AddService(app, options.service)
-      ->description("Measure the frames of a service at this endpoint, with its workers and datasets; simulate nothing")
-      ->default_str("none: workers are simulated from measurements on this machine");
+      .Description("Measure the frames of a service at this endpoint, with its workers and datasets; simulate nothing")
+      .Default("none: workers are simulated from measurements on this machine");
 }
 
 std::vector<BenchCase> SweepVolumes(const ExperimentOptions& options) {

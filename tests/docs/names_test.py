@@ -108,7 +108,7 @@ def options() -> set[str]:
 
 @functools.cache
 def subcommands() -> set[str]:
-    return set(re.findall(r'(?:add_subcommand\(|DeclareAbout\(line,)\s*"([a-z-]+)"', production()))
+    return set(re.findall(r'(?:AddCommand\(|DeclareAbout\(line,)\s*"([a-z-]+)"', production()))
 
 
 class Text:

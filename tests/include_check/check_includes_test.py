@@ -71,6 +71,15 @@ class CheckIncludes(unittest.TestCase):
         self.write("top/top.cpp", '#include "base/inner/only.h"\n')
         self.assertEqual(self.check(("x_base", "base", [], [], []), ("x_top", "top", ["top.cpp"], [], []))[0], 1)
 
+    def test_a_confined_library_is_included_by_those_that_link_it_alone(self):
+        self.write("base/base.h")
+        self.write("base/base.cpp", "#include <CLI/CLI.hpp>\n")
+        base = ("x_base", "base", ["base.cpp"], [], ["CLI11::CLI11"])
+        self.assertEqual(self.check(base)[0], 0)
+        self.write("top/top.cpp", "#include <vector>\n#include <CLI/CLI.hpp>\n")
+        status, text = self.check(base, ("x_top", "top", ["top.cpp"], ["x::base"], []))
+        self.assertEqual((status, text), (1, "top/top.cpp:2: x_top does not link CLI11_CLI11 itself\n"))
+
     def test_renderers_do_not_link_each_other(self):
         self.write("worker/renderers/fog/fog.cpp")
         for kind, links in (("common/renderers/fog", ["x::shared"]), ("common/renderers/rain", []), ("worker/renderers/snow", [])):

@@ -16,12 +16,11 @@ using testing::HasSubstr;
 
 FrameOptions Typed(const PictureFields& fields) {
   FrameOptions options;
-  CLI::App app;
+  const Program app;
   AddFrameOptions(app, options);
   std::vector<std::string> arguments = {"head"};
   for (const auto& [name, text] : fields) arguments.push_back(text.empty() ? "--" + name : fmt::format("--{}={}", name, text));
-  std::ranges::reverse(arguments);
-  app.parse(std::move(arguments));
+  EXPECT_EQ(app.Parse(std::move(arguments)).message, "");
   options.request.dataset = "head";
   return options;
 }
@@ -64,7 +63,7 @@ TEST(PictureFieldsTest, AskForWhatTheCommandLineAsksFor) {
 }
 
 TEST(PictureFieldsTest, EveryFieldIsAnOptionOfTheCommandLine) {
-  CLI::App render, slice;
+  const Program render, slice;
   FrameOptions render_options;
   SliceOptions slice_options;
   AddFrameOptions(render, render_options);
@@ -74,7 +73,7 @@ TEST(PictureFieldsTest, EveryFieldIsAnOptionOfTheCommandLine) {
     for (const Json& field : fields) {
       const std::string name = field["name"];
       if (name == "dataset") continue;
-      EXPECT_NE(app->get_option_no_throw("--" + name), nullptr) << name;
+      EXPECT_TRUE(app->FindOption("--" + name)) << name;
     }
   }
 }

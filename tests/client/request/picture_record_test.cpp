@@ -21,13 +21,12 @@ using testing::Not;
 // What `slabstream` makes of the arguments of render.
 FrameOptions Parse(std::vector<std::string> arguments) {
   FrameOptions options;
-  CLI::App app;
+  const Program app;
   std::string output;
-  app.add_option("-o,--output", output)->required();
+  app.AddText("-o,--output", output).Required();
   AddFrameOptions(app, options);
-  app.add_flag("--previews", options.request.previews);
-  std::reverse(arguments.begin(), arguments.end());
-  app.parse(arguments);
+  app.AddFlag("--previews", options.request.previews);
+  EXPECT_EQ(app.Parse(std::move(arguments)).message, "");
   return options;
 }
 

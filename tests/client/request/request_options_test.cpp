@@ -137,7 +137,7 @@ TEST(RequestOptionsTest, EveryFieldOfTheSchemaIsAnOptionOrSaysWhyNot) {
 }
 
 TEST(RequestOptionsTest, EveryOptionIsOneOfTheCommandLineAndAQuery) {
-  CLI::App app;
+  const Program app;
   FrameOptions options;
   AddFrameOptions(app, options);
   const Json queries = RenderFields();
@@ -148,10 +148,10 @@ TEST(RequestOptionsTest, EveryOptionIsOneOfTheCommandLineAndAQuery) {
     ASSERT_NE(query, queries.end());
     EXPECT_EQ((*query)["path"], option.path);
     if (option.name == "dataset") continue;  // SOURCE on the command line
-    const CLI::Option* const typed = app.get_option_no_throw("--" + option.name);
-    ASSERT_NE(typed, nullptr);
-    EXPECT_EQ(typed->get_description(), option.help);
-    EXPECT_EQ(typed->get_group(), option.group);
+    const Option typed = app.FindOption("--" + option.name);
+    ASSERT_TRUE(typed);
+    EXPECT_EQ(typed.description(), option.help);
+    EXPECT_EQ(typed.group(), option.group);
   }
 }
 
