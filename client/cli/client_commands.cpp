@@ -7,7 +7,10 @@
 
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
+#include "client/cli/completion.h"
 #include "client/cli/cores.h"
+#include "client/cli/help_pages.h"
+#include "client/cli/laboratory.h"
 #include "client/cli/measure.h"
 #include "client/cli/option_groups.h"
 #include "client/cli/picture_orders.h"
@@ -480,10 +483,11 @@ void DeclareAnnotate(const CommandLine& line) {
 }  // namespace
 
 std::span<const DeclareCommand> ClientCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareRender,   DeclareTurntable, DeclareSlice,   DeclareInfo,  DeclareValue,
-                                                 DeclareMeasure,  DeclareTransfer,  DeclareConvert, DeclareIndex, DeclareSphere,
-                                                 DeclareClusters, DeclareUp,        DeclareView,    DeclareDown,  DeclareStatus,
-                                                 DeclareAnnotate, DeclareKeys,      DeclareData,    DeclareLogs,  DeclareSlurm};
+  static constexpr DeclareCommand kCommands[] = {DeclareRender,     DeclareTurntable,  DeclareSlice,    DeclareInfo,  DeclareValue,
+                                                 DeclareMeasure,    DeclareTransfer,   DeclareConvert,  DeclareIndex, DeclareSphere,
+                                                 DeclareClusters,   DeclareUp,         DeclareView,     DeclareDown,  DeclareStatus,
+                                                 DeclareAnnotate,   DeclareKeys,       DeclareData,     DeclareLogs,  DeclareSlurm,
+                                                 DeclareLaboratory, DeclareCompletion, DeclareHelpPages};
   return kCommands;
 }
 

@@ -13,7 +13,6 @@
 #include "client/cli/annotate.h"
 #include "client/cli/commands.h"
 #include "client/cli/completion.h"
-#include "client/cli/help_pages.h"
 #include "client/cli/option_groups.h"
 #include "client/request/option_description.h"
 #include "common/base/log.h"
@@ -86,7 +85,7 @@ std::vector<std::string> Arguments(int argc, const char* const* argv) {
 
 }  // namespace
 
-int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more) {
+int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> commands) {
   const Program app("Slabstream renders volumes on CPUs, by any number of worker processes.", "slabstream",
                     fmt::format("slabstream {}", Version()));
   app.AddHelpAll();
@@ -96,9 +95,7 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
   std::string log_level;
   AddLogLevel(app, log_level).Default("warning");
   const CommandLine line{app, run, typed, log_level};
-  for (const DeclareCommand declare : ClientCommands()) declare(line);
-  for (const DeclareCommand declare : more) declare(line);
-  DeclareCompletion(line);
+  for (const DeclareCommand declare : commands) declare(line);
   DeclareHelp(line);
   DeclareOptions(line).Group(kHidden);
   DeclareMan(line).Group(kHidden);
@@ -106,7 +103,6 @@ int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCom
     if (sub.group() != kHidden) sub.Group("Commands");
     AllowLogLevel(sub, log_level);
   }
-  AddHelpPages(app);
   if (argc > 1 && argv[1] == kCompleteCommand) {  // before the parse: the words need not be complete
     return Finish("slabstream", RunComplete(app, std::vector<std::string>(argv + 2, argv + argc)));
   }

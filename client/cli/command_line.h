@@ -21,9 +21,9 @@ struct CommandLine {
 // Declares one command. The values of its options must live as long as its callbacks, which may own them.
 using DeclareCommand = void (*)(const CommandLine& line);
 
-// Runs one of the client's commands or of `more`. 0: done. 1: the service or the frame failed. 2: bad
+// Runs one of `commands`, or tells about them: `help`, `options`, `man`, `complete`. 0: done. 1: the service or the frame failed. 2: bad
 // arguments or input. 130: stopped by Ctrl-C. Unless 0, exactly one line on stderr says why: "slabstream render: --zoom 0 is out of range
 // [0.001, 10000]".
-int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> more);
+int RunCommandLine(int argc, const char* const* argv, std::span<const DeclareCommand> commands);
 
 }  // namespace slabstream

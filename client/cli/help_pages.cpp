@@ -72,10 +72,6 @@ std::vector<CommandPage> CommandPages() {
       {"data",
        {.examples = {{"slabstream data list", "The datasets of the service"},
                      {"slabstream data add foot=/scans/foot.nrrd", "One more dataset, until the service ends"}}}},
-      {"bench", {.examples = {{"slabstream bench head.nii.gz", "How fast this machine renders a volume"}}}},
-      {"experiment",
-       {.examples = {{"slabstream experiment paper -o paper --quick", "The tables and figures of the paper on this machine, in short"},
-                     {"slabstream experiment combining -o combining", "Schemes to combine images, compared"}}}},
   };
 }
 
@@ -89,9 +85,9 @@ HelpPage ProgramPage() {
 
 }  // namespace
 
-void AddHelpPages(const Command& program) {
-  SetHelpPage(program, ProgramPage());
-  for (CommandPage& each : CommandPages()) SetHelpPage(program.FindCommand(each.command), std::move(each.page));
+void DeclareHelpPages(const CommandLine& line) {
+  SetHelpPage(line.app, ProgramPage());
+  for (CommandPage& each : CommandPages()) SetHelpPage(line.app.FindCommand(each.command), std::move(each.page));
 }
 
 }  // namespace slabstream

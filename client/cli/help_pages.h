@@ -2,11 +2,11 @@
 // too. client_commands.cpp declares the options.
 #pragma once
 
-#include "common/cli/command.h"
+#include "client/cli/command_line.h"
 
 namespace slabstream {
 
 // Of the program and its commands, which are declared already.
-void AddHelpPages(const Command& program);
+void DeclareHelpPages(const CommandLine& line);
 
 }  // namespace slabstream

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "tests/end_to_end/picture_file.h"
@@ -80,6 +81,17 @@ TEST_F(BenchTest, ListNamesTheStandardCases) {
   const std::string list = MustRun({"bench", "--list"}).out;
   for (const char* name : {"class1-256 ", "class2-256-opaque ", "class1-512 ", "zbuffer-class1-256 ", "brain "})
     EXPECT_THAT(list, HasSubstr(name));
+}
+
+TEST_F(BenchTest, WithoutTheLaboratoryOneLineSaysWhatHasIt) {
+  std::filesystem::copy_file(Command({}).front(), Path("slabstream"));
+  const ProgramResult result = RunningProgram({Path("slabstream"), "bench", "--list"}, directory_).Wait();
+  EXPECT_EQ(result.exit_status, 2);
+  EXPECT_EQ(result.err, "slabstream: the program '" + Path("slabstream-laboratory") +
+                            "' is missing: the package slabstream-lab has it, and a build makes it as the target slabstream-laboratory\n");
+  const ProgramResult help = RunningProgram({Path("slabstream"), "--help"}, directory_).Wait();
+  EXPECT_EQ(help.exit_status, 0);
+  EXPECT_THAT(help.out, HasSubstr("Measure how fast this machine or a service renders"));
 }
 
 TEST_F(BenchTest, CtrlCEndsItAndKeepsTheRowsThatAreDone) {

@@ -1,14 +1,18 @@
-#include "laboratory/cli/laboratory_commands.h"
-
+// slabstream-laboratory: the commands `bench` and `experiment`. Users type them behind `slabstream`, which becomes this program, so it goes
+// by that name.
 #include <fmt/format.h>
 
 #include <iostream>
 #include <limits>
 #include <memory>
 
+#include "client/cli/command_line.h"
+#include "client/cli/laboratory.h"
 #include "client/cli/option_groups.h"
 #include "client/movie/turntable.h"
 #include "common/cli/add_option.h"
+#include "common/cli/help_formatter.h"
+#include "common/cli/program.h"
 #include "common/renderers/registry.h"
 #include "common/renderers/sampling_rate.h"
 #include "laboratory/bench/bench.h"
@@ -19,8 +23,12 @@
 namespace slabstream {
 namespace {
 
+Command Declared(const CommandLine& line, const LaboratoryCommand& command) {
+  return line.app.AddCommand(std::string(command.name), std::string(command.purpose));
+}
+
 void DeclareBench(const CommandLine& line) {
-  const Command sub = line.app.AddCommand("bench", "Measure how fast this machine or a service renders");
+  const Command sub = Declared(line, kBenchCommand);
   auto options = std::make_shared<BenchOptions>();
   options->command = line.typed;
   options->connection.local_workers = 1;
@@ -61,6 +69,7 @@ void DeclareBench(const CommandLine& line) {
   sub.AddText("--export", options->export_directory, "Measure nothing; write volumes, transfer functions and views for other renderers")
       .TypeName("DIR")
       .Excludes(endpoint);
+  SetHelpPage(sub, {.examples = {{"slabstream bench head.nii.gz", "How fast this machine renders a volume"}}});
   sub.OnTyped([options, &run = line.run] {
     if (!options->connection.service.text().empty()) options->connection.local_workers = 0;
     run = [options] { return RunBench(*options); };
@@ -103,7 +112,7 @@ void AddCommonOptions(const Command& app, ExperimentOptions& options) {
 }
 
 void DeclareExperiment(const CommandLine& line) {
-  const Command sub = line.app.AddCommand("experiment", "Compare ways of dividing, combining and streaming, and write the results");
+  const Command sub = Declared(line, kExperimentCommand);
   sub.TakeCommand(false);
   auto options = std::make_shared<ExperimentOptions>();
   options->command = line.typed;
@@ -118,6 +127,9 @@ void DeclareExperiment(const CommandLine& line) {
     one.OnTyped([options, &experiment] { options->name = experiment.name; });
   }
   DeclareReplay(sub, line.run);
+  SetHelpPage(
+      sub, {.examples = {{"slabstream experiment paper -o paper --quick", "The tables and figures of the paper on this machine, in short"},
+                         {"slabstream experiment combining -o combining", "Schemes to combine images, compared"}}});
   sub.OnTyped([options, &run = line.run] {
     if (run) return;  // replay
     if (options->list) {
@@ -135,10 +147,10 @@ void DeclareExperiment(const CommandLine& line) {
 }
 
 }  // namespace
-
-std::span<const DeclareCommand> LaboratoryCommands() {
-  static constexpr DeclareCommand kCommands[] = {DeclareBench, DeclareExperiment};
-  return kCommands;
-}
-
 }  // namespace slabstream
+
+int main(int argc, char** argv) {
+  using namespace slabstream;  // NOLINT(google-build-using-namespace): the program's own
+  constexpr DeclareCommand kCommands[] = {DeclareBench, DeclareExperiment};
+  return RunMain("slabstream", [&] { return RunCommandLine(argc, argv, kCommands); });
+}
