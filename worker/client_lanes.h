@@ -5,8 +5,6 @@
 // One thread uses an object of this class: the one that posts.
 #pragma once
 
-#include <tbb/task_arena.h>
-
 #include <functional>
 #include <map>
 #include <memory>
@@ -14,6 +12,7 @@
 #include <vector>
 
 #include "common/base/task_thread.h"
+#include "common/parallel/task_arena.h"
 #include "common/wire/ids.h"
 #include "worker/renderers/renderer.h"
 
@@ -24,7 +23,7 @@ struct ClientLane {
   ClientLane(int threads, std::function<void()> on_exception) : arena(threads), thread(std::move(on_exception)) {}
 
   ClientId client = 0;
-  tbb::task_arena arena;                                               // the thread's: in a shared one, its tasks would wait for others
+  TaskArena arena;                                                     // the thread's: in a shared one, its tasks would wait for others
   std::map<const RendererKind*, std::unique_ptr<Renderer>> renderers;  // the thread's
   TaskThread thread;                                                   // last member: ends before what its tasks use
 };

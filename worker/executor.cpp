@@ -24,12 +24,9 @@ std::int64_t NowNs() { return MonotonicNow().time_since_epoch().count(); }
 // Runs `work` with as many threads as all workers of this process have: when pixels are combined or a picture is made, the other workers
 // have already rendered. Call on the thread that the arena belongs to.
 template <class Work>
-auto WithAllThreads(tbb::task_arena& arena, Work&& work) {
-  if (const int threads = ThreadShare::OfProcess(); arena.max_concurrency() != threads) {
-    arena.terminate();
-    arena.initialize(threads);
-  }
-  return arena.execute(work);
+auto WithAllThreads(TaskArena& arena, Work&& work) {
+  if (const int threads = ThreadShare::OfProcess(); arena.threads() != threads) arena.Resize(threads);
+  return arena.Run(work);
 }
 
 // The pixels of `view` as runs: the payload, and their header in the message.
@@ -203,7 +200,7 @@ void Executor::Perform(StartRender&& action) {
   ClientLane& lane = render_.Of(action.client);
   lane.thread.Post([this, &lane, padded = std::move(padded), light = std::move(light), image = std::move(image),
                     control = std::move(control), render = std::move(action)] {
-    outbox_.Post(WorkerEvent(lane.arena.execute([&] { return Render(render, *padded, light.get(), *control, lane, *image); })));
+    outbox_.Post(WorkerEvent(lane.arena.Run([&] { return Render(render, *padded, light.get(), *control, lane, *image); })));
   });
 }
 
@@ -381,7 +378,7 @@ void Executor::Perform(SendFrame&& action) {
   });
 }
 
-void Executor::MakePicture(LocalImage& frame, SendFrame& send, tbb::task_arena& arena) {
+void Executor::MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena) {
   const GroupKey key = KeyOf(send.message);
   RankReport& report = send.message.reports.emplace_back();
   report.worker = send.message.worker;

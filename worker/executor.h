@@ -11,8 +11,6 @@
 // clients may use a padded box at a time (StoredBox).
 #pragma once
 
-#include <tbb/task_arena.h>
-
 #include <atomic>
 #include <functional>
 #include <map>
@@ -24,6 +22,7 @@
 
 #include "common/base/task_thread.h"
 #include "common/image/local_image.h"
+#include "common/parallel/task_arena.h"
 #include "common/transport/mailbox.h"
 #include "worker/client_lanes.h"
 #include "worker/image_packing.h"
@@ -97,7 +96,7 @@ class Executor {
   void Break();
   // The entry of the table, which exists.
   std::shared_ptr<LocalImage> ImageOf(ImageHandle image) const;
-  void MakePicture(LocalImage& frame, SendFrame& send, tbb::task_arena& arena);
+  void MakePicture(LocalImage& frame, SendFrame& send, TaskArena& arena);
   // The payload for pixels that stay where they are until they are read or sent from there. None: they have to be encoded.
   std::optional<Bytes> PayloadInPlace(const LocalImage& image, const ImageView& view, SendPartial& send);
   void Post(SendPartial& send, Bytes payload, std::int64_t begin_ns);  // the payload was made since begin_ns

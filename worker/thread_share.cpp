@@ -1,12 +1,10 @@
 #include "worker/thread_share.h"
 
-#include <tbb/global_control.h>
-#include <tbb/info.h>
-
 #include <algorithm>
-#include <cstddef>
 #include <mutex>
 #include <optional>
+
+#include "common/parallel/task_arena.h"
 
 namespace slabstream {
 namespace {
@@ -17,13 +15,13 @@ class Pool {
     const std::lock_guard lock(mutex_);
     workers_ += workers;
     threads_ += threads;
-    limit_.reset();  // oneTBB applies the smallest of several limits
-    if (needed() > tbb::info::default_concurrency()) limit_.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(needed()));
+    limit_.reset();  // of several limits the least one counts
+    if (needed() > DefaultThreads()) limit_.emplace(needed());
   }
 
   int threads() {
     const std::lock_guard lock(mutex_);
-    return std::min(threads_, std::max(needed(), tbb::info::default_concurrency()));
+    return std::min(threads_, std::max(needed(), DefaultThreads()));
   }
 
  private:
@@ -31,7 +29,7 @@ class Pool {
 
   std::mutex mutex_;
   int workers_ = 0, threads_ = 0;  // of this process
-  std::optional<tbb::global_control> limit_;
+  std::optional<ThreadLimit> limit_;
 };
 
 Pool& ProcessPool() {

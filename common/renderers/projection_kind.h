@@ -2,13 +2,11 @@
 // worker/rays/project.h), and values become colours at the end. Every box draws, since any may change a ray's value.
 #pragma once
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <memory>
 
 #include "common/image/local_image.h"
 #include "common/image/resolve.h"
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 
 namespace slabstream {
@@ -28,8 +26,8 @@ class ProjectionKind : public RendererKind {
   static LocalImage ColorPixels(const LocalImage& frame, const FrameSetup& setup, Color&& color) {
     LocalImage picture = MakeLocalImage(PixelFormat::kRgba, frame.bounds);
     constexpr std::size_t kGrain = 4096;  // pixels
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, frame.rgba.size() / 4, kGrain), [&](const auto& pixels) {
-      for (std::size_t i = pixels.begin(); i < pixels.end(); ++i) color(&frame.rgba[4 * i], &picture.rgba[4 * i]);
+    ParallelForRanges(0, frame.rgba.size() / 4, kGrain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) color(&frame.rgba[4 * i], &picture.rgba[4 * i]);
     });
     return Resolve(picture, setup.camera.supersample);
   }

@@ -1,7 +1,5 @@
 #include "laboratory/measure/frame_costs.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <thread>
 #include <utility>
@@ -9,6 +7,7 @@
 #include "common/base/check.h"
 #include "common/base/time.h"
 #include "common/image/run_image.h"
+#include "common/parallel/task_arena.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/wire/payload.h"
 #include "coordinator/clients.h"
@@ -24,8 +23,8 @@ template <class Work>
 double SecondsOnAnotherThread(int threads, Work&& work) {
   double seconds = 0;
   std::thread([&] {
-    tbb::task_arena arena(threads);
-    arena.execute([&] { seconds = SecondsOf(work); });
+    TaskArena arena(threads);
+    arena.Run([&] { seconds = SecondsOf(work); });
   }).join();
   return seconds;
 }

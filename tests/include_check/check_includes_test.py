@@ -71,6 +71,17 @@ class CheckIncludes(unittest.TestCase):
         self.write("top/top.cpp", '#include "base/inner/only.h"\n')
         self.assertEqual(self.check(("x_base", "base", [], [], []), ("x_top", "top", ["top.cpp"], [], []))[0], 1)
 
+    def test_a_library_behind_a_header_of_ours_is_included_by_those_that_link_it(self):
+        self.write("base/loops.h")
+        self.write("base/loops.cpp", '#include "base/loops.h"\n#include <tbb/parallel_for.h>\n')
+        self.write("top/top.cpp", '#include "base/loops.h"\n')
+        targets = (("x_base", "base", ["loops.cpp"], [], ["TBB::tbb"]), ("x_top", "top", ["top.cpp"], ["x::base"], []))
+        self.assertEqual(self.check(*targets)[0], 0)
+        self.write("top/top.cpp", '#include <tbb/parallel_for.h>\n#include "base/loops.h"\n')
+        status, text = self.check(*targets)
+        self.assertEqual(status, 1)
+        self.assertEqual(text, "top/top.cpp:1: tbb/parallel_for.h is of TBB_tbb, which x_top does not link\n")
+
     def test_renderers_do_not_link_each_other(self):
         self.write("worker/renderers/fog/fog.cpp")
         for kind, links in (("common/renderers/fog", ["x::shared"]), ("common/renderers/rain", []), ("worker/renderers/snow", [])):

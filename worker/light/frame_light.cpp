@@ -1,7 +1,5 @@
 #include "worker/light/frame_light.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <list>
@@ -10,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 #include "common/view/phong.h"
 #include "worker/light/extinction.h"
@@ -118,7 +117,7 @@ class Matter {
     const Index3& size = light.size;
     const Bytes255 all(std::size_t(size.x), 255);
     const auto row_of = [&](const Bytes255& shares, std::size_t voxel) { return shares.empty() ? all.data() : shares.data() + voxel; };
-    tbb::parallel_for(std::int32_t{0}, size.z + 1, [&](std::int32_t z) {
+    ParallelFor(0, size.z + 1, [&](std::int32_t z) {
       std::uint8_t* const slice = light.shares.data() + number * std::size_t(light.light) + std::ptrdiff_t{z} * light.stride[2];
       for (std::int32_t y = 0; y <= size.y; ++y) {
         const std::size_t row = NumberIn(size, {0, std::min(y, size.y - 1), std::min(z, size.z - 1)});

@@ -1,8 +1,8 @@
 // What is written is compared with the definition of each level, read back by the reader of Zarr, which shares no code with the writer.
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "common/parallel/task_arena.h"
 
 #include <gmock/gmock.h>
-#include <tbb/global_control.h>
 
 #include <algorithm>
 #include <cmath>
@@ -283,7 +283,7 @@ TEST(OmeZarrWriterTest, TheBytesDoNotDependOnThreadsOrMemory) {
     Case made = RandomCase(random, {50, 30, 20});
     const std::string one = directory / (std::to_string(seed) + "a.ome.zarr"), other = directory / (std::to_string(seed) + "b.ome.zarr");
     ASSERT_TRUE(WriteOmeZarr(*made.source(), one, made.options).ok());
-    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 1);
+    const ThreadLimit threads(1);
     // As little memory as it takes.
     made.options.memory = 1;
     const Status refused = WriteOmeZarr(*made.source(), other, made.options);
