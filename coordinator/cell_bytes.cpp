@@ -1,23 +1,17 @@
 #include "coordinator/cell_bytes.h"
 
-#include <algorithm>
+#include <utility>
 
 namespace slabstream {
 
 Bytes CellBytes::Of(const std::shared_ptr<const MeshCutter>& cells, const Box& box) {
-  kept_.remove_if([](const Piece& piece) { return piece.of.expired(); });
-  const auto found = std::ranges::find_if(kept_, [&](const Piece& piece) { return piece.of.lock() == cells && piece.box == box; });
-  if (found != kept_.end()) {
-    kept_.splice(kept_.begin(), kept_, found);
-    return kept_.front().bytes;
-  }
-  kept_.push_front({cells, box, Bytes(EncodeMesh(cells->Cut(box)))});
-  std::size_t bytes = 0;
-  for (auto piece = kept_.begin(); piece != kept_.end();) {
-    bytes += piece->bytes.size();
-    piece = bytes > kMostKept && piece != kept_.begin() ? kept_.erase(piece) : std::next(piece);
-  }
-  return kept_.front().bytes;
+  kept_.DropIf([](const auto& entry) { return entry.value.of.expired(); });
+  if (const Piece* found = kept_.Find({cells.get(), box})) return found->bytes;
+  Bytes bytes(EncodeMesh(cells->Cut(box)));
+  const std::size_t size = bytes.size();
+  const Piece& piece = kept_.Put({cells.get(), box}, {cells, std::move(bytes)}, size);
+  kept_.DropBeyond(kMostKept);
+  return piece.bytes;
 }
 
 }  // namespace slabstream

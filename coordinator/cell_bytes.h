@@ -3,10 +3,11 @@
 #pragma once
 
 #include <cstddef>
-#include <list>
 #include <memory>
+#include <utility>
 
 #include "common/base/bytes.h"
+#include "common/base/lru_map.h"
 #include "common/mesh/mesh_part.h"
 #include "common/volume/box.h"
 
@@ -18,13 +19,12 @@ class CellBytes {
   Bytes Of(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
 
  private:
-  static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes; the last ones stay in any case
+  static constexpr std::size_t kMostKept = std::size_t{256} << 20;  // bytes; the last one stays in any case
   struct Piece {
     std::weak_ptr<const MeshCutter> of;  // a dataset that is gone takes no memory
-    Box box;
     Bytes bytes;
   };
-  std::list<Piece> kept_;  // the last one that was asked for first
+  LruMap<std::pair<const MeshCutter*, Box>, Piece> kept_;
 };
 
 }  // namespace slabstream

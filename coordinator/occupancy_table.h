@@ -3,10 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
+#include <map>
 #include <memory>
 #include <optional>
 
+#include "common/base/lru_map.h"
 #include "common/planning/classified_volume.h"
 #include "common/volume/occupancy_grid.h"
 
@@ -22,8 +23,8 @@ class OccupancyTable {
   std::shared_ptr<const OccupancyGrid> Find(const ClassifiedVolume& volume);
   bool Counting(const ClassifiedVolume& volume) const;
   CountId Begin(const ClassifiedVolume& volume);  // neither found nor counting
-  std::size_t counting() const;                   // counts under way
-  std::size_t grids() const { return entries_.size() - counting(); }
+  std::size_t counting() const { return under_way_.size(); }
+  std::size_t grids() const { return grids_.entries().size(); }
 
   // The end of a count. If there is none with this id under way, nothing changes.
   void Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
@@ -33,14 +34,8 @@ class OccupancyTable {
   void Forget(DatasetId dataset);  // all grids of it, and counts under way
 
  private:
-  struct Entry {
-    ClassifiedVolume volume;
-    CountId count = 0;
-    std::shared_ptr<const OccupancyGrid> grid;  // null: under way
-  };
-  std::list<Entry>::iterator UnderWay(CountId count);
-
-  std::list<Entry> entries_;  // most recently used first
+  std::map<CountId, ClassifiedVolume> under_way_;
+  LruMap<ClassifiedVolume, std::shared_ptr<const OccupancyGrid>> grids_;
   CountId last_count_ = 0;
 };
 

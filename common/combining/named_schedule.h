@@ -54,7 +54,8 @@ class IndexedSchedule {
 using SharedSchedule = std::shared_ptr<const IndexedSchedule>;
 
 // The schedule of that name over all pixels of a frame. Errors: as CheckScheduleName. Groups and frames repeat names, and a process may
-// hold many workers, so recent schedules are kept and shared: at most kMaxSteps steps, but always the latest one. Any thread may call.
+// hold many workers, so recent schedules are kept and shared: at most 64 of them and kMaxSteps steps, but always the latest one. Any thread
+// may call.
 Result<SharedSchedule> DeriveSchedule(const ScheduleName& name, PixelRange frame);
 
 }  // namespace slabstream

@@ -3,13 +3,12 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <utility>
 
 #include "common/base/bytes.h"
+#include "common/base/lru_map.h"
 
 namespace slabstream {
 
@@ -30,17 +29,10 @@ class ChunkCache {
 
  private:
   using Key = std::pair<Owner, std::uint64_t>;
-  struct Entry {
-    Key key;
-    Bytes elements;
-  };
-
   const std::uint64_t most_bytes_;
   mutable std::mutex mutex_;  // guards what follows
   Owner last_owner_ = 0;
-  std::list<Entry> entries_;  // the last used one first
-  std::map<Key, std::list<Entry>::iterator> places_;
-  std::uint64_t bytes_ = 0;
+  LruMap<Key, Bytes> chunks_;
 };
 
 }  // namespace slabstream
