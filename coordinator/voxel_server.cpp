@@ -11,6 +11,7 @@
 
 #include "common/base/guarded.h"
 #include "common/base/log.h"
+#include "common/base/pooled_vector.h"
 #include "common/volume/light_volume.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"
@@ -114,10 +115,9 @@ Bytes VoxelServer::Cut(const Samples& samples, const Box& box, const ChunkPart& 
   const BrickedVoxels& bricks = part.layer == Layer::kVolume   ? *samples.bricks
                                 : part.layer == Layer::kLabels ? *samples.labels
                                                                : *samples.overlay;
-  ChunkBuffers::Buffer buffer = buffers_.Take();
-  const std::span<std::byte> cut(buffer->data(), part.bytes);
+  UnwrittenVector<std::byte> cut(part.bytes);
   VoxelBricks(bricks).Read(box, part.begin, cut);
-  return {std::move(buffer), cut};
+  return Bytes(std::move(cut));
 }
 
 Result<Bytes> VoxelServer::CutCells(const Samples& samples, const ChunkRequest& request, Chunk& chunk) {

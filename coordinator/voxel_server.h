@@ -28,7 +28,6 @@
 #include "common/volume/layers.h"
 #include "common/wire/any_message.h"
 #include "coordinator/cell_bytes.h"
-#include "coordinator/chunk_buffers.h"
 #include "data/sources/volume_source.h"
 
 namespace slabstream {
@@ -132,7 +131,6 @@ class VoxelServer {
   std::map<DatasetId, Samples> samples_;            // guarded by mutex_
   std::map<DatasetId, DatasetId> light_volume_of_;  // by LightVolumeOf; guarded by mutex_
   std::vector<std::string> unwanted_;               // users whose connections are to end; guarded by mutex_
-  ChunkBuffers buffers_;                            // the thread's
   CellBytes cell_bytes_;                            // the thread's
   LimitedLog complaints_;                           // the thread's
   std::map<DatasetId, Reads> reads_;                // the thread's

@@ -150,44 +150,40 @@ class Pool {
 };
 
 // Never destroyed: blocks are given back until the very end of the program.
-Pool& TheBlocks() {
-  static Pool& pool = *new Pool(kSanitized ? 0 : kUsuallyKept);
-  return pool;
+Pool& BlocksOf(BlockPool pool) {
+  static Pool& shared = *new Pool(kSanitized ? 0 : kUsuallyKept);
+  static Pool& own = *new Pool(kMostOwnKept);
+  return pool == BlockPool::kShared ? shared : own;
 }
-Pool& OwnBlocks() {
-  static Pool& pool = *new Pool(kMostOwnKept);
-  return pool;
-}
-
-void* TakeFrom(Pool& (*pool)(), std::size_t bytes) { return bytes < kLeastKept ? AllocatePrivate(bytes) : pool().Take(BlockBytes(bytes)); }
-void GiveBackTo(Pool& (*pool)(), void* block, std::size_t bytes) {
-  if (bytes < kLeastKept) {
-    FreePrivate(block, bytes);
-  } else {
-    pool().GiveBack(block, BlockBytes(bytes));
-  }
-}
+Pool& SharedBlocks() { return BlocksOf(BlockPool::kShared); }
 
 }  // namespace
 
-void* TakeBlock(std::size_t bytes) { return TakeFrom(TheBlocks, bytes); }
-void GiveBackBlock(void* block, std::size_t bytes) { GiveBackTo(TheBlocks, block, bytes); }
-void* TakeOwnBlock(std::size_t bytes) { return TakeFrom(OwnBlocks, bytes); }
-void GiveBackOwnBlock(void* block, std::size_t bytes) { GiveBackTo(OwnBlocks, block, bytes); }
+void* TakeBlock(BlockPool pool, std::size_t bytes) {
+  return bytes < kLeastKept ? AllocatePrivate(bytes) : BlocksOf(pool).Take(BlockBytes(bytes));
+}
+
+void GiveBackBlock(BlockPool pool, void* block, std::size_t bytes) {
+  if (bytes < kLeastKept) {
+    FreePrivate(block, bytes);
+  } else {
+    BlocksOf(pool).GiveBack(block, BlockBytes(bytes));
+  }
+}
 
 void KeepBlocks(std::size_t bytes) {
-  if (!kSanitized) TheBlocks().KeepMore(bytes);
+  if (!kSanitized) SharedBlocks().KeepMore(bytes);
 }
-Status ShareBlocks() { return TheBlocks().Share(); }
-std::optional<ArenaName> SharedBlocksArena() { return TheBlocks().arena(); }
+Status ShareBlocks() { return SharedBlocks().Share(); }
+std::optional<ArenaName> SharedBlocksArena() { return SharedBlocks().arena(); }
 
 std::optional<BlockPin> BlockPin::Pin(const void* block, std::size_t bytes) {
   if (block == nullptr || bytes < kLeastKept) return std::nullopt;
-  return BlockPin(block, TheBlocks().Pin(block));
+  return BlockPin(block, SharedBlocks().Pin(block));
 }
 
 BlockPin::~BlockPin() {
-  if (block_ != nullptr) TheBlocks().Unpin(block_);
+  if (block_ != nullptr) SharedBlocks().Unpin(block_);
 }
 
 }  // namespace slabstream

@@ -16,14 +16,14 @@
 
 namespace slabstream {
 
-// Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks are memory mappings of their own, so they leave no holes in a heap.
-// Those that were given back are kept for reuse, up to 96 MiB or what KeepBlocks says (large_buffers.h). Any thread.
-void* TakeBlock(std::size_t bytes);
-void GiveBackBlock(void* block, std::size_t bytes);  // `bytes` as taken
+// Where blocks come from. Of each pool, blocks that were given back are kept for reuse: up to 96 MiB, or what KeepBlocks says
+// (large_buffers.h), of those that other processes may come to read (ShareBlocks), such as images; up to 32 MiB of the process' own.
+enum class BlockPool { kShared, kOwn };
 
-// The same, but no other process ever reads them (ShareBlocks), and up to 32 MiB of them are kept.
-void* TakeOwnBlock(std::size_t bytes);
-void GiveBackOwnBlock(void* block, std::size_t bytes);
+// Blocks of at least `bytes` bytes at 64-byte boundaries. Large blocks are memory mappings of their own, so they leave no holes in a heap.
+// Any thread.
+void* TakeBlock(BlockPool pool, std::size_t bytes);
+void GiveBackBlock(BlockPool pool, void* block, std::size_t bytes);  // `bytes` as taken
 
 // From now on, takes large blocks from a SharedArena of the process. Unavailable: there is none; blocks stay private. Again: no change.
 Status ShareBlocks();
@@ -49,15 +49,19 @@ class BlockPin {
   std::optional<BlockName> name_;
 };
 
-template <class T>
+template <class T, BlockPool kPool>
 struct PooledAllocator {
   static_assert(std::is_trivially_destructible_v<T>);
   using value_type = T;
   PooledAllocator() = default;
   template <class U>
-  PooledAllocator(const PooledAllocator<U>&) {}  // NOLINT(google-explicit-constructor): rebinding
-  T* allocate(std::size_t count) { return static_cast<T*>(TakeBlock(count * sizeof(T))); }
-  void deallocate(T* data, std::size_t count) { GiveBackBlock(data, count * sizeof(T)); }
+  struct rebind {
+    using other = PooledAllocator<U, kPool>;
+  };
+  template <class U>
+  PooledAllocator(const PooledAllocator<U, kPool>&) {}  // NOLINT(google-explicit-constructor): rebinding
+  T* allocate(std::size_t count) { return static_cast<T*>(TakeBlock(kPool, count * sizeof(T))); }
+  void deallocate(T* data, std::size_t count) { GiveBackBlock(kPool, data, count * sizeof(T)); }
   template <class U>
   void construct(U* element) {
     ::new (static_cast<void*>(element)) U;
@@ -70,7 +74,12 @@ struct PooledAllocator {
 };
 
 template <class T>
-using PooledVector = std::vector<T, PooledAllocator<T>>;
+using PooledVector = std::vector<T, PooledAllocator<T, BlockPool::kShared>>;
+
+// The same with blocks of the process' own, for bytes that are written right after memory is taken for them, such as a chunk that is read
+// and decoded: chunks come and go on several threads, and their holes in the heap once took as much memory again.
+template <class T>
+using UnwrittenVector = std::vector<T, PooledAllocator<T, BlockPool::kOwn>>;
 
 template <class T>
 std::optional<BlockPin> PinOf(const PooledVector<T>& vector) {

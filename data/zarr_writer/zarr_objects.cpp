@@ -21,7 +21,7 @@
 
 #include "common/base/file_descriptor.h"
 #include "common/base/files.h"
-#include "common/base/unwritten_vector.h"
+#include "common/base/pooled_vector.h"
 #include "common/parallel/parallel.h"
 #include "data/codecs/codecs.h"
 

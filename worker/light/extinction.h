@@ -11,7 +11,7 @@
 // opacity without regions.
 #pragma once
 
-#include "common/base/unwritten_vector.h"
+#include "common/base/pooled_vector.h"
 #include "common/frame/frame_setup.h"
 
 namespace slabstream {

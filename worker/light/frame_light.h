@@ -7,7 +7,7 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/unwritten_vector.h"
+#include "common/base/pooled_vector.h"
 #include "common/frame/frame_setup.h"
 #include "common/volume/grid_map.h"
 
