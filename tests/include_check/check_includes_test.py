@@ -71,16 +71,14 @@ class CheckIncludes(unittest.TestCase):
         self.write("top/top.cpp", '#include "base/inner/only.h"\n')
         self.assertEqual(self.check(("x_base", "base", [], [], []), ("x_top", "top", ["top.cpp"], [], []))[0], 1)
 
-    def test_a_library_behind_a_header_of_ours_is_included_by_those_that_link_it(self):
-        self.write("base/loops.h")
-        self.write("base/loops.cpp", '#include "base/loops.h"\n#include <tbb/parallel_for.h>\n')
-        self.write("top/top.cpp", '#include "base/loops.h"\n')
-        targets = (("x_base", "base", ["loops.cpp"], [], ["TBB::tbb"]), ("x_top", "top", ["top.cpp"], ["x::base"], []))
-        self.assertEqual(self.check(*targets)[0], 0)
-        self.write("top/top.cpp", '#include <tbb/parallel_for.h>\n#include "base/loops.h"\n')
-        status, text = self.check(*targets)
+    def test_threads_are_shared_out_by_one_target(self):
+        self.write("loops/loops.h")
+        self.write("loops/loops.cpp", "#include <tbb/parallel_for.h>\n")
+        self.write("top/top.cpp", '#include <oneapi/tbb.h>\n#include "loops/loops.h"\n')
+        status, text = self.check(("slabstream_parallel", "loops", ["loops.cpp"], [], []),
+                                  ("x_top", "top", ["top.cpp"], ["slabstream::parallel"], []))
         self.assertEqual(status, 1)
-        self.assertEqual(text, "top/top.cpp:1: tbb/parallel_for.h is of TBB_tbb, which x_top does not link\n")
+        self.assertEqual(text, "top/top.cpp:1: oneapi/tbb.h is for slabstream_parallel alone\n")
 
     def test_renderers_do_not_link_each_other(self):
         self.write("worker/renderers/fog/fog.cpp")
