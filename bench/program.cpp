@@ -1,10 +1,10 @@
 #include "bench/program.h"
 
-#include "common/base/parse_number.h"
 #include "common/base/version.h"
 #include "common/cli/program.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/count_drawn.h"
+#include "common/text/parse_number.h"
 
 namespace slabstream {
 namespace {

@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/socket.h"
 #include "common/wire/client_messages.h"
 

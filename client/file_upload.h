@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "client/client.h"
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/wire/volume_messages.h"
 
 namespace slabstream {

@@ -12,13 +12,13 @@
 #include <utility>
 #include <variant>
 
-#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/url.h"
 #include "common/mesh/lattice.h"
 #include "common/planning/layer_bricks.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/text/url.h"
+#include "common/threads/guarded.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/answer_question.h"
 #include "coordinator/client_file.h"

@@ -15,9 +15,9 @@
 #include <optional>
 #include <stop_token>
 
-#include "common/base/background_tasks.h"
-#include "common/base/fair_tasks.h"
 #include "common/classification/count_occupied.h"
+#include "common/threads/background_tasks.h"
+#include "common/threads/fair_tasks.h"
 #include "common/transport/mailbox.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/dataset_machine.h"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 #include "common/volume/volume.h"
 
 namespace slabstream {

@@ -14,9 +14,9 @@
 #include <utility>
 
 #include "common/base/log.h"
-#include "common/base/url.h"
 #include "common/frame/dataset_name.h"
 #include "common/frame/frame_request.h"
+#include "common/text/url.h"
 #include "common/wire/limits.h"
 #include "coordinator/client_file.h"
 #include "data/brick_store/brick_store.h"

@@ -6,8 +6,8 @@
 #include <memory>
 #include <utility>
 
-#include "common/base/bytes.h"
 #include "common/base/lru_map.h"
+#include "common/memory/bytes.h"
 #include "common/mesh/mesh_part.h"
 #include "common/volume/box.h"
 

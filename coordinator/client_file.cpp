@@ -11,7 +11,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/file_descriptor.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
 
 namespace slabstream {
 

@@ -10,8 +10,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/wire/any_message.h"
 #include "coordinator/peer_token.h"
 

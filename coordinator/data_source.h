@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/file_stamp.h"
 #include "common/base/status.h"
+#include "common/files/file_stamp.h"
 #include "common/volume/layers.h"
 #include "common/volume/stored_at.h"
 #include "common/volume/summary.h"

@@ -28,9 +28,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/read_share.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/wire/limits.h"
 #include "coordinator/data_source.h"
 #include "coordinator/datasets.h"

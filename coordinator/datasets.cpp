@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "common/base/did_you_mean.h"
-#include "common/base/natural_order.h"
 #include "common/frame/dataset_name.h"
+#include "common/text/natural_order.h"
 
 namespace slabstream {
 

@@ -45,9 +45,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/time.h"
 #include "common/base/web_traffic.h"
+#include "common/memory/bytes.h"
 #include "common/planning/placement.h"
 #include "common/wire/control_messages.h"
 #include "coordinator/machines.h"

@@ -21,10 +21,10 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/log.h"
 #include "common/base/read_share.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "common/planning/levels.h"
 #include "common/planning/resolved_request.h"
 #include "common/wire/client_messages.h"

@@ -8,11 +8,11 @@
 
 #include "common/base/log.h"
 #include "common/base/notify_ready.h"
-#include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/metrics/metrics_listener.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"

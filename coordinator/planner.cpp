@@ -5,11 +5,11 @@
 #include <span>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/planning/levels.h"
 #include "common/planning/policy_names.h"
 #include "common/planning/shown_zones.h"
 #include "common/planning/worker_memory.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {

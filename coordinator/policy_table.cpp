@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"
+#include "common/threads/guarded.h"
 #include "coordinator/learning_table.h"
 
 namespace slabstream {

@@ -10,9 +10,9 @@
 #include <tuple>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/base/url.h"
+#include "common/text/url.h"
+#include "common/threads/guarded.h"
 #include "data/open/same_source.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"

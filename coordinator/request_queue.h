@@ -15,8 +15,8 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/fair_turns.h"
 #include "common/base/time.h"
+#include "common/threads/fair_turns.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/deadline_forecast.h"
 #include "coordinator/machines.h"

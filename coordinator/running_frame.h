@@ -37,9 +37,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/planning/frame_plan.h"
 #include "common/wire/client_messages.h"
 #include "coordinator/request_queue.h"

@@ -13,11 +13,11 @@
 #include <utility>
 #include <variant>
 
-#include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/shared_arena.h"
+#include "common/memory/shared_arena.h"
+#include "common/threads/guarded.h"
 #include "common/transport/endpoint.h"
 #include "common/wire/other_version.h"
 #include "coordinator/background_actions.h"

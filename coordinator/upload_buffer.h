@@ -5,8 +5,8 @@
 #include <memory>
 #include <span>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/wire/volume_messages.h"
 #include "coordinator/data_source.h"
 

@@ -9,9 +9,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
+#include "common/threads/guarded.h"
 #include "common/volume/light_volume.h"
 #include "common/wire/payload.h"
 #include "coordinator/box_samples.h"

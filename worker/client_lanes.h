@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/task_thread.h"
 #include "common/parallel/task_arena.h"
+#include "common/threads/task_thread.h"
 #include "common/wire/ids.h"
 #include "worker/renderers/renderer.h"
 

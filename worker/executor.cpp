@@ -6,11 +6,11 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/image/coverage_map.h"
 #include "common/image/image_view.h"
 #include "common/renderers/renderer_kind.h"
+#include "common/threads/guarded.h"
 #include "common/wire/payload.h"
 
 namespace slabstream {

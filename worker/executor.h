@@ -20,9 +20,9 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/task_thread.h"
 #include "common/image/local_image.h"
 #include "common/parallel/task_arena.h"
+#include "common/threads/task_thread.h"
 #include "common/transport/mailbox.h"
 #include "worker/client_lanes.h"
 #include "worker/image_packing.h"

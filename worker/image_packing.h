@@ -8,7 +8,7 @@
 #include <optional>
 #include <string_view>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 #include "common/wire/image_messages.h"
 #include "worker/worker_machine.h"
 

@@ -5,7 +5,7 @@
 //   runs.
 //   3. Forget releases the images of groups that are over: they have been read, or are no longer needed.
 // No message says that an image was read. When a group is done, all images lent for it have been read, because an image is passed on only
-// after everything that went into it was read. A late reader notices (common/base/shared_arena.h). Any thread.
+// after everything that went into it was read. A late reader notices (common/memory/shared_arena.h). Any thread.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
 #include "common/image/image_view.h"
+#include "common/memory/pooled_vector.h"
 #include "worker/worker_machine.h"
 
 namespace slabstream {

@@ -7,14 +7,14 @@
 #include <cstdlib>
 #include <string>
 
-#include "common/base/large_buffers.h"
-#include "common/base/stop_signals.h"
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/kernels/simd_target.h"
+#include "common/memory/large_buffers.h"
 #include "common/metrics/metrics_listener.h"
 #include "common/service/service_file.h"
+#include "common/threads/stop_signals.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/any_volume.h"

@@ -7,11 +7,11 @@
 #include <mutex>
 #include <vector>
 
-#include "common/base/bytes.h"
-#include "common/base/shared_arena.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/image/image_view.h"
+#include "common/memory/bytes.h"
+#include "common/memory/shared_arena.h"
 #include "common/wire/image_messages.h"
 
 namespace slabstream {

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/socket.h"
 #include "common/wire/control_messages.h"
 

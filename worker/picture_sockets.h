@@ -11,8 +11,8 @@
 #include <string>
 #include <utility>
 
-#include "common/base/bytes.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/socket.h"
 #include "common/wire/picture_messages.h"
 

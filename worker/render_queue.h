@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/fair_turns.h"
+#include "common/threads/fair_turns.h"
 #include "worker/box_fetcher.h"
 
 namespace slabstream {

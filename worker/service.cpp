@@ -15,11 +15,11 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/guarded.h"
 #include "common/base/limited_log.h"
 #include "common/base/log.h"
-#include "common/base/pooled_vector.h"
-#include "common/base/shared_arena.h"
+#include "common/memory/pooled_vector.h"
+#include "common/memory/shared_arena.h"
+#include "common/threads/guarded.h"
 #include "common/transport/authenticator.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/mailbox.h"

@@ -11,9 +11,9 @@
 #include <tuple>
 #include <utility>
 
-#include "common/base/background_tasks.h"
-#include "common/base/guarded.h"
 #include "common/base/log.h"
+#include "common/threads/background_tasks.h"
+#include "common/threads/guarded.h"
 #include "data/open/any_volume.h"
 #include "data/open/same_source.h"
 

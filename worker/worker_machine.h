@@ -39,11 +39,11 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/rare.h"
 #include "common/base/time.h"
 #include "common/base/web_traffic.h"
 #include "common/kernels/combine.h"
+#include "common/memory/bytes.h"
 #include "common/wire/any_message.h"
 #include "worker/link_rates.h"
 

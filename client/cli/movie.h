@@ -10,8 +10,8 @@
 #include "client/image_io/composed_picture.h"
 #include "client/movie/movie_encoder.h"
 #include "client/movie/movie_format.h"
-#include "common/base/files.h"
 #include "common/base/status.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 

@@ -11,7 +11,7 @@
 #include "client/cli/warn_of_picture.h"
 #include "client/image_io/image_writer.h"
 #include "client/report/picture_warnings.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 

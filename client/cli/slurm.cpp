@@ -7,8 +7,8 @@
 #include "client/cli/commands.h"
 #include "client/cli/job_script.h"
 #include "client/service/service_state.h"
-#include "common/base/program_beside.h"
 #include "common/cli/program.h"
+#include "common/files/program_beside.h"
 #include "coordinator/catalogue.h"
 
 namespace slabstream {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "client/cli/commands.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/volume_io/volume_reader.h"
 
 namespace slabstream {

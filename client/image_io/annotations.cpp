@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "common/base/check.h"
-#include "common/base/utf8.h"
+#include "common/text/utf8.h"
 #include "common/view/picture_labels.h"
 
 namespace slabstream {

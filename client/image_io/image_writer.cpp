@@ -16,8 +16,8 @@
 #include "client/image_io/ink.h"
 #include "client/picture_encoder/picture_encoder.h"
 #include "common/base/check.h"
-#include "common/base/files.h"
 #include "common/base/version.h"
+#include "common/files/files.h"
 
 namespace slabstream {
 namespace {

@@ -6,7 +6,7 @@
 // the pixels an inch that PictureFormat says; without them the size of its pixels in the world, if that is one length all over the picture
 // and its unit is known: for orthographic pictures of patients. (PNG: chunk pHYs; JPEG: JFIF and Exif; WebP: Exif; TIFF: XResolution; EXR:
 // xDensity.) The page of a PDF or SVG has the size that follows from the pixels an inch, or else 72 of them. The file appears whole or not
-// at all (common/base/files.h).
+// at all (common/files/files.h).
 #pragma once
 
 #include <cstddef>

@@ -13,8 +13,8 @@
 #include <memory>
 #include <string_view>
 
-#include "common/base/program_beside.h"
-#include "common/base/utf8.h"
+#include "common/files/program_beside.h"
+#include "common/text/utf8.h"
 
 namespace slabstream {
 namespace {

@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "client/service/process.h"
-#include "common/base/files.h"
 #include "common/base/time.h"
+#include "common/files/files.h"
 #include "common/service/service_file.h"
 #include "common/transport/endpoint.h"
 #include "common/transport/this_machine.h"

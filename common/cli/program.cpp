@@ -15,17 +15,17 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/background_tasks.h"
 #include "common/base/did_you_mean.h"
-#include "common/base/large_buffers.h"
 #include "common/base/log.h"
-#include "common/base/open_files.h"
 #include "common/base/printable.h"
 #include "common/base/process_limits.h"
-#include "common/base/url.h"
 #include "common/cli/add_option.h"
 #include "common/cli/help_formatter.h"
 #include "common/cli/man_page.h"
+#include "common/files/open_files.h"
+#include "common/memory/large_buffers.h"
+#include "common/text/url.h"
+#include "common/threads/background_tasks.h"
 
 namespace slabstream {
 

@@ -12,10 +12,10 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/parse_number.h"
 #include "common/base/status.h"
 #include "common/classification/transfer_function.h"
 #include "common/frame/layer_look.h"
+#include "common/text/parse_number.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "common/view/shading.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/wildcard.h"
 #include "common/classification/transfer_function.h"
+#include "common/text/wildcard.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
 
@@ -25,7 +25,7 @@ inline constexpr std::size_t kMaxLabelRanges = 1024;
 // Values of labels, both ends included: 1 <= first <= last <= kMaxLabelValue. Or if there is a name, the labels of that name.
 struct LabelRange {
   std::uint32_t first = 1, last = 1;
-  std::string name = {};  // may be a pattern (common/base/wildcard.h); at most kMaxNameBytes
+  std::string name = {};  // may be a pattern (common/text/wildcard.h); at most kMaxNameBytes
   friend bool operator==(const LabelRange&, const LabelRange&) = default;
 };
 inline bool Covers(const LabelRange& range, const Label& label) {

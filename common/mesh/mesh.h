@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/mesh/cells.h"
 
 namespace slabstream {

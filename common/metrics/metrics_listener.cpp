@@ -9,10 +9,10 @@
 #include <thread>
 #include <utility>
 
-#include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/cli/add_option.h"
 #include "common/http/http.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {

@@ -11,8 +11,8 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
 #include "common/wire/any_message.h"
 
 namespace slabstream {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/files/files.h"
 #include "common/transport/endpoint.h"
 
 namespace slabstream {

@@ -20,8 +20,8 @@
 #include <variant>
 #include <vector>
 
-#include "common/base/bytes.h"
-#include "common/base/pooled_vector.h"
+#include "common/memory/bytes.h"
+#include "common/memory/pooled_vector.h"
 #include "common/transport/keys.h"
 
 struct evp_cipher_ctx_st;

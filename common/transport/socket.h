@@ -24,9 +24,9 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/bytes.h"
 #include "common/transport/context.h"
 #include "common/transport/keys.h"
 

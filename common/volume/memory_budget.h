@@ -34,7 +34,7 @@ std::uint64_t MachineMemoryBytes();
 std::int64_t ControlGroupLimit(const std::string& memberships, const std::filesystem::path& mounted);
 
 // What a process of the service takes before it does anything, with its threads and the blocks that it keeps for reuse (KeepBlocks,
-// common/base/large_buffers.h): a sixteenth of its limit, at least half of kIdleMemoryBytes.
+// common/memory/large_buffers.h): a sixteenth of its limit, at least half of kIdleMemoryBytes.
 inline constexpr std::uint64_t kIdleMemoryBytes = std::uint64_t{192} << 20;
 inline constexpr std::uint64_t KeptBytes(std::uint64_t limit) { return std::max(kIdleMemoryBytes / 2, limit / 16); }
 inline constexpr std::uint64_t IdleMemoryBytes(std::uint64_t limit) { return kIdleMemoryBytes / 2 + KeptBytes(limit); }

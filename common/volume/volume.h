@@ -9,7 +9,7 @@
 #include <memory>
 #include <string_view>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 #include "common/volume/orientation.h"
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/base/rare.h"
-#include "common/base/shared_arena.h"
 #include "common/image/image_view.h"
+#include "common/memory/shared_arena.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 

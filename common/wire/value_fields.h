@@ -5,8 +5,8 @@
 #include <limits>
 #include <string>
 
-#include "common/base/url.h"
 #include "common/image/run_image.h"
+#include "common/text/url.h"
 #include "common/volume/layers.h"
 #include "common/wire/client_messages.h"
 #include "common/wire/fields.h"

@@ -4,16 +4,16 @@
 //               and how many bytes, so that a store of which somebody has removed a part is not used
 //   NAME.lock   whoever uses the store holds it shared, whoever writes or removes it holds it alone; its time is that of the last use
 //
-// Locks are those of common/base/file_lock.h. The folder and all in it are for this user alone (cache_folder.h). Any thread.
+// Locks are those of common/files/file_lock.h. The folder and all in it are for this user alone (cache_folder.h). Any thread.
 #pragma once
 
 #include <cstdint>
 #include <stop_token>
 #include <string>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/file_lock.h"
 #include "common/base/status.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/file_lock.h"
 
 namespace slabstream {
 

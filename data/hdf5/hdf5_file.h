@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/sources/chunked_array.h"
 
 namespace slabstream {

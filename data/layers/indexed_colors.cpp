@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "common/base/parse_number.h"
+#include "common/text/parse_number.h"
 #include "data/layers/color_table.h"
 
 namespace slabstream::indexed_colors {

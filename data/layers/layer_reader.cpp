@@ -14,10 +14,10 @@
 #include <unordered_map>
 #include <utility>
 
-#include "common/base/files.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
-#include "common/base/utf8.h"
+#include "common/files/files.h"
+#include "common/text/parse_number.h"
+#include "common/text/utf8.h"
 #include "common/volume/memory_budget.h"
 #include "data/layers/color_table.h"
 #include "data/layers/layer_sampling.h"

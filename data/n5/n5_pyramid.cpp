@@ -12,9 +12,9 @@
 #include <string_view>
 #include <utility>
 
-#include "common/base/natural_order.h"
-#include "common/base/parse_number.h"
 #include "common/base/printable.h"
+#include "common/text/natural_order.h"
+#include "common/text/parse_number.h"
 #include "data/n5/n5_array.h"
 #include "data/n5/n5_place.h"
 #include "data/sources/axis_choice.h"

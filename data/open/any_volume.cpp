@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "common/base/log.h"
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "common/volume/memory_budget.h"
 #include "data/open/open_source.h"
 #include "data/positional/slice_stream.h"

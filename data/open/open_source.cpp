@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/metadata/open_store_for.h"
 #include "data/n5/n5.h"

@@ -1,4 +1,4 @@
-// Volumes at addresses (common/base/url.h).
+// Volumes at addresses (common/text/url.h).
 #pragma once
 
 #include <cstdint>

@@ -9,9 +9,9 @@
 #include <system_error>
 #include <utility>
 
-#include "common/base/file_stamp.h"
-#include "common/base/guarded.h"
 #include "common/base/printable.h"
+#include "common/files/file_stamp.h"
+#include "common/threads/guarded.h"
 
 namespace slabstream {
 namespace {

@@ -9,8 +9,8 @@
 #include <mutex>
 #include <string>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 #include "data/positional/located_volume.h"
 #include "data/sources/read_context.h"

@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include "common/base/bytes.h"
 #include "common/base/lru_map.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 

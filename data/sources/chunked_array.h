@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/volume_io/sample_type.h"
 
 namespace slabstream {

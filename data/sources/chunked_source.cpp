@@ -14,7 +14,7 @@
 #include "common/base/check.h"
 #include "common/base/log.h"
 #include "common/base/printable.h"
-#include "common/base/url.h"
+#include "common/text/url.h"
 #include "common/volume/memory_budget.h"
 #include "data/sources/copy_samples.h"
 

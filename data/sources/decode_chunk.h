@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/codecs/codec.h"
 #include "data/sources/chunked_array.h"
 #include "data/sources/source_format.h"

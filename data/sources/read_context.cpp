@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "common/base/background_tasks.h"
+#include "common/threads/background_tasks.h"
 
 namespace slabstream {
 

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/files.h"
 #include "common/base/printable.h"
 #include "common/base/time.h"
-#include "common/base/trimmed.h"
-#include "common/base/url.h"
+#include "common/files/files.h"
+#include "common/text/trimmed.h"
+#include "common/text/url.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 #include "data/stores/object_key.h"

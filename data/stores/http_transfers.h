@@ -30,10 +30,10 @@
 #include <string>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
 #include "common/base/web_traffic.h"
+#include "common/memory/bytes.h"
 #include "data/stores/range_reader.h"
 #include "data/stores/s3.h"
 

@@ -17,8 +17,8 @@
 #include <optional>
 #include <string>
 
-#include "common/base/bytes.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 
 namespace slabstream {
 

@@ -11,9 +11,9 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
 #include "common/base/status.h"
 #include "common/base/time.h"
+#include "common/memory/pooled_vector.h"
 #include "data/stores/address_reach.h"
 #include "data/stores/http_transfers.h"
 

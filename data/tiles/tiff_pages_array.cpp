@@ -6,8 +6,8 @@
 #include <exception>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
 #include "common/base/printable.h"
+#include "common/memory/pooled_vector.h"
 
 namespace slabstream {
 namespace {

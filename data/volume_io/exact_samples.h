@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/exact_value.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/sample_type.h"

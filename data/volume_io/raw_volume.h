@@ -13,8 +13,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/mesh/mesh.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/payload.h"

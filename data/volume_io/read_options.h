@@ -78,7 +78,7 @@ struct ReadOption {
 const std::vector<ReadOption>& ReadOptionList();
 
 struct SourceText {
-  std::string path;  // of a file, or an address (IsUrl, common/base/url.h) without a query, but for the endpoint of a bucket
+  std::string path;  // of a file, or an address (IsUrl, common/text/url.h) without a query, but for the endpoint of a bucket
   ReadOptions options;
   std::string options_text;  // "?time=3,channel=1": those that say which volume it is, as they are written; empty: there are none
 };

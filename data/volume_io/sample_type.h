@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "data/volume_io/half.h"
 

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "common/base/natural_order.h"
+#include "common/text/natural_order.h"
 #include "data/volume_io/text_header.h"
 
 namespace slabstream {

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/base/status.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/volume_io/converted_samples.h"
 #include "data/volume_io/grid_arrays.h"

@@ -8,7 +8,7 @@
 #include <set>
 #include <utility>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "data/metadata/json_fields.h"
 #include "data/stores/range_reader.h"
 #include "data/zarr/zarr_node.h"

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
 #include "common/base/lru_map.h"
 #include "common/base/status.h"
+#include "common/memory/bytes.h"
 #include "data/stores/store.h"
 
 namespace slabstream::zarr {

@@ -15,10 +15,10 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
-#include "common/base/file_descriptor.h"
-#include "common/base/file_stamp.h"
-#include "common/base/files.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/file_stamp.h"
+#include "common/files/files.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/memory_budget.h"
 #include "data/zarr_writer/reduce.h"
 #include "data/zarr_writer/zarr_objects.h"

@@ -19,9 +19,9 @@
 #include <span>
 #include <system_error>
 
-#include "common/base/file_descriptor.h"
-#include "common/base/files.h"
-#include "common/base/pooled_vector.h"
+#include "common/files/file_descriptor.h"
+#include "common/files/files.h"
+#include "common/memory/pooled_vector.h"
 #include "common/parallel/parallel.h"
 #include "data/codecs/codecs.h"
 

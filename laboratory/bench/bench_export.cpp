@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "common/mesh/lattice.h"
 #include "data/volume_io/read_options.h"
 #include "data/volume_io/volume_reader.h"

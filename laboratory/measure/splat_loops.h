@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/kernels/footprint_table.h"
 #include "worker/kernels/segment_set.h"
 

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/box.h"
 
 namespace slabstream {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/results/columns.h"
 
 namespace slabstream {

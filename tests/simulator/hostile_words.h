@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/bytes.h"
+#include "common/memory/bytes.h"
 #include "common/wire/any_message.h"
 #include "tests/support/random.h"
 

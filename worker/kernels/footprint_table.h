@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 
 namespace slabstream {
 

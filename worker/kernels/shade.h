@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/kernels/phong_table.h"
 #include "worker/kernels/voxel_record.h"
 

@@ -13,8 +13,8 @@
 #include <optional>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
 #include "common/classification/region_table.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 #include "common/renderers/renderer_kind.h"
 

@@ -7,8 +7,8 @@
 #include <functional>
 #include <memory>
 
-#include "common/base/pooled_vector.h"
 #include "common/frame/frame_setup.h"
+#include "common/memory/pooled_vector.h"
 #include "common/volume/grid_map.h"
 
 namespace slabstream {

@@ -11,7 +11,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 #include "worker/light/exponential-inl.h"
 

@@ -10,7 +10,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/parallel/parallel.h"
 #include "worker/light/exponential-inl.h"
 

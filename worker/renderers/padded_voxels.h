@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "common/base/large_array.h"
+#include "common/memory/large_array.h"
 #include "common/volume/bricks.h"
 
 namespace slabstream {

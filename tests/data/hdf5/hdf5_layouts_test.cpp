@@ -5,7 +5,7 @@
 #include <cstring>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/hdf5/hdf5_format.h"
 #include "data/open/open_source.h"
 #include "tests/data/hdf5/hdf5_files.h"

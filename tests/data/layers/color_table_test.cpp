@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 

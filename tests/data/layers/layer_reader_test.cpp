@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <span>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/layers/color_table.h"
 #include "data/volume_io/volume_reader.h"
 #include "tests/support/temporary_directory.h"

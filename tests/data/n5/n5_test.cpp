@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/n5/n5_array.h"
 #include "data/n5/n5_pyramid.h"
 #include "data/open/open_source.h"

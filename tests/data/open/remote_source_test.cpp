@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "data/open/open_source.h"
 #include "data/sources/memory_source.h"
 #include "data/zarr_writer/ome_zarr_writer.h"

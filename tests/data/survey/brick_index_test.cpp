@@ -11,7 +11,7 @@
 #include <limits>
 #include <thread>
 
-#include "common/base/file_descriptor.h"
+#include "common/files/file_descriptor.h"
 #include "data/sources/memory_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/make_index.h"

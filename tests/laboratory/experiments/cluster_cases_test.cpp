@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/experiments/figures.h"
 #include "tests/support/temporary_directory.h"
 

@@ -5,7 +5,7 @@
 
 #include <regex>
 
-#include "common/base/files.h"
+#include "common/files/files.h"
 #include "laboratory/results/columns.h"
 #include "tests/support/temporary_directory.h"
 

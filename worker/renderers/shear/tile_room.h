@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "worker/renderers/shear/shear_tile.h"
 
 namespace slabstream::shear {

@@ -12,8 +12,8 @@
 
 #include <span>
 
-#include "common/base/aligned_buffer.h"
 #include "common/math/vec.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/view/camera.h"
 #include "common/view/clip.h"
 #include "worker/rays/view_rays.h"

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/base/pooled_vector.h"
+#include "common/memory/pooled_vector.h"
 #include "worker/kernels/splat.h"
 #include "worker/renderers/splat/splat_pass.h"
 #include "worker/renderers/stage_clock.h"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "common/base/aligned_buffer.h"
+#include "common/memory/aligned_buffer.h"
 #include "common/volume/volume.h"
 #include "worker/kernels/surface_face.h"
 #include "worker/renderers/bin_lookup.h"
