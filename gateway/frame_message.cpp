@@ -120,7 +120,7 @@ Result<EncodedView> EncodeView(const RenderedView& view, bool final, int quality
 std::string HeadOf(Json header, std::uint64_t frame, Duration round_trip) {
   header["frame"] = frame;
   header["statistics"]["round_trip_ms"] = Milliseconds(round_trip.count());
-  const std::string text = header.dump(-1, ' ', false, Json::error_handler_t::replace);
+  const std::string text = header.dump();
   std::string head;
   for (int byte = 0; byte < 4; ++byte) head += char((text.size() >> (8 * byte)) & 0xFF);
   return head + text;

@@ -19,7 +19,7 @@ constexpr Duration kDeadline = std::chrono::minutes(10);  // volumes may have to
 constexpr std::size_t kLargePicture = 100'000;            // bytes: on its way, it may keep other messages waiting
 constexpr double kMostDetail = 1000;                      // FrameRequest::detail
 
-std::string TextOf(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
+std::string TextOf(const Json& json) { return json.dump(); }
 
 std::string_view NameOf(FramePhase phase) {
   switch (phase) {

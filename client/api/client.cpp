@@ -4,7 +4,6 @@
 #include <atomic>
 #include <limits>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <variant>
 
@@ -16,6 +15,7 @@
 #include "client/request/picture_record.h"
 #include "client/service/service_state.h"
 #include "common/base/time.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 inline namespace v0 {
@@ -224,7 +224,7 @@ std::vector<std::string> Service::Datasets() {
 std::string Service::StatusJson() {
   const std::lock_guard lock(impl_->mutex);
   const StatusReply reply = ValueOf(impl_->client->QueryStatus());
-  return slabstream::StatusJson(reply).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return slabstream::StatusJson(reply).dump(2);
 }
 
 }  // namespace v0

@@ -4,11 +4,11 @@
 #include <chrono>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "client/client.h"
 #include "client/request/option_description.h"
 #include "client/service/service_state.h"
+#include "common/json/json.h"
 
 namespace slabstream {
 namespace {
@@ -136,16 +136,16 @@ std::vector<Candidate> OptionNames(CLI::App& app) {
 std::vector<Candidate> Values(CLI::App& command, const CLI::Option& option) {
   std::vector<Candidate> values;
   const std::string name = option.get_lnames().empty() ? option.get_name() : option.get_lnames().front();
-  for (const nlohmann::ordered_json& described : DescribeOptions(command)) {
+  for (const Json& described : DescribeOptions(command)) {
     if (described["name"] != name) continue;
     for (const char* list : {"choices", "presets"}) {
-      for (const auto& value : described.value(list, nlohmann::ordered_json::array())) values.push_back({value, ""});
+      for (const auto& value : described.value(list, Json::array())) values.push_back({value.text(), ""});
     }
     if (described.contains("renderers")) values = {{"auto", ""}};  // and those below, with their purposes
-    for (const auto& renderer : described.value("renderers", nlohmann::ordered_json::array())) {
-      values.push_back({renderer["name"], renderer["purpose"]});
+    for (const auto& renderer : described.value("renderers", Json::array())) {
+      values.push_back({renderer["name"].text(), renderer["purpose"].text()});
     }
-    for (const auto& window : described.value("windows", nlohmann::ordered_json::array())) values.push_back({window["name"], ""});
+    for (const auto& window : described.value("windows", Json::array())) values.push_back({window["name"].text(), ""});
   }
   return values;
 }

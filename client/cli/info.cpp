@@ -8,7 +8,6 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <numeric>
 #include <optional>
@@ -28,6 +27,7 @@
 #include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/planning/brick_visibility.h"
 #include "common/planning/resolved_request.h"
 #include "common/view/picture_geometry.h"
@@ -91,9 +91,9 @@ std::string IndexText(const std::optional<IndexFacts>& index, const std::string&
   return text;
 }
 
-nlohmann::ordered_json IndexJson(const std::optional<IndexFacts>& index) {
+Json IndexJson(const std::optional<IndexFacts>& index) {
   if (!index || !index->file) return nullptr;
-  nlohmann::ordered_json json = {
+  Json json = {
       {"path", index->path}, {"bytes", index->file->bytes}, {"written", TimeText(index->file->written)}, {"usable", index->usable}};
   if (index->usable) {
     json["read"] = index->read;
@@ -261,9 +261,7 @@ std::string InfoText(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   return text + "histogram    lowest value of the row, voxels, bar by the logarithm of their number\n" + HistogramText(summary);
 }
 
-std::string JsonText(const nlohmann::ordered_json& json) {
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
+std::string JsonText(const Json& json) { return json.dump(2) + "\n"; }
 
 // Voxels of the volume by number of the label.
 std::vector<std::uint64_t> CountLabels(const Layers& layers) {
@@ -298,15 +296,15 @@ std::string LayersText(const Layers& layers) {
   return text;
 }
 
-nlohmann::ordered_json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
+Json RangeJson(const ValueRange& range) { return {{"min", range.min}, {"max", range.max}}; }
 
-nlohmann::ordered_json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
+Json SizeJson(const Index3& index) { return {index.x, index.y, index.z}; }
 
-nlohmann::ordered_json LayersJson(const Layers& layers) {
-  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+Json LayersJson(const Layers& layers) {
+  Json json = Json::object();
   if (layers.labels != nullptr) {
     const std::vector<std::uint64_t> counts = CountLabels(layers);
-    json["labels"] = nlohmann::ordered_json::array();
+    json["labels"] = Json::array();
     for (std::size_t i = 0; i < layers.table->labels.size(); ++i) {
       const Label& label = layers.table->labels[i];
       json["labels"].push_back(
@@ -320,9 +318,9 @@ nlohmann::ordered_json LayersJson(const Layers& layers) {
   return json;
 }
 
-void AddPartsJson(const VolumeFacts& facts, nlohmann::ordered_json& json) {
+void AddPartsJson(const VolumeFacts& facts, Json& json) {
   const SourceInfo& info = facts.parts->source->info();
-  json["levels"] = nlohmann::ordered_json::array();
+  json["levels"] = Json::array();
   for (const SourceLevel& level : info.levels) {
     const VolumeGeometry& geometry = level.description.geometry;
     json["levels"].push_back({{"size", SizeJson(geometry.size)},
@@ -341,35 +339,34 @@ std::string InfoJson(const VolumeFacts& facts, const std::optional<IndexFacts>& 
   const VolumeSummary& summary = *facts.summary;
   const VolumeDescription& d = info.description;
   const Orientation& orientation = d.geometry.orientation;
-  nlohmann::ordered_json world = {
-      {"world", NameOf(orientation.world)},
-      {"origin", VectorJson(orientation.origin)},
-      {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
-      {"oblique_degrees", ObliqueDegrees(orientation)}};
+  Json world = {{"world", NameOf(orientation.world)},
+                {"origin", VectorJson(orientation.origin)},
+                {"axes", {VectorJson(orientation.axes[0]), VectorJson(orientation.axes[1]), VectorJson(orientation.axes[2])}},
+                {"oblique_degrees", ObliqueDegrees(orientation)}};
   if (orientation.world != World::kVoxels && !facts.parts) {
     for (std::size_t i = 0; i < 3; ++i) world[kStoredAxes[i]] = DirectionName(orientation.world, info.steps[i]);
   }
   world["straightened"] = info.straightened;
-  nlohmann::ordered_json json = {{"format", info.format},
-                                 {"size", SizeJson(d.geometry.size)},
-                                 {"type", NameOf(d.type)},
-                                 {"file_type", info.file_type},
-                                 {"labels", info.labels},
-                                 {"channels", info.channels},
-                                 {"channel", info.channel},
-                                 {"times", info.times},
-                                 {"time", info.time},
-                                 {"notes", info.notes},
-                                 {"voxel_bytes", d.voxel_bytes()},
-                                 {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
-                                 {"spacing", VectorJson(d.geometry.spacing)},
-                                 {"unit", NameOf(UnitOf(d.geometry))},
-                                 {"orientation", world},
-                                 {"range", RangeJson(summary.range)},
-                                 {"non_finite", summary.non_finite},
-                                 {"transfer", transfer},
-                                 {"occupancy", occupancy},
-                                 {"histogram", summary.histogram}};
+  Json json = {{"format", info.format},
+               {"size", SizeJson(d.geometry.size)},
+               {"type", NameOf(d.type)},
+               {"file_type", info.file_type},
+               {"labels", info.labels},
+               {"channels", info.channels},
+               {"channel", info.channel},
+               {"times", info.times},
+               {"time", info.time},
+               {"notes", info.notes},
+               {"voxel_bytes", d.voxel_bytes()},
+               {"mapping", {{"scale", d.mapping.scale}, {"offset", d.mapping.offset}}},
+               {"spacing", VectorJson(d.geometry.spacing)},
+               {"unit", NameOf(UnitOf(d.geometry))},
+               {"orientation", world},
+               {"range", RangeJson(summary.range)},
+               {"non_finite", summary.non_finite},
+               {"transfer", transfer},
+               {"occupancy", occupancy},
+               {"histogram", summary.histogram}};
   if (facts.parts) {
     AddPartsJson(facts, json);
     json["index"] = IndexJson(index);

@@ -1,15 +1,12 @@
 #include "client/cli/stats_json.h"
 
-#include <nlohmann/json.hpp>
-
 #include "client/report/frame_json.h"
 #include "client/report/frame_summary.h"
+#include "common/json/json.h"
 #include "data/volume_io/read_options.h"
 
 namespace slabstream {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 double Milliseconds(std::int64_t ns) { return double(ns) / 1e6; }
 
@@ -75,7 +72,7 @@ std::string StatsJson(const FrameOptions& options, const std::vector<FrameRecord
                   {"balance", last.balance},       {"combine", last.combine}};
   json["bytes"] = BytesJson(all);
   json["frames"] = std::move(list);
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json.dump(2) + "\n";
 }
 
 }  // namespace slabstream

@@ -14,8 +14,6 @@
 namespace slabstream {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 std::string NameOf(const CLI::Option& option) {
   const std::vector<std::string>& names = option.get_lnames();
   return names.empty() ? option.get_name() : names.front();

@@ -156,7 +156,7 @@ FrameRequest AsMade(FrameRequest request, const FrameStatistics& statistics) {
 
 std::string RecordText(const std::string& source, const FrameRequest& request, const PictureFormat& format, const PictureGeometry& geometry,
                        const LayerFiles& layers, const std::vector<LevelUse>& levels) {
-  Json made = Json::parse(RequestToJson(request));
+  Json made = Json::Parse(RequestToJson(request)).value();
   made.erase("dataset");  // the source says it
   Json json = {{"program", fmt::format("{}{}", kProgram, Version())},
                {"source", ShownSource(source)},
@@ -168,7 +168,7 @@ std::string RecordText(const std::string& source, const FrameRequest& request, c
   if (std::ranges::any_of(levels, [](const LevelUse& use) { return use.level > 0; })) {
     for (const LevelUse& use : levels) json["levels"].push_back(use.level);
   }
-  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
+  return json.dump(-1, true);
 }
 
 Result<PictureRecord> ParseRecord(std::string_view text) {

@@ -374,12 +374,12 @@ std::vector<std::string> TextsOf(const RequestOption& option, const FrameRequest
 }
 
 std::optional<std::vector<std::string>> TextsOfJson(const Json& value, bool repeatable) {
-  const auto dumped = [](const Json& json) { return json.dump(-1, ' ', true, Json::error_handler_t::replace); };
+  const auto dumped = [](const Json& json) { return json.dump(-1, true); };
   const auto text_of = [&](const Json& item) -> std::optional<std::string> {
     if (item.is_string()) return item.get<std::string>();
     if (item.is_boolean()) return item.get<bool>() ? "true" : "false";
-    if (item.is_number_float()) return fmt::format("{}", item.get<double>());  // the fewest digits that read back the same
-    if (item.is_number() || item.is_object()) return dumped(item);
+    if (item.is_number_integer() || item.is_object()) return dumped(item);
+    if (item.is_number()) return fmt::format("{}", item.get<double>());  // the fewest digits that read back the same
     if (!item.is_array() || item.empty()) return std::nullopt;
     if (item.front().is_object()) return dumped(item);  // a colour map
     std::string joined;
@@ -423,7 +423,7 @@ Json OptionsJson(const FrameRequest& request, std::string_view place) {
     if (option.flag()) {
       json[option.name] = texts.front() == "true";
     } else if (option.range) {
-      json[option.name] = Json::parse(texts.front());
+      json[option.name] = Json::Parse(texts.front()).value();
     } else {
       json[option.name] = option.repeatable ? Json(texts) : Json(texts.front());
     }

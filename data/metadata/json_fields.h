@@ -4,18 +4,16 @@
 
 #include <cstdint>
 #include <future>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/json/json.h"
 #include "data/stores/store.h"
 
 namespace slabstream::metadata {
-
-using Json = nlohmann::json;
 
 inline constexpr std::uint64_t kMostElements = std::uint64_t{1} << 53;  // along an axis: whole numbers that every writer of JSON keeps
 

@@ -27,7 +27,6 @@ namespace {
 
 using metadata::Field;
 using metadata::Join;
-using metadata::Json;
 
 constexpr std::size_t kMostLevels = 64;
 

@@ -18,7 +18,6 @@ namespace {
 
 using metadata::Field;
 using metadata::Join;
-using metadata::Json;
 
 using Objects = std::map<std::string, std::string, std::less<>>;  // by their keys
 

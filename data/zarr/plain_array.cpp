@@ -103,7 +103,7 @@ std::optional<double> NumberOf(const Field& field) {
 // xarray writes _FillValue of floats as the bytes of a double in base64 into Zarr 3.
 std::optional<double> MissingValueOf(const Field& field) {
   constexpr std::size_t kBytes = 8, kTextBytes = 12;
-  if (!field.is_text() || field.value().get_ref<const std::string&>().size() != kTextBytes) return NumberOf(field);
+  if (!field.is_text() || field.value().text().size() != kTextBytes) return NumberOf(field);
   constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::uint64_t bits = 0, low = 0;
   const std::string text = *field.Text();

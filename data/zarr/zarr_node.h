@@ -18,9 +18,9 @@ struct ZarrNode {
   std::string path;           // in the store; "": its root
   int version = 3;            // of Zarr: 2 or 3
   bool array = false;         // else a group
-  metadata::Json metadata;    // of version 2: of an array .zarray, of a group nothing
+  Json metadata;              // of version 2: of an array .zarray, of a group nothing
   std::string metadata_name;  // of the store and the object: "/data/scan.zarr/0/zarr.json"
-  metadata::Json attributes;
+  Json attributes;
   std::string attributes_name;
   std::vector<std::string> keys = {};  // of the objects that were read
 

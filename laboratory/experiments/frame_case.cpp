@@ -337,8 +337,10 @@ MeasuredFrame WithBoxCosts(ExperimentContext& context, const FrameCase& frame, F
            .drawn_voxels = drawn[i],
            .covered_pixels = covered[i],
            .voxel_bytes = bytes[i],
-           .work = repeats.front()->at("work")[i].get<WorkUnits>(),
            .coverage = CoverageOf(repeats.front()->at("coverage")[i], FrameBounds(measured.plan.setup))};
+    const auto work = repeats.front()->at("work")[i].get<std::vector<double>>();
+    CHECK_EQ(work.size(), box.work.size());
+    std::ranges::copy(work, box.work.begin());
     for (std::size_t stage = 0; stage < stages.size(); ++stage) box.stage_seconds[stage] = stages[stage][i];
   }
   return measured;

@@ -31,7 +31,7 @@ Json Parameters(const Experiment& experiment, const ExperimentOptions& options, 
   Json parameters = {{"seed", options.seed},   {"repeats", options.repeats}, {"quick", options.quick},
                      {"scale", options.scale}, {"volumes", options.volumes}, {"sweep", Json()}};
   if (!options.sweep_file.empty()) {
-    parameters["sweep"] = Json::parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes)), nullptr, false);
+    parameters["sweep"] = OrThrow(Json::Parse(OrThrow(ReadTextFile(options.sweep_file, kMaxSweepBytes))));
   }
   const auto& [cases, workers, renderers, paths, methods, footprints, transfers, service] = options.own;
   parameters["own"] = {{"cases", cases},     {"workers", workers},       {"renderers", Json::array()}, {"paths", paths},

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <utility>
@@ -16,6 +15,7 @@
 #include "client/request/volume_argument.h"
 #include "common/base/files.h"
 #include "common/base/printable.h"
+#include "common/json/json.h"
 #include "common/planning/layout.h"
 #include "common/planning/policy_names.h"
 #include "common/renderers/registry.h"

@@ -9,17 +9,15 @@
 
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/base/status.h"
+#include "common/json/json.h"
 
 namespace slabstream {
-
-using Json = nlohmann::ordered_json;
 
 // Trials of two runs may be mixed only if these agree.
 struct RunIdentity {

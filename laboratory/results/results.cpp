@@ -23,7 +23,7 @@ std::string Field(const Json& value) {
     return text;
   }
   if (!value.is_string()) return value.dump();
-  const auto& text = value.get_ref<const std::string&>();
+  const auto& text = value.text();
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) {

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "client/cli/option_groups.h"
+#include "tests/support/json_at.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -183,11 +184,11 @@ TEST(PictureRecordTest, CoarseLevelsAreNamed) {
 
 TEST(PictureRecordTest, BadRecordsAreNamed) {
   const FrameOptions options = Parse({"-o", "a.png", "brain"});
-  const Json good = Json::parse(RecordText("brain", options.request, options.format, SomeGeometry()));
+  const Json good = Json::Parse(RecordText("brain", options.request, options.format, SomeGeometry())).value();
   EXPECT_TRUE(ParseRecord(good.dump()).ok());
   const auto with = [&](const char* pointer, const Json& value) {
     Json bad = good;
-    bad[Json::json_pointer(pointer)] = value;
+    JsonAt(bad, pointer) = value;
     return bad.dump();
   };
   const auto without = [&](const char* field) {

@@ -287,13 +287,13 @@ TEST(RequestOptionsTest, StandardTextsOfTheSchemaAreThoseOfTheStruct) {
 TEST(RequestOptionsTest, ValuesOfFilesMayBeNumbersListsAndTexts) {
   FrameRequest request = Standard();
   std::optional<std::string> mistake;
-  const Json json = Json::parse(R"({"look_at": [1, 2.5, -3], "zoom": 0.1, "projection": "perspective"})");
+  const Json json = Json::Parse(R"({"look_at": [1, 2.5, -3], "zoom": 0.1, "projection": "perspective"})").value();
   JsonValue(json, "view", mistake).Fields(OptionFields(request, {"view."}));
   EXPECT_EQ(mistake, std::nullopt);
   EXPECT_EQ(request.view.look_at, (Vec3{1, 2.5, -3}));
   EXPECT_EQ(request.view.zoom, 0.1);
   EXPECT_EQ(OptionsJson(request, "view.").dump(), R"({"projection":"perspective","look-at":"1,2.5,-3","zoom":0.1})");
-  const Json bad = Json::parse(R"({"zoom": 0})");
+  const Json bad = Json::Parse(R"({"zoom": 0})").value();
   JsonValue(bad, "view", mistake).Fields(OptionFields(request, {"view."}));
   EXPECT_EQ(mistake, "view.zoom: zoom 0 is out of range [0.001, 10000]");
 }

@@ -109,7 +109,7 @@ class N5Test : public testing::Test {
  protected:
   Result<std::shared_ptr<ChunkedArray>> OpenArray() {
     const auto store = FolderStore(root_);
-    const Result<std::optional<metadata::Json>> json = metadata::ReadJson(*store, "attributes.json");
+    const Result<std::optional<Json>> json = metadata::ReadJson(*store, "attributes.json");
     if (!json.ok()) return json.status();
     return n5::OpenArray(store, "", metadata::Field("attributes.json", **json), context_);
   }

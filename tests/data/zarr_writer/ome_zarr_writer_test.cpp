@@ -1,5 +1,6 @@
 // What is written is compared with the definition of each level, read back by the reader of Zarr, which shares no code with the writer.
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "common/json/json.h"
 
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
@@ -10,13 +11,14 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <span>
 #include <sstream>
 
+#include "common/base/files.h"
 #include "data/sources/memory_source.h"
 #include "data/zarr/zarr.h"
 #include "tests/support/full_disk.h"
+#include "tests/support/json_at.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
 
@@ -258,11 +260,10 @@ TEST(OmeZarrWriterTest, WrongAttributesAreNamed) {
   Case made = RandomCase(random, {9, 9, 9});
   made.options.version = OmeZarrVersion::k05;
   ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
-  nlohmann::json right;
-  std::ifstream(file) >> right;
-  const auto refusal = [&](const std::string& field, const nlohmann::json& value) {
-    nlohmann::json wrong = right;
-    wrong[nlohmann::json::json_pointer("/attributes/slabstream" + field)] = value;
+  const Json right = Json::Parse(ReadTextFile(file, std::size_t{1} << 20).value()).value();
+  const auto refusal = [&](const std::string& field, const Json& value) {
+    Json wrong = right;
+    JsonAt(wrong, "/attributes/slabstream" + field) = value;
     std::ofstream(file) << wrong;
     return Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
   };
