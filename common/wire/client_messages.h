@@ -35,13 +35,11 @@
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
+#include "common/stats/probe_results.h"
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
 #include "common/wire/volume_messages.h"
-#include "coordinator/probe/box_statistics.h"
-#include "coordinator/probe/joint_histogram.h"
-#include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
 

@@ -5,11 +5,11 @@
 #include <optional>
 #include <utility>
 
+#include "common/stats/probe_results.h"
 #include "common/volume/bricks.h"
 #include "common/volume/exact_value.h"
 #include "common/volume/layers.h"
 #include "common/volume/summary.h"
-#include "coordinator/probe/volume_sample.h"
 
 namespace slabstream {
 
