@@ -8,11 +8,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "common/wire/client_fields.h"
-#include "common/wire/control_fields.h"
-#include "common/wire/image_fields.h"
-#include "common/wire/volume_fields.h"
-#include "common/wire/voxel_fields.h"
+#include "common/base/check.h"
+#include "common/wire/codecs.h"
 #include "slabstream/v1/envelope.pb.h"
 
 namespace slabstream {

@@ -16,10 +16,11 @@
 #include "common/renderers/registry.h"
 #include "common/renderers/renderer_choice.h"
 #include "common/view/default_view.h"
-#include "common/wire/about.h"
-#include "common/wire/request_fields.h"
+#include "common/wire/checker.h"
+#include "common/wire/codecs.h"
 #include "common/wire/request_json.h"
 #include "common/wire/validate_request.h"
+#include "slabstream/v1/frame.pb.h"
 
 namespace slabstream {
 namespace {
@@ -108,7 +109,7 @@ FrameRequest Asked(const RequestOption& option, bool with_option = true) {
 void ExpectDescribed(const Descriptor& message, const std::string& place, bool inside, std::set<std::string>& names) {
   for (int i = 0; i < message.field_count(); ++i) {
     const FieldDescriptor& field = *message.field(i);
-    const v1::About& about = AboutOf(field);
+    const v1::About& about = field.options().GetExtension(v1::about);
     const std::string path = place + field.name();
     if (!about.name().empty()) {
       EXPECT_FALSE(about.help().empty()) << path;

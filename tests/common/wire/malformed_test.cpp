@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "common/volume/filled_box.h"
-#include "common/wire/about.h"
 #include "common/wire/any_message.h"
 #include "common/wire/limits.h"
+#include "slabstream/v1/about.pb.h"
 #include "slabstream/v1/envelope.pb.h"
 #include "tests/common/wire/decode_any_input.h"
 #include "tests/common/wire/error_of.h"
@@ -138,7 +138,7 @@ TEST(Malformed, NoEnumMayHaveAnUnknownValue) {
           // Replies and plans state everything.
           const bool of_request = place.path.find("FrameSetup") == std::string::npos && !place.path.starts_with("GroupAssignment") &&
                                   !place.path.starts_with("FrameReply") && !place.path.starts_with("ViewReply");
-          const bool has_standard = of_request && !AboutOf(*place.field).standard().empty();
+          const bool has_standard = of_request && !place.field->options().GetExtension(v1::about).standard().empty();
           const bool of_world = place.field->containing_type() == v1::Orientation::descriptor() && place.field->name() == "unit";
           if (bad == 0 && (has_standard || of_world)) {
             EXPECT_EQ(error, "") << place.path << " has a standard value, or a file states none";
