@@ -42,6 +42,7 @@
 #include "common/base/time.h"
 #include "common/planning/frame_plan.h"
 #include "common/wire/client_messages.h"
+#include "common/wire/control_messages.h"
 #include "coordinator/request_queue.h"
 #include "coordinator/suspects.h"
 

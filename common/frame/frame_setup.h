@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/classification/transfer_function.h"
+#include "common/frame/dataset_id.h"
 #include "common/frame/frame_request.h"
 #include "common/frame/layer_look.h"
 #include "common/frame/opaque_front.h"
@@ -23,8 +24,6 @@
 namespace slabstream {
 
 class RendererKind;  // common/renderers/renderer_kind.h
-
-using DatasetId = std::uint64_t;  // a volume under a name: the same in every coordinator's life, another one for other voxels. 0: none
 
 // The light volume of a dataset whose voxels the coordinator holds (common/volume/light_volume.h).
 constexpr DatasetId LightVolumeOf(DatasetId dataset) {

@@ -17,12 +17,11 @@
 #include "common/image/color_coding.h"
 #include "common/planning/layout.h"
 #include "common/planning/resolved_request.h"
+#include "common/planning/worker_id.h"
 #include "common/volume/filled_box.h"
 #include "common/volume/summary.h"
 
 namespace slabstream {
-
-using WorkerId = std::uint32_t;  // unique within one coordinator's life, never reused. 0: nobody
 
 // One rank of a group: which box, and who renders it. After the loss of a worker, another one may hold several ranks of a group.
 struct Placement {

@@ -36,9 +36,14 @@
 #include "common/keys/admitted_key.h"
 #include "common/stats/prediction.h"
 #include "common/stats/probe_results.h"
+#include "common/stats/report.h"
+#include "common/view/ball.h"
 #include "common/view/picture_geometry.h"
-#include "common/wire/control_messages.h"
+#include "common/volume/layers.h"
+#include "common/volume/summary.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
+#include "common/wire/picture_messages.h"
 #include "common/wire/volume_messages.h"
 
 namespace slabstream {
@@ -384,13 +389,14 @@ using CoordinatorToClient =
 
 using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery, PrefetchQuery>;
 using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply>;
-inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const JointHistogramQuery& query) { return query.dataset; }
-inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
-inline const std::string& DatasetOf(const ViewQuery& query) { return query.frame.dataset; }
-inline const std::string& DatasetOf(const PrefetchQuery& query) { return query.frame.dataset; }
+template <class Query>
+const std::string& DatasetOf(const Query& query) {
+  if constexpr (requires { query.dataset; }) {
+    return query.dataset;
+  } else {
+    return query.frame.dataset;
+  }
+}
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);
 }

@@ -27,14 +27,13 @@
 #include "common/image/run_header.h"
 #include "common/planning/frame_plan.h"
 #include "common/stats/report.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 #include "common/wire/picture_messages.h"
 
 namespace slabstream {
 
 inline constexpr std::size_t kMaxEndpointBytes = 512;
-inline constexpr std::size_t kMaxTextBytes = 4096;
-inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
 inline constexpr std::int32_t kMaxOcclusionTiles = OcclusionTiles(kMaxGridSide);
 
 // The slot that a worker owns, among how many.
@@ -126,25 +125,6 @@ struct GroupDone {
   friend bool operator==(const GroupDone&, const GroupDone&) = default;
 };
 
-// How a payload is packed. kZstd: bytes of each 32-bit word grouped by significance (all first bytes, then all second, ...), then zstd.
-enum class Codec : std::uint8_t { kRaw = 1, kZstd = 2 };
-
-struct EncodedRuns {
-  RunImageHeader image;
-  Codec codec = Codec::kRaw;
-  std::uint64_t encoded_bytes = 0;  // length of the payload frame
-  std::uint64_t digest = 0;         // XXH3-64 of the payload frame
-  friend bool operator==(const EncodedRuns&, const EncodedRuns&) = default;
-};
-
-// A share of a picture, or the whole of it. All shares add up to the picture: where two of them have a pixel, each has a part of its
-// colour.
-struct PictureShare {
-  EncodedRuns runs;
-  bool direct = false;  // the payload went straight to the client (SentPicture)
-  friend bool operator==(const PictureShare&, const PictureShare&) = default;
-};
-
 // Final pixels (supersampling resolved), premultiplied; payload: the runs, unless they went straight to the client.
 struct FrameImage {
   Epoch epoch = 0;
@@ -183,8 +163,6 @@ struct Stop {
   Epoch epoch = 0;
   friend bool operator==(const Stop&, const Stop&) = default;
 };
-
-inline constexpr std::size_t kMaxReports = 65536;
 
 using WorkerToCoordinator = std::variant<Register, Heartbeat, GroupDone, FrameImage, WorkerTrouble, Leave>;
 using CoordinatorToWorker = std::variant<Welcome, Ping, GroupAssignment, Retire, Stop>;

@@ -7,8 +7,10 @@
 
 #include "common/base/rare.h"
 #include "common/base/shared_arena.h"
+#include "common/combining/schedule.h"
 #include "common/image/image_view.h"
-#include "common/wire/control_messages.h"
+#include "common/stats/report.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 
 namespace slabstream {

@@ -15,8 +15,9 @@
 
 #include "common/base/check.h"
 #include "common/base/status.h"
+#include "common/frame/dataset_id.h"
 #include "common/volume/layers.h"
-#include "common/wire/control_messages.h"
+#include "common/wire/encoded_runs.h"
 #include "common/wire/ids.h"
 
 namespace slabstream {
