@@ -15,6 +15,7 @@
 #include "common/planning/shown_zones.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/probe/box_statistics.h"
+#include "coordinator/probe/joint_histogram.h"
 #include "coordinator/probe/percentiles.h"
 #include "coordinator/probe/pick.h"
 

@@ -9,9 +9,12 @@
 #include <fmt/format.h>
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/reflection.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -32,6 +35,11 @@ using google::protobuf::FileDescriptor;
 
 const v1::Wire& WireOf(const FieldDescriptor& field) { return field.options().GetExtension(v1::wire); }
 const v1::About& AboutOf(const FieldDescriptor& field) { return field.options().GetExtension(v1::about); }
+
+[[noreturn]] void Reject(const FieldDescriptor& field, const std::string& what) {
+  std::fputs(fmt::format("{}: {}\n", field.full_name(), what).c_str(), stderr);
+  std::exit(1);
+}
 
 // ---- names
 
@@ -108,21 +116,29 @@ std::string Checked(const FieldDescriptor& field) {
   return limits.empty() ? fmt::format("in.{}()", name) : fmt::format(R"(check.Range("{0}", in.{0}(){1}))", name, limits);
 }
 
+// The number of the enumerator that is called so by `name_of`.
+int NumberOf(const FieldDescriptor& field, const EnumDescriptor& choices, const std::string& name, const auto& name_of) {
+  for (int number = 1; number < choices.value_count(); ++number) {
+    if (name_of(choices, number) == name) return number;
+  }
+  Reject(field, fmt::format("{} has no '{}'", choices.name(), name));
+}
+
 // Whether the field travels, from what the schema says of that: of a struct ("in.state == ...") or of a message ("in.state() == ...").
 std::string Condition(const FieldDescriptor& field, bool of_message) {
   const std::string& only = WireOf(field).only();
   if (only.empty()) return "";
   if (only.front() == '!') return fmt::format("if (!in.{}{}{}) ", of_message ? "has_" : "", only.substr(1), of_message ? "()" : "");
   const std::string name = only.substr(0, only.find('='));
-  const EnumDescriptor& choices = *field.containing_type()->FindFieldByName(name)->enum_type();
-  std::istringstream words(only.substr(name.size() + 1));
+  const FieldDescriptor* const decides = field.containing_type()->FindFieldByName(name);
+  if (decides == nullptr || decides->enum_type() == nullptr) Reject(field, fmt::format("'{}' is no enum", name));
+  std::istringstream words(only.substr(std::min(name.size() + 1, only.size())));
   std::string condition, word;
   while (std::getline(words, word, '|')) {
-    for (int number = 1; number < choices.value_count(); ++number) {
-      if (BareName(choices, number) != word) continue;
-      condition += condition.empty() ? "" : " || ";
-      condition += of_message ? fmt::format("in.{}() == {}", name, number) : fmt::format("in.{} == {}", name, Enumerator(choices, number));
-    }
+    const int number = NumberOf(field, *decides->enum_type(), word, BareName);
+    condition += condition.empty() ? "" : " || ";
+    condition += of_message ? fmt::format("in.{}() == {}", name, number)
+                            : fmt::format("in.{} == {}", MemberOf(*decides), Enumerator(*decides->enum_type(), number));
   }
   return fmt::format("if ({}) ", condition);
 }
@@ -132,11 +148,11 @@ std::string Condition(const FieldDescriptor& field, bool of_message) {
 std::string WriteOf(const FieldDescriptor& field) {
   const std::string& name = field.name();
   const std::string in = "in." + MemberOf(field);
-  if (const auto* choice = field.real_containing_oneof()) {
+  if (field.real_containing_oneof() != nullptr) {
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_STRING)
       return fmt::format("if (const auto* text = std::get_if<std::string>(&{})) out.set_{}(WireText(*text, 256));", in, name);
-    const std::string part = StructOf(*field.message_type());
-    return fmt::format("if (const auto* part = std::get_if<{}>(&{})) Write(*part, *out.mutable_{}());", part, "in." + choice->name(), name);
+    return fmt::format("if (const auto* part = std::get_if<{}>(&{})) Write(*part, *out.mutable_{}());", StructOf(*field.message_type()), in,
+                       name);
   }
   if (field.is_repeated()) {
     if (field.cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) return fmt::format("WriteItems({}, *out.mutable_{}());", in, name);
@@ -183,14 +199,14 @@ std::string ReadOf(const FieldDescriptor& field) {
       std::string read =
           fmt::format(R"(ReadEnum("{0}", in.{0}(), {1}, {2}, {3}, check);)", name, out, Enumerator(choices, 1), Enumerator(choices, last));
       if (standard.empty()) return read;
-      const std::vector<std::string> words = WordsOf(choices);
-      const int number = int(std::ranges::find(words, standard) - words.begin()) + 1;
+      const int number = NumberOf(field, choices, standard, WordOf);
       return fmt::format("if (in.{}() == 0 && check.fills()) {} = {}; else {}", name, out, Enumerator(choices, number), read);
     }
     case FieldDescriptor::CPPTYPE_STRING: {
       if (standard.empty()) return fmt::format("{} = {};", out, Checked(field));
       const std::string absent = field.has_presence() ? fmt::format("!in.has_{}()", name) : fmt::format("in.{}().empty()", name);
-      const std::string unless = field.has_presence() ? "if (!in.has_function()) " : "";
+      const auto* choice = field.real_containing_oneof();
+      const std::string unless = choice != nullptr ? fmt::format("if (!in.has_{}()) ", choice->field(1)->name()) : "";
       return fmt::format(R"({}{} = {} && check.fills() ? "{}" : {};)", unless, out, absent, standard, Checked(field));
     }
     default: break;
@@ -261,23 +277,18 @@ Output CodecsOf(const FileDescriptor& schema) {
   return file;
 }
 
-Output Declarations(const std::vector<const FileDescriptor*>& schemas, const Descriptor& envelope) {
-  Output file, codecs;
+Output Declarations(const std::vector<const Descriptor*>& messages, const Descriptor& envelope) {
+  Output file;
   file.Line("#pragma once\n#include \"common/wire/any_message.h\"\n#include \"common/wire/checker.h\"\nnamespace slabstream::v1 {{");
-  for (const FileDescriptor* schema : schemas) {
-    for (int i = 0; i < schema->message_type_count(); ++i) file.Line("class {};", schema->message_type(i)->name());
-  }
+  for (const Descriptor* message : messages) file.Line("class {};", message->name());
   file.Line("}}\nnamespace slabstream {{");
-  for (const FileDescriptor* schema : schemas) {
-    for (int i = 0; i < schema->message_type_count(); ++i) {
-      const Descriptor& message = *schema->message_type(i);
-      for (const char* name : {"", "Fields"}) {
-        if (!HasStruct(message)) continue;
-        if (*name != 0 && (!IsOwn(message) || FieldsOf(message).empty())) continue;
-        file.Line("void Write{0}(const {1}&, v1::{2}&);\nvoid Read{0}(const v1::{2}&, {1}&, Checker&);", name, StructOf(message),
-                  message.name());
-      }
-    }
+  const auto declare = [&](const char* name, const Descriptor& message) {
+    file.Line("void Write{0}(const {1}&, v1::{2}&);\nvoid Read{0}(const v1::{2}&, {1}&, Checker&);", name, StructOf(message),
+              message.name());
+  };
+  for (const Descriptor* message : messages) {
+    if (HasStruct(*message)) declare("", *message);
+    if (IsOwn(*message) && !FieldsOf(*message).empty()) declare("Fields", *message);
   }
   // The Protobuf message of each message of the envelope.
   for (int i = 0; i < envelope.field_count(); ++i) {
@@ -310,22 +321,32 @@ std::string List(const auto& texts) {
   return "{" + list + "}";
 }
 
+// What the schema says of a field, as initialisers of a FieldAbout, which has the members of an About.
+std::string Initialisers(const FieldDescriptor& field) {
+  const v1::About& about = AboutOf(field);
+  const auto& access = *about.GetReflection();
+  std::string text = ".field = " + Quoted(field.name());
+  std::vector<const FieldDescriptor*> given;
+  access.ListFields(about, &given);
+  for (const FieldDescriptor* said : given) {
+    text += fmt::format(", .{} = ", said->name());
+    switch (said->cpp_type()) {
+      case FieldDescriptor::CPPTYPE_DOUBLE: text += fmt::format("{}", access.GetDouble(about, said)); break;
+      case FieldDescriptor::CPPTYPE_BOOL: text += "true"; break;
+      default:
+        text += said->is_repeated() ? List(access.GetRepeatedFieldRef<std::string>(about, said)) : Quoted(access.GetString(about, said));
+    }
+  }
+  if (const auto* choices = field.enum_type()) text += ", .words = " + List(WordsOf(*choices));
+  return text;
+}
+
 Output RequestFields(const std::vector<const Descriptor*>& messages) {
   Output file;
   file.Line("#include \"common/wire/request_walk.h\"\n\nnamespace slabstream {{");
   for (const Descriptor* message : messages) {
     file.Line("const std::vector<FieldAbout>& FieldsOf{}() {{\n  static const std::vector<FieldAbout> kFields = {{", message->name());
-    for (const FieldDescriptor* field : FieldsOf(*message)) {
-      const v1::About& about = AboutOf(*field);
-      file.Line("    {{.field = {}, .name = {}, .help = {}, .value = {}, .unit = {}, .standard = {}, .least = {}, .most = {},",
-                Quoted(field->name()), Quoted(about.name()), Quoted(about.help()), Quoted(about.value()), Quoted(about.unit()),
-                Quoted(about.standard()), about.least(), about.most());
-      file.Line("     .above_least = {}, .list = {}, .ability = {}, .group = {}, .same_picture = {}, .excludes = {}, .needs = {},",
-                about.above_least(), Quoted(about.list()), Quoted(about.ability()), Quoted(about.group()), about.same_picture(),
-                List(about.excludes()), List(about.needs()));
-      const auto* choices = field->enum_type();
-      file.Line("     .words = {}}},", List(choices != nullptr ? WordsOf(*choices) : std::vector<std::string>()));
-    }
+    for (const FieldDescriptor* field : FieldsOf(*message)) file.Line("    {{{}}},", Initialisers(*field));
     file.Line("  }};\n  return kFields;\n}}");
   }
   file.Line("}}  // namespace slabstream");
@@ -365,16 +386,16 @@ bool WriteAll(const std::string& schema_file, const std::string& folder) {
     if (pool.BuildFile(file) == nullptr) return false;
   }
   const Descriptor& envelope = *pool.FindMessageTypeByName("slabstream.v1.Envelope");
-  std::vector<const FileDescriptor*> schemas;
+  std::vector<const Descriptor*> messages, request;
   for (const auto& file : files.file()) {
     const std::string name = file.name().substr(file.name().rfind('/') + 1);
     if (file.package() != "slabstream.v1" || name == "about.proto" || name == "envelope.proto") continue;
-    schemas.push_back(pool.FindFileByName(file.name()));
-    if (!CodecsOf(*schemas.back()).Save(fmt::format("{}/{}_codec.cpp", folder, name.substr(0, name.find('.'))))) return false;
+    const FileDescriptor& schema = *pool.FindFileByName(file.name());
+    for (int i = 0; i < schema.message_type_count(); ++i) messages.push_back(schema.message_type(i));
+    if (!CodecsOf(schema).Save(fmt::format("{}/{}_codec.cpp", folder, name.substr(0, name.find('.'))))) return false;
   }
-  std::vector<const Descriptor*> request;
   Collect(*pool.FindMessageTypeByName("slabstream.v1.FrameRequest"), request);
-  return Declarations(schemas, envelope).Save(folder + "/codecs.h") && RequestWalk(request).Save(folder + "/request_walk.h") &&
+  return Declarations(messages, envelope).Save(folder + "/codecs.h") && RequestWalk(request).Save(folder + "/request_walk.h") &&
          RequestFields(request).Save(folder + "/request_fields.cpp");
 }
 

@@ -13,14 +13,17 @@ namespace slabstream {
 
 // Texts are empty and limits are both 0 where the schema says nothing.
 struct FieldAbout {
-  std::string field;  // its name in the schema
+  std::string field;  // its name in the schema; then come the members of About, in its order
   std::string name, help, value, unit, standard;
   double least = 0, most = 0;
   bool above_least = false;
-  std::string list, ability, group;
-  bool same_picture = false;
+  std::string list, ability;
   std::vector<std::string> excludes, needs;
-  std::vector<std::string> words;  // of an enum: those of its values, from 1 on
+  std::string group;
+  bool always = false;
+  std::string apart;
+  bool same_picture = false;
+  std::vector<std::string> words = {};  // of an enum: those of its values, from 1 on
 };
 
 // An enumerator of a struct, as the schema numbers it.

@@ -262,6 +262,42 @@ TEST(Malformed, EveryRepeatedFieldIsBounded) {
          "gradients, opacities, levels and traffic in two";
 }
 
+TEST(Malformed, LimitsOfTheSchemaAreThoseOfTheCode) {
+  const std::map<std::string, double> limits = {
+      {"AddVolume.name", kMaxNameBytes},
+      {"Chunk.raw_bytes", kChunkBytes},
+      {"DataOrder.items", kMaxDataItemBytes},
+      {"FrameStatistics.lowered", kMaxTextBytes},
+      {"GroupKey.group", kMaxGroups - 1},
+      {"Index3.x", kMaxVolumeSide},
+      {"Label.name", kMaxLabelNameBytes},
+      {"Label.value", kMaxLabelValue},
+      {"PackedRuns.bytes", double(kMaxRunsBytes - 1)},
+      {"PartialImage.interval_end", kMaxRanks},
+      {"PartialImage.step", kMaxSteps},
+      {"PicturesDoor.key", kKeyTextBytes},
+      {"PixelRange.end", double(kMaxFramePixels)},
+      {"Placement.level", kMaxLevels - 1},
+      {"Register.images_endpoint", kMaxEndpointBytes},
+      {"Register.threads", kMaxThreads},
+      {"SentFile.bytes", double(kMaxSentFileBytes)},
+      {"SentPicture.bytes", double(kMaxRunsBytes)},
+      {"SharedBlock.offset", double(kArenaBytes)},
+      {"SharedBlock.slot", kArenaSlots - 1},
+      {"SharedImage.stride", kMaxFrameSide},
+      {"SheetGrid.height", kMaxGridSide},
+      {"StoredAt.source", kMaxSourceBytes},
+      {"VolumePart.bytes", kMaxVolumePartBytes},
+  };
+  const auto* const schema = v1::Envelope::descriptor()->file()->pool();
+  for (const auto& [name, limit] : limits) {
+    const FieldDescriptor* const field = schema->FindFieldByName("slabstream.v1." + name);
+    ASSERT_NE(field, nullptr) << name;
+    const v1::Wire& wire = field->options().GetExtension(v1::wire);
+    EXPECT_EQ(wire.has_most() ? wire.most() : 256, limit) << name;
+  }
+}
+
 TEST(Malformed, MissingFieldsAreNoCrash) {
   AlterEachField(
       [&](const Place& place) {
