@@ -121,8 +121,6 @@ Result<QuestionReply> Answer(const ViewQuery& query, const Dataset& dataset) {
   return AnswerView(query, dataset.summary->description.geometry, dataset.summary);
 }
 
-Result<QuestionReply> Answer(const PrefetchQuery& query, const Dataset&) { return QuestionReply(PrefetchReply{.nonce = query.nonce}); }
-
 // ---- voxels that nobody holds are read for the answer
 
 Result<VoxelBlock> ReadBox(const VoxelServer::Samples::InParts& from, const Box& box) {
@@ -231,27 +229,15 @@ Result<QuestionReply> ReadAnswer(const ViewQuery& query, const AnswerQuestion& a
   return AnswerView(query, asked.summary->description.geometry, asked.summary);
 }
 
-Result<QuestionReply> Fetch(const PrefetchQuery& query, const AnswerQuestion& asked, Prefetcher& prefetcher) {
-  PrefetchReply reply{.nonce = query.nonce, .fetches = asked.summary->stored && Prefetcher::Fetches(*asked.summary->stored)};
-  if (!reply.fetches) return QuestionReply(reply);
-  const Result<ResolvedRequest> resolved = ResolveRequest(query.frame, asked.dataset, asked.summary);
-  if (!resolved.ok()) return resolved.status();
-  const Result<FrameSetup> setup = MakeFrameSetup(*resolved);
-  if (!setup.ok()) return setup.status();
-  const Status begun = prefetcher.Fetch(*setup->stored, ShownBlocks(*setup, Prefetcher::kMostBlocks));
-  return begun.ok() ? QuestionReply(reply) : Result<QuestionReply>(begun);
-}
-
 }  // namespace
 
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher) {
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples) {
   if (asked.levels != nullptr) {
     return AnswerView(std::get<ViewQuery>(asked.question), asked.levels->levels.front().geometry, asked.summary);
   }
   if (asked.dataset == 0) return AnswerSummary(std::get<SummaryQuery>(asked.question), *asked.summary);
   if (!samples.any()) return Status::Unavailable("dataset \"" + DatasetOf(asked.question) + "\" was unloaded meanwhile");
   if (samples.in_parts.source != nullptr) {
-    if (const auto* prefetch = std::get_if<PrefetchQuery>(&asked.question)) return Fetch(*prefetch, asked, prefetcher);
     return std::visit([&](const auto& query) { return ReadAnswer(query, asked, samples.in_parts); }, asked.question);
   }
   ProbeVolume volume{.voxels = samples.view(), .labels = samples.labels.get(), .overlay = samples.overlay.get()};

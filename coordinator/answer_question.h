@@ -2,13 +2,12 @@
 #pragma once
 
 #include "coordinator/dataset_machine.h"
-#include "coordinator/prefetcher.h"
 #include "coordinator/voxel_server.h"
 
 namespace slabstream {
 
 // Errors: as of ResolveRequest and MakeFrameSetup. `samples`: neither, if the dataset has gone meanwhile, which is Unavailable.
-// `prefetcher` begins with what a PrefetchQuery asks for. Any thread.
-Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples, Prefetcher& prefetcher);
+// Any thread.
+Result<QuestionReply> AnswerTo(const AnswerQuestion& asked, const VoxelServer::Samples& samples);
 
 }  // namespace slabstream

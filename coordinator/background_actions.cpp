@@ -274,8 +274,7 @@ BackgroundActions::AtOnce BackgroundActions::Perform(AnswerQuestion& action) {
   const std::optional<StoredAt>& stored = action.summary->stored;
   return PostResult(
       answers_.Of(stored ? ServerOf(stored->source) : 0), "an answer to a question",
-      [action, samples = voxels_.Find(action.dataset), prefetcher = prefetcher_] { return AnswerTo(action, samples, *prefetcher); },
-      EndOf<QuestionAnswered>(action.id));
+      [action, samples = voxels_.Find(action.dataset)] { return AnswerTo(action, samples); }, EndOf<QuestionAnswered>(action.id));
 }
 
 BackgroundActions::AtOnce BackgroundActions::Perform(BeginUpload& action) {

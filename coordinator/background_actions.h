@@ -24,7 +24,6 @@
 #include "coordinator/folder_memory.h"
 #include "coordinator/frame_machine.h"
 #include "coordinator/planner.h"
-#include "coordinator/prefetcher.h"
 #include "coordinator/upload_buffer.h"
 #include "coordinator/voxel_server.h"
 
@@ -94,7 +93,6 @@ class BackgroundActions {
   const PlanFunction make_plan_;
   const CountFunction count_occupied_;
   const std::shared_ptr<Planner> planner_;
-  const std::shared_ptr<Prefetcher> prefetcher_ = std::make_shared<Prefetcher>();
   VoxelServer& voxels_;
   const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken

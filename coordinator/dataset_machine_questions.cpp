@@ -9,7 +9,6 @@ namespace {
 // The picture that a question is about; null: it is about the dataset.
 FrameRequest* FrameOf(Question& question) {
   if (auto* pick = std::get_if<PickQuery>(&question)) return &pick->frame;
-  if (auto* prefetch = std::get_if<PrefetchQuery>(&question)) return &prefetch->frame;
   return nullptr;
 }
 

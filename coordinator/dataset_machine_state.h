@@ -127,7 +127,6 @@ struct DatasetMachine::State {
   void OnMessage(PeerToken client, const JointHistogramQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const PickQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const ViewQuery& message, const Bytes&) { Ask(client, message); }
-  void OnMessage(PeerToken client, const PrefetchQuery& message, const Bytes&) { Ask(client, message); }
   void OnMessage(PeerToken client, const AddVolume& message, const Bytes&);
   void OnMessage(PeerToken client, const VolumePart& message, const Bytes& payload);
   void OnMessage(PeerToken client, const DropVolume& message, const Bytes&);

@@ -48,9 +48,6 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void Handle(ViewMessage view);
   void Do(const ViewMachine::Actions& actions);
   void Render(const ViewAction& action);  // kRender
-  // While the view moves: asks the service to fetch what it will probably show. `frames` of the view, as they are asked for when it stands
-  // still.
-  void PrefetchAhead(const std::vector<FrameRequest>& frames);
   void OnFrames(std::uint64_t order, Result<ServiceLink::Rendered> rendered);
   void OnProgress(std::uint64_t order, const FrameProgress& progress);
   void Encode(bool final, int quality);
@@ -77,13 +74,6 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
     bool shadowed = false;  // the view asks for shadows or ambient occlusion
   };
   std::optional<Rendering> rendering_;
-  struct Moved {
-    Time at;
-    std::vector<FrameRequest> frames;
-  };
-  std::optional<Moved> moved_;  // the view when PrefetchAhead asked last, or it came anew
-  int prefetching_ = 0;         // questions that are not answered
-  std::string not_fetched_;     // a dataset of which the service fetches nothing ahead
   std::shared_ptr<const RenderedView> rendered_;
   std::shared_ptr<std::atomic<bool>> given_up_;  // of what is being encoded
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited

@@ -155,7 +155,6 @@ std::optional<CoordinatorToClient> RefusalOf(std::span<const std::byte> header, 
     case Envelope::kJointHistogramQuery: return OrderRefused{.nonce = envelope.joint_histogram_query().nonce(), .status = why};
     case Envelope::kPickQuery: return OrderRefused{.nonce = envelope.pick_query().nonce(), .status = why};
     case Envelope::kViewQuery: return OrderRefused{.nonce = envelope.view_query().nonce(), .status = why};
-    case Envelope::kPrefetchQuery: return OrderRefused{.nonce = envelope.prefetch_query().nonce(), .status = why};
     case Envelope::kStatusQuery: return OrderRefused{.nonce = envelope.status_query().nonce(), .status = why};
     case Envelope::kShutDown: return OrderRefused{.nonce = envelope.shut_down().nonce(), .status = why};
     case Envelope::kKeysOrder: return OrderRefused{.nonce = envelope.keys_order().nonce(), .status = why};

@@ -485,18 +485,4 @@ void Fields(auto& io, Is<ViewReply> auto& m) {
   io.Optional("framed", m.framed, &P::has_framed, &P::framed, &P::mutable_framed);
 }
 
-v1::PrefetchQuery ProtoOf(const PrefetchQuery&);
-void Fields(auto& io, Is<PrefetchQuery> auto& m) {
-  using P = v1::PrefetchQuery;
-  io.Any(m.nonce, &P::nonce, &P::set_nonce);
-  io.Message("frame", m.frame, &P::frame, &P::mutable_frame);
-}
-
-v1::PrefetchReply ProtoOf(const PrefetchReply&);
-void Fields(auto& io, Is<PrefetchReply> auto& m) {
-  using P = v1::PrefetchReply;
-  io.Any(m.nonce, &P::nonce, &P::set_nonce);
-  io.Any(m.fetches, &P::fetches, &P::set_fetches);
-}
-
 }  // namespace slabstream

@@ -19,7 +19,6 @@
 //   JointHistogramQuery ----------------->  JointHistogramReply
 //   PickQuery --------------------------->  PickReply
 //   ViewQuery --------------------------->  ViewReply
-//   PrefetchQuery ----------------------->  PrefetchReply
 //   These questions wait until their dataset is loaded and its files were looked at, as frames do. Any of them may be answered by
 //   OrderRefused.
 #pragma once
@@ -363,36 +362,22 @@ struct ViewReply {
   friend bool operator==(const ViewReply&, const ViewReply&) = default;
 };
 
-// What a picture would show is fetched from its web server and kept on disk (coordinator/prefetcher.h).
-struct PrefetchQuery {
-  std::uint64_t nonce = 0;
-  FrameRequest frame;  // its policy and previews do not matter
-  friend bool operator==(const PrefetchQuery&, const PrefetchQuery&) = default;
-};
-
-struct PrefetchReply {
-  std::uint64_t nonce = 0;
-  bool fetches = false;  // no: the dataset lies behind no web server, or nothing is kept on disk
-  friend bool operator==(const PrefetchReply&, const PrefetchReply&) = default;
-};
-
 using ClientToFrames = std::variant<SubmitFrame, CancelFrame, ClientPing, StatusQuery, ShutDown>;  // and about the service
 using ClientToDatasets = std::variant<DataOrder, SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery,
-                                      PrefetchQuery, AddVolume, VolumePart, DropVolume>;
+                                      AddVolume, VolumePart, DropVolume>;
 using ClientToCoordinator = Merged<ClientToFrames, ClientToDatasets, std::variant<KeysOrder>>;
 using CoordinatorToClient =
     std::variant<FrameProgress, FrameReply, FrameFailed, ClientPong, StatusReply, ShutDownReply, KeysReply, DataReply, OrderRefused,
-                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply, VolumeCredit>;
+                 SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, VolumeCredit>;
 
-using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery, PrefetchQuery>;
-using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply, PrefetchReply>;
+using Question = std::variant<SummaryQuery, SampleQuery, StatisticsQuery, JointHistogramQuery, PickQuery, ViewQuery>;
+using QuestionReply = std::variant<SummaryReply, SampleReply, StatisticsReply, JointHistogramReply, PickReply, ViewReply>;
 inline const std::string& DatasetOf(const SummaryQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const SampleQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const StatisticsQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const JointHistogramQuery& query) { return query.dataset; }
 inline const std::string& DatasetOf(const PickQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const ViewQuery& query) { return query.frame.dataset; }
-inline const std::string& DatasetOf(const PrefetchQuery& query) { return query.frame.dataset; }
 inline const std::string& DatasetOf(const Question& question) {
   return std::visit([](const auto& query) -> const std::string& { return DatasetOf(query); }, question);
 }

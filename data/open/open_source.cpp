@@ -37,7 +37,7 @@ Result<std::shared_ptr<VolumeSource>> OpenSource(const std::string& path, const 
   ReadOptions with_store = options;
   RemoteFormat there{.format = remote ? nullptr : FindSourceFormat(path, options)};
   if (remote) {
-    Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
+    Result<std::shared_ptr<Store>> store = OpenStoreFor(path, options);
     if (!store.ok()) return store.status();
     with_store.store = *std::move(store);
     const Result<RemoteFormat> found = FindRemoteFormat(*with_store.store, SourceFormats());

@@ -199,7 +199,7 @@ class Level : public std::enable_shared_from_this<Level> {
   void NoteMissing(const Index3& chunk) try {
     constexpr std::uint64_t kMostNoted = std::uint64_t{1} << 16;
     const std::uint64_t count = std::uint64_t(counts_.x) * std::uint64_t(counts_.y) * std::uint64_t(counts_.z);
-    if (findings_->settled || context_->only_keeps() || count > kMostNoted) return;
+    if (findings_->settled || count > kMostNoted) return;
     {
       const std::lock_guard lock(mutex_);
       missing_.insert(NumberIn(counts_, chunk));

@@ -63,8 +63,6 @@ Result<std::shared_ptr<Store>> ZipStore(const std::string& path);
 class HttpTransfers;
 class ObjectCache;
 struct WebOptions {
-  // Of objects in the cache: the server is asked whether they are still right, or not.
-  enum class Kept : std::uint8_t { kAreChecked, kAreTaken } kept = Kept::kAreChecked;
   std::string query = {};                 // encoded, that goes with each address; empty: none
   std::vector<std::string> headers = {};  // that go with each request: "NAME:VALUE" or "NAME:@FILE" with the value in a file
 };

@@ -59,7 +59,7 @@ void NoteAxes(const std::vector<std::string>& names, const std::vector<AxisKind>
 Status PlaceByCoordinates(const ArrayContext& context, const ZarrNode& node, const std::vector<std::string>& names,
                           const AxisChoice& choice, const std::vector<std::uint64_t>& sizes, Pyramid& pyramid) {
   const std::size_t slash = node.path.rfind('/');
-  if (node.path.empty() || context.source->only_keeps()) return Status::Ok();
+  if (node.path.empty()) return Status::Ok();
   const std::string group = slash == std::string::npos ? "" : node.path.substr(0, slash);
   PyramidLevel& level = pyramid.levels.front();
   std::vector<std::string> placed, units;

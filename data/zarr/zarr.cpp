@@ -27,7 +27,7 @@ bool Recognises(const std::string& path, const ReadOptions&) {
 }
 
 Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  const Result<std::shared_ptr<Store>> store = OpenStoreFor(context, path, options);
+  const Result<std::shared_ptr<Store>> store = OpenStoreFor(path, options);
   if (!store.ok()) return store.status();
   Result<Pyramid> pyramid = OpenPyramid(*store, options, context);
   if (!pyramid.ok()) return pyramid.status();

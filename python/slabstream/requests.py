@@ -24,7 +24,7 @@ _MOST_RESUBMITS = 3    # before it fails
 _TELL_BYTES = 1 << 20  # of payloads, until the next ping tells of them
 
 _ANSWERS = ("client_pong", "status_reply", "shut_down_reply", "keys_reply", "data_reply", "order_refused", "summary_reply",
-            "sample_reply", "joint_histogram_reply", "pick_reply", "view_reply", "prefetch_reply", "statistics_reply")
+            "sample_reply", "joint_histogram_reply", "pick_reply", "view_reply", "statistics_reply")
 MOST_PART_BYTES = 1 << 19  # of a volume that is sent
 
 _log = logging.getLogger("slabstream")

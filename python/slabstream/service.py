@@ -174,16 +174,6 @@ class Service(contextlib.AbstractContextManager["Service"]):
         reply = self._connection.ask("pick_query", query, timeout)
         return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
 
-    @takes_options_of("render")
-    def prefetch(self, dataset: str, *, timeout: float = _QUESTION_SECONDS, **options: Any) -> bool:
-        """Says that the picture with these options may be asked for soon. For a second, the service fetches what it shows from the dataset's web
-        server, a few blocks at a time, and keeps it on disk (`--cache`). False: the dataset lies behind no web server, or the service
-        keeps nothing on disk."""
-        draft = draft_of(dataset, options)
-        self._settle([draft])
-        query = schema.PrefetchQuery(frame=draft.frame)
-        return bool(self._connection.ask("prefetch_query", query, timeout).fetches)
-
     def status(self, timeout: float = ANSWER_SECONDS) -> Status:
         """Workers, datasets and counts of frames."""
         return status_of(self._connection.ask("status_query", schema.StatusQuery(), timeout), self.endpoint)

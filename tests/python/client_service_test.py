@@ -137,11 +137,6 @@ class AtAService(WithAService):
         with self.assertRaisesRegex(ss.InvalidArgument, r"x 51 is out of range \[0, 50\]"):
             self.service.pick("head", 51, 0, **options)
 
-    def test_a_volume_of_a_file_needs_no_prefetch(self) -> None:
-        self.assertFalse(self.service.prefetch("head", azimuth=40, zoom=2))
-        with self.assertRaisesRegex(ss.NotFound, 'no dataset "nothing"'):
-            self.service.prefetch("nothing")
-
     def test_pictures_are_saved_whole(self) -> None:
         image = self.service.render("head", size=20)
         image.save(self.folder / "a.PNG")

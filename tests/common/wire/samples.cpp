@@ -584,16 +584,6 @@ std::vector<ViewReply> SamplesOf() {
 }
 
 template <>
-std::vector<PrefetchQuery> SamplesOf() {
-  return {{.frame = Request()}, {kMax64, Request()}};
-}
-
-template <>
-std::vector<PrefetchReply> SamplesOf() {
-  return {{}, {kMax64, true}};
-}
-
-template <>
 std::vector<AddVolume> SamplesOf() {
   return {{.name = "a", .description = Description(), .layers = {}, .labels = {}},
           {kMax64,
