@@ -118,7 +118,7 @@ void Compare(const Subject& subject, const std::vector<View>& views, const Polic
     const ResolvedRequest resolved = ResolveRequest(view.request, 1, subject.summary).value();
     const FrameSetup of_view = MakeFrameSetup(resolved).value();
     const auto measure = [&](std::shared_ptr<const Layout> layout) {
-      FramePlan plan = PlanFrame(of_view, *resolved.policy, RosterOf(std::uint32_t(options.workers)), std::move(layout)).value();
+      FramePlan plan = PlanFrame(of_view, resolved.policy, RosterOf(std::uint32_t(options.workers)), std::move(layout)).value();
       return Measure(subject, std::move(plan), options.workers, options.repeats);
     };
     MeasuredLayouts layouts(options.workers);

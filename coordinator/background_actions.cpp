@@ -96,11 +96,10 @@ auto EndOf(Names... names) {
 
 }  // namespace
 
-BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings,
-                                     VoxelServer& voxels)
+BackgroundActions::BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, VoxelServer& voxels)
     : make_plan_(std::move(make_plan)),
       count_occupied_(std::move(count_occupied)),
-      planner_(std::make_shared<Planner>(surroundings)),
+      planner_(std::make_shared<Planner>()),
       voxels_(voxels) {}
 
 void BackgroundActions::HandleEvents(const std::function<void(CoordinatorEvent)>& handle) {
@@ -317,14 +316,10 @@ BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
   if (auto planned = planner_->PlanAtHand(action)) return Planned{plan, *std::move(planned)};
   const Status begun = Guarded("planning", [&] {
     action.stop = plans_[plan].get_token();
-    planning_.Post(action.client, [inbox = inbox_, planner = planner_, make = make_plan_, choices = choices_,
-                                   left = choosers_[action.client].get_token(), request = std::move(action)] {
-      if (!request.stop.stop_requested()) {
-        auto made = Guarded("planning", [&] { return make(*planner, request); });
-        if (!request.stop.stop_requested()) inbox->Post({Planned{request.plan, std::move(made)}});
-      }
-      if (!planner->WantsChoice(request.client)) return;
-      choices->Post(request.client, [planner, client = request.client, left] { planner->Choose(client, left); });
+    planning_.Post(action.client, [inbox = inbox_, planner = planner_, make = make_plan_, request = std::move(action)] {
+      if (request.stop.stop_requested()) return;
+      auto made = Guarded("planning", [&] { return make(*planner, request); });
+      if (!request.stop.stop_requested()) inbox->Post({Planned{request.plan, std::move(made)}});
     });
   });
   if (begun.ok()) return std::nullopt;
@@ -334,11 +329,6 @@ BackgroundActions::AtOnce BackgroundActions::Perform(PlanRequest& action) {
 
 BackgroundActions::AtOnce BackgroundActions::Perform(DropPlan& action) {
   if (auto plan = plans_.extract(action.plan)) plan.mapped().request_stop();
-  return std::nullopt;
-}
-
-BackgroundActions::AtOnce BackgroundActions::Perform(ClientLeft& action) {
-  if (auto chooser = choosers_.extract(action.client)) chooser.mapped().request_stop();
   return std::nullopt;
 }
 

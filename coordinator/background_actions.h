@@ -1,9 +1,9 @@
 // BackgroundActions: the actions of the coordinator's machines that take long, on threads of their own: up to kLoadsAtOnce load datasets
 // from files or take memory for uploads, up to kFarLoadsAtOnce load datasets from servers, kLoadsAtOnce from each, up to kChecksAtOnce
 // check files, up to kAnswersAtOnce answer questions about voxels, two about those of one server or of all files, up to kCountsAtOnce count
-// occupied voxels, each of another dataset, up to kPlansAtOnce plan, each for another client, and up to kChoicesAtOnce choose open
-// policies. None waits for another, and who has used least time is next (FairTasks). An exception in one fails only what it was doing. What
-// they find comes back as events for the machines. A plan that is dropped stops soon. So does a choice if its client has left.
+// occupied voxels, each of another dataset, and up to kPlansAtOnce plan, each for another client. None waits for another, and who has used
+// least time is next (FairTasks). An exception in one fails only what it was doing. What they find comes back as events for the machines. A
+// plan that is dropped stops soon.
 //
 // One thread uses an object of this class: the one that runs the machines.
 #pragma once
@@ -41,12 +41,11 @@ inline constexpr std::size_t kAnswersAtOnce = 8;    // likewise
 inline constexpr std::size_t kChecksAtOnce = 4;     // so one file system that does not answer leaves the others alone
 inline constexpr std::size_t kCountsAtOnce = 4;
 inline constexpr std::size_t kPlansAtOnce = 8;
-inline constexpr std::size_t kChoicesAtOnce = 2;
 
 class BackgroundActions {
  public:
   // `voxels` serves the voxels of the datasets that are loaded, and must outlive this.
-  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, const ServiceSurroundings& surroundings, VoxelServer& voxels);
+  BackgroundActions(PlanFunction make_plan, CountFunction count_occupied, VoxelServer& voxels);
 
   // Each begins an action. An event: the action is over already, or could not begin.
   using AtOnce = std::optional<CoordinatorEvent>;
@@ -63,7 +62,6 @@ class BackgroundActions {
   AtOnce Perform(CountDataset& action);
   AtOnce Perform(PlanRequest& action);
   AtOnce Perform(DropPlan& action);
-  AtOnce Perform(ClientLeft& action);
   AtOnce Perform(FrameMeasured& action);
 
   // Hands over what has ended since the last call, one event after the other. Voxels of a loaded dataset are served from just before its
@@ -97,10 +95,8 @@ class BackgroundActions {
   const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
-  std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen
   BackgroundTasks loads_{kLoadsAtOnce}, checks_{kChecksAtOnce};
-  FairTasks far_loads_{kFarLoadsAtOnce, kLoadsAtOnce}, answers_{kAnswersAtOnce, 2};         // by server
-  const std::shared_ptr<FairTasks> choices_ = std::make_shared<FairTasks>(kChoicesAtOnce);  // plans share it
+  FairTasks far_loads_{kFarLoadsAtOnce, kLoadsAtOnce}, answers_{kAnswersAtOnce, 2};  // by server
   FairTasks counts_{kCountsAtOnce}, planning_{kPlansAtOnce};
 };
 

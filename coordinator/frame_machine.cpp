@@ -98,7 +98,7 @@ void FrameMachine::State::CountAhead() {
   std::vector<ClassifiedVolume> ahead;
   const auto count = [&](const OpenRequest& request) {
     const auto* const dataset = request.dataset();
-    if (dataset == nullptr || !request.uses_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
+    if (dataset == nullptr || !request.needs_occupancy || !std::holds_alternative<std::monostate>(dataset->plan)) return true;
     const ClassifiedVolume volume = dataset->volume().Whole();
     if (std::ranges::find(ahead, volume) != ahead.end()) return true;
     if (!occupancy.Counting(volume) && occupancy.Find(volume) == nullptr) {
@@ -120,7 +120,7 @@ void FrameMachine::State::PlanAhead() {
     auto* const dataset = request.dataset();
     if (dataset == nullptr) return false;
     if (std::visit(is_present, dataset->plan)) return true;
-    const auto occupied = request.uses_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
+    const auto occupied = request.needs_occupancy ? occupancy.Find(dataset->volume().Whole()) : nullptr;
     if (request.needs_occupancy && occupied == nullptr) return false;
     dataset->plan = PlanAsked{++last_plan, roster.version()};
     planning.insert(last_plan);
@@ -156,9 +156,9 @@ PlanRequest FrameMachine::State::MakePlanRequest(const OpenRequest& request, std
     ask.level = dataset.drawn.front();
   }
   for (const Member& member : roster.members()) {
-    if (member.leaving) continue;
-    const Register& worker = member.description;
-    ask.workers.push_back({worker.memory_scope, worker.lends_memory, worker.threads, worker.pid, worker.memory_bytes});
+    const std::uint64_t bytes = member.description.memory_bytes;
+    if (member.leaving || bytes == 0) continue;
+    ask.worker_memory = ask.worker_memory == 0 ? bytes : std::min(ask.worker_memory, bytes);
   }
   return ask;
 }

@@ -134,16 +134,13 @@ struct CountDataset {
 struct DropPlan {
   PlanId plan = 0;
 };
-struct ClientLeft {
-  PeerToken client = 0;  // nothing is planned or chosen for it any more
-};
 struct StopService {};  // everything was sent; end
 // End the connection of a client that reads nothing and says nothing: what waits for it must not stay in memory.
 struct DropClient {
   PeerToken client = 0;
 };
-using FrameAction = std::variant<TellWorkers, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, ClientLeft,
-                                 FrameMeasured, Note, StopService>;
+using FrameAction =
+    std::variant<TellWorkers, ToClient, DropClient, ToDatasets, CountDataset, PlanRequest, DropPlan, FrameMeasured, Note, StopService>;
 
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0 but for the workers, their slots and
 // the grids of earlier counts (at most OccupancyTable::kMaxKept).

@@ -87,8 +87,7 @@ Status FrameMachine::State::Resolve(OpenRequest& request, const DatasetReady& re
   resolved->light = ready.light;
   // Nobody counts what nobody holds, nor what is drawn from several levels.
   const bool counted = !resolved->summary->stored && resolved->map == nullptr;
-  request.uses_occupancy = NeedsOccupancy(asked.policy) && counted;
-  request.needs_occupancy = request.uses_occupancy && !LeavesChoice(asked.policy);
+  request.needs_occupancy = NeedsOccupancy(asked.policy) && counted;
   const ViewParameters view = ready.view.value_or(resolved->frame.view);
   request.state = OpenRequest::HasDataset{.resolved = std::make_shared<const ResolvedRequest>(*std::move(resolved)),
                                           .seen = ready.seen,
@@ -248,7 +247,6 @@ void FrameMachine::State::FailRequest(const OpenRequest& request, const Status& 
 void FrameMachine::State::FreeClient(PeerToken client) {
   actions.emplace_back(std::in_place_type<ToDatasets>, ForgetClient{client});
   if (!clients.Forget(client)) return;
-  actions.emplace_back(ClientLeft{client});
   for (const OpenRequest& request : queue.Forget(client)) {
     actions.emplace_back(std::in_place_type<ToDatasets>, LeaveDataset{request.use});
     frames_cancelled += request.coarse ? 0 : 1;

@@ -7,10 +7,21 @@
 
 #include "common/planning/balance.h"
 #include "common/planning/clipped_cells.h"
-#include "coordinator/learning_table.h"
 
 namespace slabstream {
 namespace {
+
+// `list`: most recently used first.
+template <class List>
+void KeepFirst(List& list, std::size_t count) {
+  while (list.size() > count) list.pop_back();
+}
+
+// Rendering without what is done once a padded box, which the next frame does not repeat. 0: none is reported.
+std::int64_t LastingRenderNs(const RankReport& report) {
+  const auto stage = [&report](Stage s) { return report.stage_ns[std::size_t(s)]; };
+  return std::max<std::int64_t>(stage(Stage::kRender) - stage(Stage::kPrepare), 0);
+}
 
 // Render time of each box that was rendered.
 std::map<BoxId, double> SecondsOf(const Layout& layout, std::span<const RankReport> reports) {
@@ -64,14 +75,26 @@ LayoutTable::Learnt* LayoutTable::FindLearnt(const ClassifiedVolume& volume) {
   return &*found;
 }
 
-std::optional<MeasuredCost> LayoutTable::CopyLearnt(const ClassifiedVolume& volume) {
-  const std::lock_guard lock(mutex_);
-  const Learnt* const learnt = FindLearnt(volume);
-  return learnt != nullptr && learnt->cost.any() ? std::optional(learnt->cost) : std::nullopt;
+std::shared_ptr<const Layout> LayoutTable::FindEarlier(const Key& key) const {
+  for (const Entry& entry : entries_) {
+    Key same = key;
+    same.volume = entry.key.volume;
+    if (same.volume.dataset() == key.volume.dataset() && same == entry.key) return entry.layout;
+  }
+  return nullptr;
 }
 
-LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
-  Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target, !counted && NeedsOccupancy(AskFor(*request.policy))};
+std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) {
+  std::optional<MeasuredCost> known;
+  {
+    const std::lock_guard lock(mutex_);
+    if (const Learnt* const learnt = FindLearnt(volume); learnt != nullptr && learnt->cost.any()) known = learnt->cost;
+  }
+  return known ? std::optional(known->Field()) : std::nullopt;
+}
+
+LayoutTable::Key LayoutTable::KeyOf(const Request& request) {
+  Key key{*request.volume, *request.policy, request.slots, request.box_bytes_target};
   if (request.map != nullptr) key.map = *request.map;
   key.policy.combine.clear();
   key.policy.pixel_error = 0;
@@ -79,7 +102,7 @@ LayoutTable::Key LayoutTable::KeyOf(const Request& request, bool counted) {
 }
 
 std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
-  const Key key = KeyOf(request, request.occupied != nullptr);
+  const Key key = KeyOf(request);
   std::unique_lock lock(mutex_);
   if (request.occupied != nullptr && FindLearnt(key.volume) == nullptr) {
     lock.unlock();
@@ -92,16 +115,14 @@ std::shared_ptr<const Layout> LayoutTable::Find(const Request& request) {
       KeepFirst(learnt_, kMaxLearnt);
     }
   }
-  if (key.by_bricks) {  // a layout by counted voxels is better, and its voxels are where it wants them
-    Key counted = key;
-    counted.by_bricks = false;
-    if (const Entry* better = FindEntry(counted)) return better->layout;
-  }
   if (const Entry* found = FindEntry(key)) return found->layout;
+  const std::shared_ptr<const Layout> earlier = FindEarlier(key);
   lock.unlock();
 
   const std::optional<WorkField> cost = request.occupied != nullptr ? KnownCost(key.volume) : std::nullopt;
-  auto made = std::make_shared<const Layout>(MakeLayout(MakingOf(request, cost)));
+  LayoutRequest make = MakingOf(request, cost);
+  if (earlier != nullptr) make.earlier = &earlier->partition;
+  auto made = std::make_shared<const Layout>(MakeLayout(make));
   if (request.stop.stop_requested()) return nullptr;
 
   lock.lock();
@@ -124,7 +145,7 @@ LayoutRequest LayoutTable::MakingOf(const Request& request, const std::optional<
 }
 
 bool LayoutTable::HasMade(const Request& request) {
-  Key key = KeyOf(request, true);
+  Key key = KeyOf(request);
   const std::unique_lock lock(mutex_, std::try_to_lock);
   return lock && std::ranges::any_of(entries_, [&](const Entry& entry) {
            key.box_bytes_target = entry.key.box_bytes_target;
@@ -135,23 +156,12 @@ bool LayoutTable::HasMade(const Request& request) {
 std::shared_ptr<const Layout> LayoutTable::FindMade(const Request& request) {
   const std::unique_lock lock(mutex_, std::try_to_lock);
   if (!lock) return nullptr;
-  const Entry* const found = FindEntry(KeyOf(request, true));
+  const Entry* const found = FindEntry(KeyOf(request));
   return found == nullptr ? nullptr : found->layout;
 }
 
-bool LayoutTable::KnowsCost(const ClassifiedVolume& volume) {
-  const std::lock_guard lock(mutex_);
-  const Learnt* const learnt = FindLearnt(volume);
-  return learnt != nullptr && learnt->cost.any();
-}
-
-std::optional<WorkField> LayoutTable::KnownCost(const ClassifiedVolume& volume) {
-  const std::optional<MeasuredCost> learnt = CopyLearnt(volume);
-  return learnt ? std::optional(learnt->Field()) : std::nullopt;
-}
-
 void LayoutTable::Learn(const Request& request, const FramePlan& plan, std::span<const RankReport> reports) {
-  const Key key = KeyOf(request, true);
+  const Key key = KeyOf(request);
   if (LearnCosts(request, key, plan, reports) && request.occupied != nullptr) ChangeLayout(request, key);
 }
 

@@ -38,7 +38,7 @@ class LayoutTable {
     const ResolvedPolicy* policy = nullptr;
     const ClassifiedVolume* volume = nullptr;  // of the frame
     const VolumeSummary* summary = nullptr;
-    std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it, or begins without it
+    std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
     // As in ResolvedRequest.
@@ -54,11 +54,7 @@ class LayoutTable {
   // threads.
   std::shared_ptr<const Layout> FindMade(const Request& request);
 
-  // Measured costs: seconds.
-  bool KnowsCost(const ClassifiedVolume& volume);
-  std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);
-
-  // Learns from a finished frame of this request, unless it was planned without occupied voxels; then the layout changes if it should.
+  // Learns from a finished frame of this request, which has occupied voxels; then the layout changes if it should.
   void Learn(const Request& request, const FramePlan& plan, std::span<const RankReport> reports);
 
  private:
@@ -67,12 +63,11 @@ class LayoutTable {
     ResolvedPolicy policy;
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
-    bool by_bricks = false;  // the policy needs occupied voxels, but they were not counted yet
-    LevelMap map = {};       // of one level: the whole volume
+    LevelMap map = {};  // of one level: the whole volume
     friend bool operator==(const Key&, const Key&) = default;
   };
   // Combining moves no box, so policies that differ in that alone share a layout.
-  static Key KeyOf(const Request& request, bool counted);
+  static Key KeyOf(const Request& request);
   struct Entry {
     Key key;
     std::shared_ptr<const Layout> layout;
@@ -90,7 +85,8 @@ class LayoutTable {
   };
   Entry* FindEntry(const Key& key);  // under the lock, like FindLearnt; null: there is none
   Learnt* FindLearnt(const ClassifiedVolume& volume);
-  std::optional<MeasuredCost> CopyLearnt(const ClassifiedVolume& volume);  // nothing: no cost is known
+  std::shared_ptr<const Layout> FindEarlier(const Key& key) const;     // under the lock: of another look at the same volume; null: none
+  std::optional<WorkField> KnownCost(const ClassifiedVolume& volume);  // measured, in seconds; nothing: no cost is known
   // Returns whether the frame was of the present layout.
   bool LearnCosts(const Request& request, const Key& key, const FramePlan& plan, std::span<const RankReport> reports);
   // Weighs whether the layout should change, and changes it. For requests with occupied voxels.

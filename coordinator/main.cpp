@@ -74,11 +74,6 @@ int Run(int argc, char** argv) {
       ->type_name("SIZE")
       ->default_str(fmt::format("a quarter of this machine's memory: {}", MemoryText(options.machine.memory_bytes)));
   AddCacheOption(app, cache);
-  options.surroundings.link = *ParseLink("--link", kDefaultLink);
-  AddParsed(app, "--link", options.surroundings.link, ParseLink,
-            "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
-      ->type_name("LINK")
-      ->default_str(kDefaultLink);
   AddMetricsOptions(app, metrics);
   return RunService(app, argc, argv, "coordinator", [&]() -> Status {
     SetReadMemory(options.machine.memory_bytes);  // before anything is read

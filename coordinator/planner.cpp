@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <exception>
-#include <span>
 #include <utility>
 
 #include "common/base/guarded.h"
 #include "common/planning/levels.h"
-#include "common/planning/policy_names.h"
 #include "common/planning/shown_zones.h"
 #include "common/planning/worker_memory.h"
 
@@ -15,10 +13,8 @@ namespace slabstream {
 namespace {
 
 // The worker with the least memory decides: any box may come to it after a loss.
-std::int64_t BoxTarget(const FrameSetup& setup, std::span<const HostedWorker> workers) {
-  std::int64_t target = kBoxBytesTarget;
-  for (const HostedWorker& worker : workers) target = std::min(target, BoxBytesFor(setup, worker.memory_bytes));
-  return target;
+std::int64_t BoxTarget(const FrameSetup& setup, const PlanRequest& request) {
+  return std::min(kBoxBytesTarget, BoxBytesFor(setup, request.worker_memory));
 }
 
 // Whether the frame fits if it is drawn from this level. Nobody may have loaded it, so it counts as one that is read in parts.
@@ -33,17 +29,15 @@ bool FitsAt(const VolumeDescription& level, const FrameRequest& frame, const Vol
   Result<FrameSetup> setup = MakeFrameSetup(*resolved);
   if (!setup.ok()) return false;
   const std::size_t slots = request.roster.slots.size();
-  const ResolvedPolicy policy =
-      resolved->policy ? *resolved->policy : ResolvePolicy(FirstPolicy(resolved->frame.policy, slots), level.geometry);
   const std::shared_ptr<const LevelMap> map = ShownZones(*setup);
   auto layout = std::make_shared<const Layout>(MakeLayout({.summary = summary.get(),
                                                            .volume = &resolved->volume,
-                                                           .policy = &policy,
+                                                           .policy = &resolved->policy,
                                                            .slots = std::uint32_t(slots),
-                                                           .box_bytes_target = BoxTarget(*setup, request.workers),
+                                                           .box_bytes_target = BoxTarget(*setup, request),
                                                            .map = map.get(),
                                                            .stop = request.stop}));
-  const Result<FramePlan> plan = PlanFrame(*std::move(setup), policy, request.roster, std::move(layout), request.turn);
+  const Result<FramePlan> plan = PlanFrame(*std::move(setup), resolved->policy, request.roster, std::move(layout), request.turn);
   return plan.ok() && FramesThatFit(*plan, *summary, request.limits).ok();
 }
 
@@ -80,16 +74,15 @@ std::optional<Result<std::shared_ptr<const PlannedFrame>>> Planner::PlanAtHand(c
   constexpr std::size_t kMostBoxes = 4096;  // a plan places each of them
   const ResolvedRequest& resolved = *request.resolved;
   const std::size_t slots = request.roster.slots.size();
-  if (LeavesChoice(resolved.frame.policy, ServiceMachine(request.workers, surroundings_), slots)) return std::nullopt;
   if (resolved.summary->stored && resolved.map == nullptr) return std::nullopt;  // to find its ShownZones may take long
-  LayoutTable::Request wanted{.policy = &*resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
+  LayoutTable::Request wanted{.policy = &resolved.policy, .volume = &resolved.volume, .slots = std::uint32_t(slots), .map = resolved.map};
   if (!layouts_.HasMade(wanted)) return std::nullopt;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
-  wanted.box_bytes_target = BoxTarget(*setup, request.workers);
+  wanted.box_bytes_target = BoxTarget(*setup, request);
   std::shared_ptr<const Layout> layout = layouts_.FindMade(wanted);
   if (layout == nullptr || layout->owners.size() > kMostBoxes) return std::nullopt;
-  Result<PlannedFrame> planned = WithLayout({.asked = request, .policy = *resolved.policy}, *std::move(setup), std::move(layout));
+  Result<PlannedFrame> planned = WithLayout(request, *std::move(setup), std::move(layout));
   if (!planned.ok()) return planned.status();
   if (!planned->fit.ok()) return std::nullopt;  // Plan looks for a level that fits
   return std::make_shared<const PlannedFrame>(*std::move(planned));
@@ -101,58 +94,39 @@ Result<std::shared_ptr<const PlannedFrame>> Planner::TryPlan(const PlanRequest& 
   const ResolvedRequest& resolved = *request.resolved;
   Result<FrameSetup> setup = MakeFrameSetup(resolved);
   if (!setup.ok()) return setup.status();
-  PlannedFrame planned{.asked = request};
-  const MachineModel machine = ServiceMachine(request.workers, surroundings_);
-  const std::size_t slots = request.roster.slots.size();
-  const bool unknown = setup->stored || resolved.map != nullptr;
-  if (unknown && LeavesChoice(resolved.frame.policy, machine, slots)) {
-    // Nothing is known of the work in voxels that nobody has read, or that are drawn from several levels.
-    planned.policy = ResolvePolicy(FirstPolicy(resolved.frame.policy, slots), setup->description.geometry);
-  } else if (LeavesChoice(resolved.frame.policy, machine, slots)) {
-    ChosenPolicy chosen = policies_.Find(request, machine, layouts_);
-    planned.policy = std::move(chosen.policy);
-    if (!chosen.chosen) planned.asked.occupied = nullptr;
-    planned.prediction = chosen.prediction;
-    planned.render_scale = chosen.render_scale;
-  } else {
-    planned.policy = *resolved.policy;
-  }
-  LayoutTable::Request wanted = WantedLayout(planned.asked, planned.policy, *setup);
+  LayoutTable::Request wanted = WantedLayout(request, *setup);
   wanted.stop = request.stop;
   std::shared_ptr<const Layout> layout = layouts_.Find(wanted);
   if (layout == nullptr) return Status::Cancelled("the plan is not wanted any more");
-  Result<PlannedFrame> with_layout = WithLayout(std::move(planned), *std::move(setup), std::move(layout));
+  Result<PlannedFrame> with_layout = WithLayout(request, *std::move(setup), std::move(layout));
   if (!with_layout.ok()) return with_layout.status();
   if (!with_layout->fit.ok()) with_layout->level_that_fits = LevelThatFits(request);
   return std::make_shared<const PlannedFrame>(*std::move(with_layout));
 }
 
-LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const ResolvedPolicy& policy, const FrameSetup& setup) {
+LayoutTable::Request Planner::WantedLayout(const PlanRequest& request, const FrameSetup& setup) {
   const ResolvedRequest& resolved = *request.resolved;
-  return {.policy = &policy,
+  return {.policy = &resolved.policy,
           .volume = &resolved.volume,
           .summary = resolved.summary.get(),
           .occupied = request.occupied,
           .slots = std::uint32_t(request.roster.slots.size()),
-          .box_bytes_target = BoxTarget(setup, request.workers),
+          .box_bytes_target = BoxTarget(setup, request),
           .map = resolved.map != nullptr ? resolved.map : ShownZones(setup),
           .coarser = resolved.coarser};
 }
 
-Result<PlannedFrame> Planner::WithLayout(PlannedFrame planned, FrameSetup setup, std::shared_ptr<const Layout> layout) {
-  const PlanRequest& asked = planned.asked;
-  Result<FramePlan> plan = PlanFrame(std::move(setup), planned.policy, asked.roster, std::move(layout), asked.turn,
+Result<PlannedFrame> Planner::WithLayout(const PlanRequest& asked, FrameSetup setup, std::shared_ptr<const Layout> layout) {
+  Result<FramePlan> plan = PlanFrame(std::move(setup), asked.resolved->policy, asked.roster, std::move(layout), asked.turn,
                                      {.share_pixels = asked.share_pixels, .straight8 = asked.resolved->frame.straight8});
   if (!plan.ok()) return plan.status();
-  planned.plan = *std::move(plan);
-  planned.fit = FramesThatFit(planned.plan, *asked.resolved->summary, asked.limits);
-  return planned;
+  Result<int> fit = FramesThatFit(*plan, *asked.resolved->summary, asked.limits);
+  return PlannedFrame{.asked = asked, .plan = *std::move(plan), .fit = std::move(fit)};
 }
 
 void Planner::Learn(const FrameMeasured& measured) {
   const PlannedFrame& frame = *measured.frame;
-  layouts_.Learn(WantedLayout(frame.asked, frame.policy, frame.plan.setup), frame.plan, measured.reports);
-  policies_.Learn(frame, measured.reports);
+  layouts_.Learn(WantedLayout(frame.asked, frame.plan.setup), frame.plan, measured.reports);
 }
 
 }  // namespace slabstream

@@ -45,8 +45,7 @@ struct OpenRequest {
   bool coarse = false;       // it makes a preview of the client's request of this number (frame_machine_previews.cpp)
   FrameKind kind = 0;        // for the forecast; not of coarse ones
   // Once it has its dataset.
-  bool uses_occupancy = false;   // its policy does (NeedsOccupancy)
-  bool needs_occupancy = false;  // and is not open, so that its frame waits for the count
+  bool needs_occupancy = false;  // its policy does (NeedsOccupancy): its frame waits for the count
 
   struct Submitted {};  // it has sought its dataset
   struct AwaitsDataset {};

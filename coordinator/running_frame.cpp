@@ -380,7 +380,7 @@ Duration RunningFrame::WorkerTime() const {
 }
 
 FrameStatistics RunningFrame::Statistics(Time now) const {
-  const ResolvedPolicy& policy = planned_->policy;
+  const ResolvedPolicy& policy = planned_->asked.resolved->policy;
   FrameStatistics statistics{.workers = std::uint32_t(Participants().size()),
                              .groups = group_count(),
                              .attempts = attempt(),
@@ -397,7 +397,6 @@ FrameStatistics RunningFrame::Statistics(Time now) const {
                              .reports = {},
                              .display = plan_.display,
                              .grid = FrameBounds(plan_.setup),
-                             .predicted = planned_->prediction,
                              .levels = {},
                              .lowered = request_.lowered,
                              .view = request_.dataset()->view};

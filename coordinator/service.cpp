@@ -70,7 +70,7 @@ struct CoordinatorService::Impl {
         clients(std::move(client_socket)),
         control(std::move(control_socket)),
         voxels(std::move(voxel_server)),
-        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), service_options.surroundings, *voxels),
+        background(std::move(service_options.make_plan), std::move(service_options.count_occupied), *voxels),
         metrics(service_options.machine.memory_bytes) {}
 
   void Run();
@@ -369,9 +369,6 @@ Result<std::unique_ptr<CoordinatorService>> CoordinatorService::Start(Context& c
 
   options.machine.pid = static_cast<std::uint32_t>(::getpid());
   options.machine.voxels_endpoint = (*voxels)->endpoint();
-  options.surroundings.memory_scope = SharedMemoryScope();
-  options.surroundings.encrypted = keys.has_value();
-  options.surroundings.cores = std::int32_t(std::max(std::thread::hardware_concurrency(), 1U));
   auto impl = std::make_unique<Impl>(std::move(options), std::move(keys), std::move(*clients), std::move(*control), std::move(*voxels));
   impl->client_endpoint = std::move(*client_endpoint);
   impl->worker_endpoint = std::move(*worker_endpoint);

@@ -19,15 +19,14 @@
 namespace slabstream {
 
 struct CoordinatorOptions {
-  std::string client_endpoint;       // bound; a wildcard port is read back
-  std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
-  std::string voxels_endpoint;       // bound; empty: any port, ".voxels" beside an ipc path or inproc name
-  std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
-  Catalogue catalogue;               // datasets
-  std::set<std::string> folders;     // that are watched (FoundData)
-  Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
-  CoordinatorConfig machine;         // filled in by Start: epoch, pid, voxels_endpoint
-  ServiceSurroundings surroundings;  // except the link, filled in by Start
+  std::string client_endpoint;    // bound; a wildcard port is read back
+  std::string worker_endpoint;    // bound; empty: WorkerEndpointFor(client_endpoint)
+  std::string voxels_endpoint;    // bound; empty: any port, ".voxels" beside an ipc path or inproc name
+  std::string keys_folder;        // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
+  Catalogue catalogue;            // datasets
+  std::set<std::string> folders;  // that are watched (FoundData)
+  Codec codec = Codec::kRaw;      // of voxels on their way to workers; zstd pays if the link is slower than packing
+  CoordinatorConfig machine;      // filled in by Start: epoch, pid, voxels_endpoint
   PlanFunction make_plan = &Planner::Plan;
   CountFunction count_occupied = CountOccupied;
 };

@@ -91,7 +91,7 @@ class SimulatedService {
 
   void Perform(TellWorkers& action);
   void SendWorker(PeerToken to, CoordinatorToWorker sent);
-  void Perform(AnyOf<DropPlan, ClientLeft, DropClient, Note> auto&) {}
+  void Perform(AnyOf<DropPlan, DropClient, Note> auto&) {}
   void Perform(StopService&) { StopCoordinator(); }
   void Perform(auto& action) { conditions_.Perform(action); }
 

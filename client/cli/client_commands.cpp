@@ -22,10 +22,8 @@
 #include "common/transport/this_machine.h"
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
-#include "coordinator/tuning/service_machine.h"
 #include "data/open/cache_option.h"
 #include "data/volume_io/formats.h"
-#include "simulator/model/link_model.h"
 
 namespace slabstream {
 namespace {
@@ -298,12 +296,6 @@ void DeclareUp(const CommandLine& line) {
       "and pictures for clients behind a slow tunnel. off: never")
       ->type_name("[=MODE]")
       ->default_str("auto");
-  AddParsed(
-      *sub, "--link", options->link,
-      [](const std::string& option, const std::string& text) { return TextIf(ParseLink(option, text).status(), text); },
-      "Network between hosts of workers, as NAME or NAME:MICROSECONDS,GBIT, for policies that are 'auto'" + Explained(LinkPresets()))
-      ->type_name("LINK")
-      ->default_str(kDefaultLink);
   sub->add_option("--keys", options->keys, "Encrypt connections with the keys in this folder; make it if it does not exist")
       ->type_name("FOLDER")
       ->default_str("a folder beside the logs if --listen is not loopback, else none");

@@ -140,7 +140,6 @@ struct UpOptions {
   std::string listen;             // endpoint for clients; a wildcard port is fine
   std::string keys;               // folder of keys; empty: one beside the logs if `listen` leaves this machine, else none
   std::string compress = "auto";  // compression of images on their way: auto, on or off, as slabstream-worker takes it
-  std::string link;               // as ParseLink takes it; empty: the coordinator's default
   std::uint64_t memory = 0;       // bytes, of all processes together
   std::uint64_t cache = 0;        // bytes on disk, as slabstream-worker takes it; 0: none
   int metrics = 0;                // port of the coordinator's metrics, those of workers at the next ones; 0: none

@@ -187,7 +187,6 @@ class LocalService {
                                           "--log-level", LogLevelOfChildren()};
     for (const std::string& data : options_.data) arguments.insert(arguments.end(), {"--data", data});
     AddCacheArgument(arguments, options_.cache);
-    if (!options_.link.empty()) arguments.insert(arguments.end(), {"--link", options_.link});
     if (!state_.keys_folder.empty()) arguments.insert(arguments.end(), {"--keys", state_.keys_folder});
     AddMetrics(arguments, 0);
     if (Status started = StartChild(0, kCoordinatorProgram, std::move(arguments)); !started.ok()) return started;

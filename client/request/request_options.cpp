@@ -46,9 +46,6 @@ Choices ChoicesOf(const std::string& list) {
   const auto add_all = [&](const auto& entries) {
     for (const auto& entry : entries) choices.Add(entry.name, entry.purpose);
   };
-  if (list == "decompositions" || list == "assignments" || list == "combining schemes") {
-    choices.Add(kAutomatic, "what should be fastest for this volume, view and service");
-  }
   if (list == "decompositions") add_all(Decompositions());
   if (list == "assignments") add_all(Assignments());
   if (list == "loads") add_all(BalanceByChoices());
@@ -231,7 +228,7 @@ struct OptionReader {
   }
   void Read(const std::string& text, std::string& value) {
     if (!option.choices.empty()) status = Choice(text).status();
-    if (option.path == "policy.combine" && text != kAutomatic) {
+    if (option.path == "policy.combine" && !text.empty()) {
       if (const auto parsed = ParseCombining(text); !parsed.ok()) {
         status = Status::InvalidArgument(fmt::format("{} {}", shown, parsed.status().message()));
       }

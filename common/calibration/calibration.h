@@ -67,23 +67,14 @@ inline constexpr double kSample = 8e-9;
 //   balance_bench VOLUME
 inline constexpr double kMacrocellWork = 512;
 
-// Pixels of the picture (coordinator/tuning/frame_predictor.cpp).
-//   simulation_bench CASE  (laboratory/measure/frame_costs.h)
-namespace picture {
-inline constexpr double kResample = 4.5e-9;  // the accumulated frame to a pixel of the picture
-inline constexpr double kResolve = 1.5e-9;   // a supersampled pixel, averaged
-inline constexpr double kEncode = 2.5e-9;
-inline constexpr double kReceive = 1.2e-9;  // checked and decoded at the client
-}  // namespace picture
-
-// A worker's combining thread, for each pixel that is not empty (CombiningCosts), if images travel in messages and if they are lent.
+// A worker's combining thread, for each pixel that is not empty (CombiningCosts), if images travel in messages.
 //   simulation_bench CASE  (laboratory/measure/combining_costs.h)
 namespace combining {
-inline constexpr double kScan = 0.2e-9, kLentScan = 0.03e-9;        // searched for runs, empty or not
-inline constexpr double kEncode = 1.5e-9;                           // copied into a message
-inline constexpr double kCombine = 1.5e-9, kLentCombine = 0.45e-9;  // onto what is there; from a message: checked, too
-inline constexpr double kLocal = 1e-9, kLentLocal = 0.45e-9;        // of one image of this worker onto another one
-inline constexpr double kHidden = 0.1e-9;                           // of the frame: searched for opaque tiles
+inline constexpr double kScan = 0.2e-9;     // searched for runs, empty or not
+inline constexpr double kEncode = 1.5e-9;   // copied into a message
+inline constexpr double kCombine = 1.5e-9;  // onto what is there, and checked
+inline constexpr double kLocal = 1e-9;      // of one image of this worker onto another one
+inline constexpr double kHidden = 0.1e-9;   // of the frame: searched for opaque tiles
 }  // namespace combining
 
 // Threads and processes of the service (MachineModel).
@@ -91,11 +82,9 @@ inline constexpr double kHidden = 0.1e-9;                           // of the fr
 namespace service {
 inline constexpr double kAwake = 25e-6, kAsleep = 60e-6, kDoze = 500e-6;   // WakeUps
 inline constexpr double kSerialShare = 0.02;                               // of rendering and making a picture
-inline constexpr double kMemorySlowdown = 0.03;                            // share of a host's speed, by each busy thread
 inline constexpr double kPlan = 200e-6, kMessage = 5e-6, kClient = 50e-6;  // of the coordinator
 inline constexpr double kCipherByte = 0.19e-9;  // of processor time at each end: 16 MiB sealed and opened in 6.2 ms (combining_bench)
 inline constexpr double kCurveByte = 1.2e-9;    // of processor time to encrypt and send, or receive and decrypt, a byte over CURVE
-inline constexpr double kLoopbackRate = 6e9;    // bytes a second between processes of a host: 16 MiB in 2.7 ms (combining_bench)
 inline constexpr double kVoxelRate = 5e8;       // bytes a second of voxels that reach a new owner: an order of magnitude
 }  // namespace service
 

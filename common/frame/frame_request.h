@@ -37,13 +37,13 @@ inline constexpr std::array<std::string_view, 5> kAxisChoiceNames = {"x", "y", "
 constexpr std::string_view NameOf(AxisChoice axis) { return kAxisChoiceNames.at(std::size_t(axis)); }
 
 struct Policy {
-  std::string decomposition = "slab";  // a name of Decompositions(), or "auto" (kAutomatic), like the other names
-  std::string balance_by = "auto";     // of BalanceByChoices(): what boxes have equal shares of
+  std::string decomposition = "kd-tree";  // a name of Decompositions()
+  std::string balance_by = "auto";        // of BalanceByChoices(): what boxes have equal shares of
   AxisChoice axis = AxisChoice::kAuto;
   int groups = 0;                     // [1, kMaxGroups]; 0: the planner chooses
-  std::string assignment = "cyclic";  // of Assignments(), or "auto": who owns which box
+  std::string assignment = "cyclic";  // of Assignments(): who owns which box
   std::string balance = "static";     // of Balances(): whether boxes change between frames
-  std::string combine = "fan-in";     // a scheme with its arguments (common/combining/schemes.h), or "auto"
+  std::string combine;                // a scheme with its arguments (common/combining/schemes.h); empty: StandardCombining
   // How much a channel of the picture may change because workers send colours in fewer bits: [0, kMaxPixelError]; 0: not at all.
   double pixel_error = 0;
   int teams = 1;  // [1, kMaxTeams]: render frames in turn (common/planning/team.h); 1: all workers share every frame

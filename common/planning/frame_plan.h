@@ -71,7 +71,7 @@ struct FramePlan {
   std::uint32_t slots = 1;               // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
   double pixel_error = 0;         // as in the policy
-  std::string combine;            // the combining scheme, as in the policy
+  std::string combine;            // the combining scheme, never empty
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one
   Turn turn;
@@ -98,8 +98,7 @@ Result<FrameSetup> MakeFrameSetup(const ResolvedRequest& request);
 // the roster has.
 Result<FramePlan> PlanFrame(FrameSetup setup, const ResolvedPolicy& policy, const Roster& roster, std::shared_ptr<const Layout> layout,
                             const Turn& turn = {}, const ClientTakes& client = {});
-// Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps; InvalidArgument also
-// for a policy that leaves a choice.
+// Resolves the request (ResolveRequest) and plans it with no knowledge but the volume's summary. Errors of all steps.
 Result<FramePlan> PlanFrame(const FrameRequest& request, DatasetId dataset, const VolumeSummary& summary, const Roster& roster,
                             std::int64_t box_bytes_target = kBoxBytesTarget);
 

@@ -53,13 +53,16 @@ struct LayoutRequest {
   std::span<const CoarserVolume> coarser = {};
   WorkKnowledge known;
   const Partition* resized = nullptr;  // partition to resize, of a layout by the same policy (DecompositionRequest); null: cut anew
-  std::stop_token stop = {};           // once it is told to stop, the layout comes soon, and is of no use but to be dropped
+  // Partition of the same volume by the same policy under another look; null: none. Boxes by bricks stay what they were there unless new
+  // ones are predicted to gain much, so that a change of the look moves few voxels.
+  const Partition* earlier = nullptr;
+  std::stop_token stop = {};  // once it is told to stop, the layout comes soon, and is of no use but to be dropped
 };
 
 // Pure. A box is assigned to no worker if neither it nor its halo contains a visible voxel; the others are numbered consecutively for their
-// assignment. If boxes are split by what is occupied, they are cut repeatedly by their analytic costs (AnalyticCost), as they would be by
-// measured costs (MeasuredCost). The result is the layout with the quickest frame, on average over views along x and along y and with the
-// renderer's default parameters: a layout stays for all views.
+// assignment. If boxes are split by what bricks show or by what is occupied, they are cut repeatedly by their analytic costs
+// (AnalyticCost), as they would be by measured costs (MeasuredCost). The result is the layout with the quickest frame, on average over
+// views along x and along y and with the renderer's default parameters: a layout stays for all views.
 Layout MakeLayout(const LayoutRequest& request);
 
 // Makes layouts by several policies; computes what they share once.

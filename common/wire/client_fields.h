@@ -41,16 +41,6 @@ void Fields(auto& io, Is<FrameProgress> auto& m) {
   io.Any(m.read_rate, &P::read_rate, &P::set_read_rate);
 }
 
-void Fields(auto& io, Is<FramePrediction> auto& m) {
-  using P = v1::FramePrediction;
-  constexpr double kMost = 1e9;  // of seconds, and of the imbalance
-  io.Between("render_seconds", m.render_seconds, &P::render_seconds, &P::set_render_seconds, 0, kMost);
-  io.Between("combine_seconds", m.combine_seconds, &P::combine_seconds, &P::set_combine_seconds, 0, kMost);
-  io.Between("finish_seconds", m.finish_seconds, &P::finish_seconds, &P::set_finish_seconds, 0, kMost);
-  io.Between("latency_seconds", m.latency_seconds, &P::latency_seconds, &P::set_latency_seconds, 0, kMost);
-  io.Between("imbalance", m.imbalance, &P::imbalance, &P::set_imbalance, 1, kMost);
-}
-
 void Fields(auto& io, Is<LevelUse> auto& m) {
   using P = v1::LevelUse;
   io.Range("level", m.level, &P::level, &P::set_level, 0, kMaxLevels - 1);
@@ -76,7 +66,6 @@ void Fields(auto& io, Is<FrameStatistics> auto& m) {
   io.Messages("reports", m.reports, &P::reports, &P::mutable_reports, kMaxReports);
   io.Any(m.display, &P::display, &P::set_display);
   io.Message("grid", m.grid, &P::grid, &P::mutable_grid);
-  io.Optional("predicted", m.predicted, &P::has_predicted, &P::predicted, &P::mutable_predicted);
   io.Messages("levels", m.levels, &P::levels, &P::mutable_levels, kMaxLevels);
   io.Text("lowered", m.lowered, &P::lowered, &P::mutable_lowered, 0, kMaxTextBytes);
   io.Optional("view", m.view, &P::has_view, &P::view, &P::mutable_view);

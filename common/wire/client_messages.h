@@ -33,7 +33,6 @@
 #include "common/base/web_traffic.h"
 #include "common/frame/frame_request.h"
 #include "common/keys/admitted_key.h"
-#include "common/stats/prediction.h"
 #include "common/view/picture_geometry.h"
 #include "common/wire/control_messages.h"
 #include "common/wire/ids.h"
@@ -87,7 +86,6 @@ struct FrameStatistics {
   std::vector<RankReport> reports;                                            // at most kMaxReports
   std::uint32_t display = 0;                                                  // worker
   PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                                   // if the policy left a choice
   std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
   std::string lowered;                 // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
   std::optional<ViewParameters> view;  // that the picture was made by, complete (ChooseView); final pictures have it

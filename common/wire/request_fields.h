@@ -211,7 +211,7 @@ void Fields(auto& io, Is<Policy> auto& m) {
   io.Text("balance", m.balance, &P::balance, &P::mutable_balance, 1, kMaxNameBytes);
   io.Range("groups", m.groups, &P::groups, &P::set_groups, 0, kMaxGroups);
   io.Range("teams", m.teams, &P::teams, &P::set_teams, 1, kMaxTeams);
-  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 1, kMaxNameBytes);
+  io.Text("combine", m.combine, &P::combine, &P::mutable_combine, 0, kMaxNameBytes);
   io.Finite("pixel_error", m.pixel_error, &P::pixel_error, &P::set_pixel_error);
 }
 

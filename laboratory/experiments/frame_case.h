@@ -60,17 +60,13 @@ Json ServiceKey(ExperimentContext& context, const FrameCase& frame, int frames);
 Trial ValidationTrial(ExperimentContext& context, const FrameCase& frame, int turns);
 Json ValidationKey(ExperimentContext& context, const FrameCase& frame, int turns);
 
-// The frame's request for its volume. Errors of Validate and ResolveRequest.
+// The frame's request for its volume (ResolveCompared). Errors of Validate and ResolveRequest.
 ResolvedRequest Resolve(ExperimentContext& context, const FrameCase& frame);
 
-// The service's plan for its first frame. Errors of Resolve, MakeFrameSetup and PlanFrame. The policy leaves no choice.
+// The service's plan for its first frame. Errors of Resolve, MakeFrameSetup and PlanFrame.
 FramePlan PlanOf(ExperimentContext& context, const FrameCase& frame);
 // The plan of the next frame with the next of these layouts.
 FramePlan NextPlan(ExperimentContext& context, const FrameCase& frame, MeasuredLayouts& layouts);
-
-// The same frame with a resolved policy: the one that a coordinator of as many workers, one on each host, joined by `link`, would choose
-// before it has seen a frame. Errors of Resolve and MakeFrameSetup.
-FrameCase WithChosenPolicy(ExperimentContext& context, FrameCase frame, const LinkModel& link);
 
 // A planned frame with the measured costs of its boxes: medians over repeats.
 struct MeasuredFrame {

@@ -35,11 +35,10 @@ std::vector<SweepCase> CasesOf(ExperimentContext& context, const Sweep& sweep) {
         c.team = asked.frame;
         c.team.workers = p / c.teams;
         c.team.policy.teams = 1;
-        c.team = WithChosenPolicy(context, std::move(c.team), link.link);
         c.frame = c.team;
         c.frame.workers = p;
         c.frame.policy.teams = asked.frame.policy.teams;
-        // The service has no link to vary: it follows the choice for the first one.
+        // The service has no link to vary.
         c.served = p <= kMeasuredWorkers && link.name == sweep.links.front().name;
         c.columns = ColumnsOf(c.frame);
         c.columns.update(asked.names);

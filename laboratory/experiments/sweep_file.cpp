@@ -168,7 +168,8 @@ void CheckNamesDiffer(const std::vector<T>& entries, const char* list, std::opti
 
 std::string Describe(const Policy& policy) {
   std::string text = fmt::format("{} by {}, {}, {}, {} groups, {}", policy.decomposition, BalanceByOf(policy), policy.assignment,
-                                 policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups), policy.combine);
+                                 policy.balance, policy.groups == 0 ? kAutomatic : std::to_string(policy.groups),
+                                 policy.combine.empty() ? "combined as the service does" : policy.combine);
   if (policy.axis != AxisChoice::kAuto) text += fmt::format(", axis {}", NameOf(policy.axis));
   if (policy.teams > 1) text += fmt::format(", {} teams", policy.teams);
   if (policy.pixel_error > 0) text += fmt::format(", error {}", policy.pixel_error);

@@ -64,6 +64,7 @@ inline SubmitFrame Frame(RequestId request, int groups = 1, const std::string& d
   submit.frame.dataset = dataset;
   submit.frame.size = {64, 64};
   submit.frame.transfer.choice = TransferFunction{.colors = {{0, {1, 1, 1}}}, .opacities = {{0, 0.5}}};
+  submit.frame.policy.decomposition = "slab";
   submit.frame.policy.axis = AxisChoice::kZ;
   submit.frame.policy.groups = groups;
   return submit;
@@ -228,7 +229,6 @@ class CoordinatorScript {
     const PlanRequest request = std::move(plans.front());
     plans.erase(plans.begin());
     const auto planned = planner.Plan(request);
-    planner.Choose(request.client, {});
     return Step(Planned{request.plan, planned});
   }
   Actions Worker(const FakeWorker& from, WorkerToCoordinator message, Bytes payload = {}) {

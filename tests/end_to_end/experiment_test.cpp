@@ -67,7 +67,7 @@ TEST_F(ExperimentTest, SweepOfAUsersOwn) {
   const std::string ball = MakeSphere("ball.nrrd", 2, 24);
   std::ofstream(Path("sweep.json")) << R"({"volumes": [{"file": "ball.nrrd", "transfer": "opaque"}], "size": 48,
     "policies": [{}, {"decomposition": "kd-tree", "combine": "radix-k"},
-                 {"name": "open", "decomposition": "auto", "balance_by": "auto", "assignment": "auto", "combine": "auto"}], "workers": [1, 3]})";
+                 {"name": "paper", "decomposition": "slab", "combine": "fan-in"}], "workers": [1, 3]})";
   MustRun({"experiment", "sweep", "sweep.json", "-o", "out", "--repeats", "2"});
   ExpectResults("out", "sweep");
   ExpectPage("out");

@@ -35,6 +35,7 @@ inline FrameRequest TestRequest(const RendererKind* renderer, double azimuth_deg
   request.transfer.choice = TransferFunction{.colors = {{0, {0.2F, 0.4F, 1}}, {255, {1, 0.7F, 0.3F}}},
                                              .opacities = {{0, 0, 0.5, 0}, {100, 0, 0.5, 0}, {255, 0.2, 0.5, 0}},
                                              .opacity_distance = 1};
+  request.policy.decomposition = "slab";
   request.policy.groups = groups;
   return request;
 }

@@ -49,22 +49,6 @@ std::vector<FrameRecord> TwoFrames() {
   return frames;
 }
 
-TEST(StatsJsonTest, SetsWhatHappenedBesideWhatWasPredicted) {
-  std::vector<FrameRecord> frames = TwoFrames();
-  frames[1].statistics.predicted =
-      FramePrediction{.render_seconds = 0.004, .combine_seconds = 0.001, .finish_seconds = 0, .latency_seconds = 0.05, .imbalance = 1};
-  const json stats = json::parse(StatsJson(FrameOptions(), frames));
-  EXPECT_FALSE(stats["frames"][0].contains("predicted")) << "its policy left no choice";
-  const json& frame = stats["frames"][1];
-  EXPECT_EQ(frame["predicted"]["render_ms"], 4.0);
-  EXPECT_EQ(frame["happened"]["render_ms"], 8.0);
-  EXPECT_EQ(frame["prediction_error"]["render_ms"], -0.5);
-  EXPECT_EQ(frame["happened"]["latency_ms"], 40.0);
-  EXPECT_EQ(frame["prediction_error"]["latency_ms"], 0.25);
-  EXPECT_EQ(frame["prediction_error"]["imbalance"], 0.0);
-  EXPECT_FALSE(frame["prediction_error"].contains("finish_ms")) << "nothing happened that it could be a share of";
-}
-
 TEST(StatsJsonTest, HasThePromisedFields) {
   const FrameOptions options;
   const json stats = json::parse(StatsJson(options, TwoFrames()));

@@ -94,7 +94,7 @@ const std::vector<std::vector<std::string>> kOptions = {
     {"--background", "0.2,0.4,0.6"},
     {"--background", "0,0,0,0.1", "--depth", "16"},
     {"--termination", "0"},
-    {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "auto", "--balance", "dynamic"},
+    {"--decomposition", "kd-tree", "--axis", "view", "--balance-by", "cost", "--assignment", "greedy", "--balance", "dynamic"},
     {"--groups", "3", "--teams", "2", "--combine", "radix-k:2x2", "--pixel-error", "1e-4"},
     {"--scale-bar", "--orientation-marker", "--title", "It's \"B\xC3\xBCro\" \xE2\x86\x92 $x"},
     {"--title=-x"},

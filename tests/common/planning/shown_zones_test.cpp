@@ -84,11 +84,11 @@ TEST(ShownZones, BoxesOfATerabyteAreThoseOfThePicture) {
     const Roster roster = FullRoster(2);
     const auto layout = std::make_shared<const Layout>(MakeLayout({.summary = &summary,
                                                                    .volume = &resolved.volume,
-                                                                   .policy = &*resolved.policy,
+                                                                   .policy = &resolved.policy,
                                                                    .slots = 2,
                                                                    .box_bytes_target = kTarget,
                                                                    .map = map.get()}));
-    const FramePlan plan = PlanFrame(setup, *resolved.policy, roster, layout).value();
+    const FramePlan plan = PlanFrame(setup, resolved.policy, roster, layout).value();
     ExpectSound(plan, roster);
     std::int64_t voxels = 0;
     for (const Placement& placement : PlacementsOf(plan)) {

@@ -51,11 +51,11 @@ TEST(SweepFile, ReadsWhatItSays) {
   EXPECT_DOUBLE_EQ(sweep->links[1].link.latency_seconds, 30e-6);
 }
 
-TEST(SweepFile, LeavesNamesOpen) {
+TEST(SweepFile, LeavesTheSchemeAndTheGroupsToTheService) {
   const Result<Sweep> sweep = ParseSweep("s.json", R"({"volumes": [{"sphere": {}}], "workers": [2],
-    "policies": [{"decomposition": "auto", "balance_by": "auto", "assignment": "auto", "groups": "auto", "combine": "auto"}]})");
+    "policies": [{"groups": "auto"}]})");
   ASSERT_TRUE(sweep.ok()) << sweep.status().message();
-  EXPECT_EQ(sweep->policies[0].name, "auto by auto, auto, static, auto groups, auto");
+  EXPECT_EQ(sweep->policies[0].name, "kd-tree by bricks, cyclic, static, auto groups, combined as the service does");
   EXPECT_EQ(sweep->policies[0].policy.groups, 0);
 }
 
