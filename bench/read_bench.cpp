@@ -10,7 +10,6 @@
 
 #include "common/base/aligned_buffer.h"
 #include "common/volume/box.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 
 namespace slabstream {

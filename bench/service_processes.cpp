@@ -7,7 +7,7 @@
 #include "common/base/check.h"
 #include "common/base/program_beside.h"
 #include "common/volume/sphere.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {

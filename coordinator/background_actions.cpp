@@ -198,7 +198,7 @@ Result<BackgroundActions::News> BackgroundActions::LoadLevel(const LoadDataset& 
   VolumeSummary summary;
   if (with_coarser <= most && CheckFitsMemory(std::int64_t(bytes), action.name).ok()) {
     ReadProgress progress(tell);
-    const Result<LevelInMemory> level = ReadLevel(*at.source, at.stored.level, &progress);
+    const Result<LevelInMemory> level = at.source->ReadLevel(at.stored.level, &progress);
     // If its files have changed, the look that requests wait for sees that, and everything is opened anew.
     const Result<bool> changed = level.ok() || at.stamp == nullptr ? Result<bool>(false) : HaveChanged(*at.stamp);
     if (!level.ok() && (!changed.ok() || !*changed)) return level.status();

@@ -20,9 +20,10 @@
 #include "common/wire/limits.h"
 #include "coordinator/client_file.h"
 #include "data/brick_store/brick_store.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
+#include "data/open/read_volume.h"
 #include "data/open/source_name.h"
+#include "data/open/unchanged_source.h"
 #include "data/volume_io/exact_samples.h"
 #include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
@@ -59,9 +60,9 @@ bool HasFiles(const std::string& folder) {
 // Whether the folder is a volume, and nothing in it is one of another format. One of nothing but folders, such as those of DICOM studies,
 // holds a volume in each.
 bool IsOneVolume(const std::string& folder, const std::vector<fs::path>& volumes) {
-  const VolumeFormat* const format = FindFormat(folder, {});
-  return format != nullptr && LooksLikeAnyVolume(folder) && HasFiles(folder) &&
-         std::ranges::all_of(volumes, [&](const fs::path& path) { return FindFormat(path.string(), {}) == format; });
+  const VolumeFormat* const format = FindFormat(folder);
+  return format != nullptr && HasFiles(folder) &&
+         std::ranges::all_of(volumes, [&](const fs::path& path) { return FindFormat(path.string()) == format; });
 }
 
 Status Repeated(const std::string& name) { return Status::InvalidArgument("there is already a dataset named \"" + name + "\""); }
@@ -89,7 +90,7 @@ Result<std::vector<fs::path>> VolumeFilesIn(const std::string& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const fs::path& path = entry->path();
     if (IsHidden(path) || IsPicture(path.string())) continue;  // pictures lie about for other reasons
-    if (LooksLikeAnyVolume(path.string())) files.push_back(path);
+    if (LooksLikeVolume(path.string())) files.push_back(path);
   }
   if (error) {
     const bool missing = error == std::errc::no_such_file_or_directory || error == std::errc::not_a_directory;
@@ -125,7 +126,8 @@ Status AddNamed(FoundData& found, const DataArgument& argument) {
 // it is one volume as long as nothing else lies in it.
 bool IsWatched(const std::string& path) {
   if (!IsFolder(path)) return false;
-  return FindFormat(path, {}) != nullptr || !LooksLikeAnyVolume(path);
+  const VolumeFormat* const format = FindFormat(path);
+  return format == nullptr || format->markers.empty();
 }
 
 // As the name of a dataset, or of several times.
@@ -159,17 +161,13 @@ void LeaveOutMost(FoundData& found) {
   found.complaints.push_back(fmt::format("{} volumes of folders are left out: the catalogue has at most {}", left_out, kMaxListed));
 }
 
-// The files of a source, by its headers.
-Result<std::vector<std::string>> FilesOf(const DataSource& data) {
+// By its headers.
+Status CheckHeaders(const DataSource& data) {
   Result<SourceText> source = ParseSourceText(data.path);
   if (!source.ok()) return source.status();
   source->options.describe = true;
-  Result<std::vector<std::string>> files = CheckAnyVolumeHeaders(source->path, source->options);
-  if (!files.ok() || !data.layers.any()) return files;
-  const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
-  if (!of_layers.ok()) return of_layers.status();
-  files->insert(files->end(), of_layers->begin(), of_layers->end());
-  return files;
+  if (const auto files = CheckVolumeHeaders(source->path, source->options); !files.ok()) return files.status();
+  return CheckLayerHeaders(data.layers).status();
 }
 
 // Moves ",labels=..." and ",overlay=..." from the end of a named path to `layers`.
@@ -226,6 +224,7 @@ void AwaitRest(const FileStamp& stamp) {
 
 // How a source is read: what of it may change, and the reading.
 struct WayToRead {
+  std::shared_ptr<VolumeSource> source;
   std::vector<std::string> files;
   std::function<Result<ReadableSource>()> read;
 };
@@ -244,16 +243,13 @@ Result<ReadableSource> Surveyed(std::shared_ptr<VolumeSource> source, std::strin
 }
 
 // The voxels, those of layers too.
-Result<ReadableSource> Shown(Result<LoadedVolume> read, const SourceText& text, const LayerFiles& layers) {
+Result<ReadableSource> ReadWhole(VolumeSource& source, const SourceText& text, const LayerFiles& layers) {
+  Result<LoadedVolume> read = ReadVolume(source, text.path, text.options);
   if (!read.ok()) return read.status();
-  PrepareToShow(text.path, *read);
-  Result<Layers> with = ReadLayers(layers, read->volume->description.geometry);
+  if (!read->rounding.empty()) LogWarning(text.path + ": " + read->rounding);
+  Result<Layers> with = ReadLayers(layers, read->info.finest().geometry);
   if (!with.ok()) return with.status();
   return ReadableSource(LoadedSource{std::move(read->info), std::move(read->volume), *std::move(with), nullptr, std::move(read->exact)});
-}
-
-Result<ReadableSource> ReadWhole(const SourceText& text, const LayerFiles& layers) {
-  return Shown(ReadAnyVolume(text.path, text.options), text, layers);
 }
 
 // Other processes may run in other folders.
@@ -261,34 +257,15 @@ std::string PlaceOf(const DataSource& data, const SourceText& text) {
   return IsUrl(text.path) ? data.path : fs::absolute(text.path).string() + text.options_text;
 }
 
-// Of a source that its format can read in parts.
-WayToRead WayOf(const std::shared_ptr<VolumeSource>& source, const DataSource& data, const SourceText& text, bool in_parts) {
-  ReadProgress* const progress = text.options.progress;
-  WayToRead way{source->info().files, {}};
-  if (in_parts) {
-    way.read = [source, source_text = data.path, place = PlaceOf(data, text), text, progress] {
-      WarnOfPart(text.path, text.options, FileInfoOf(source->info()));
-      return Surveyed(source, place, FindIndex(source_text, source->info()), *progress);
-    };
-  } else if (IsReadWhole(text.path, text.options)) {
-    way.read = [text] { return ReadWhole(text, {}); };
-  } else {
-    way.read = [source, text] { return Shown(ReadFinest(*source, text.path, text.options), text, {}); };
-  }
-  return way;
-}
-
-// Of a stream that is larger than what may be held.
-WayToRead WayOfStream(SourceInfo info, const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
+// Of a stream, or samples in several files, larger than what may be held.
+Result<ReadableSource> ReadStream(const std::string& source, std::uint64_t most_bytes, ReadProgress& progress) {
   constexpr std::uint64_t kLeastMemory = std::uint64_t{64} << 20, kMostMemory = std::uint64_t{1} << 30;
-  const std::uint64_t memory = std::clamp(most_bytes, kLeastMemory, kMostMemory);
-  return {std::move(info.files), [source = data.path, memory, &progress]() -> Result<ReadableSource> {
-            const Result<StoreFolder> stores = StoreFolder::Usual();
-            if (!stores.ok()) return stores.status();
-            Result<StoredStream> stored = OpenStored(source, *stores, ProcessReadContext(), {.memory = memory}, &progress);
-            if (!stored.ok()) return stored.status();
-            return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress);
-          }};
+  const Result<StoreFolder> stores = StoreFolder::Usual();
+  if (!stores.ok()) return stores.status();
+  Result<StoredStream> stored =
+      OpenStored(source, *stores, ProcessReadContext(), {.memory = std::clamp(most_bytes, kLeastMemory, kMostMemory)}, &progress);
+  if (!stored.ok()) return stored.status();
+  return Surveyed(std::move(stored->source), std::move(stored->path), nullptr, progress);
 }
 
 Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, ReadProgress& progress) {
@@ -296,21 +273,27 @@ Result<WayToRead> FindWay(const DataSource& data, std::uint64_t most_bytes, Read
   if (!text.ok()) return text.status();
   text->options.progress = &progress;
   text->options.describe = true;
-  if (!data.layers.any()) {
-    const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
-    const auto is_large = [&](const SourceInfo& info) { return info.levels.front().description.voxel_bytes() > most; };
-    if (IsReadInParts(text->path, text->options)) {
-      const Result<std::shared_ptr<VolumeSource>> source = OpenSource(text->path, text->options, ProcessReadContext());
-      if (!source.ok()) return source.status();
-      return WayOf(*source, data, *text, (*source)->info().levels.size() > 1 || is_large((*source)->info()));
-    }
-    Result<std::optional<SourceInfo>> stream = DescribeStream(text->path, text->options);
-    if (!stream.ok()) return stream.status();
-    if (*stream && is_large(**stream)) return WayOfStream(**std::move(stream), data, most_bytes, progress);
+  const Result<std::shared_ptr<VolumeSource>> opened = OpenSource(text->path, text->options, ProcessReadContext());
+  if (!opened.ok()) return opened.status();
+  const std::shared_ptr<VolumeSource>& source = *opened;
+  const SourceInfo& info = source->info();
+  WayToRead way{source, info.files, {}};
+  const auto most = std::int64_t(std::min<std::uint64_t>(most_bytes, kExactBytes));
+  const bool is_large = info.levels.size() > 1 || info.finest().voxel_bytes() > most;
+  if (info.whole || !is_large || data.layers.any()) {
+    const Result<std::vector<std::string>> of_layers = CheckLayerHeaders(data.layers);
+    if (!of_layers.ok()) return of_layers.status();
+    way.files.insert(way.files.end(), of_layers->begin(), of_layers->end());
+    way.read = [source, text = *std::move(text), layers = data.layers] { return ReadWhole(*source, text, layers); };
+  } else if (info.slices) {
+    way.read = [path = data.path, most_bytes, &progress] { return ReadStream(path, most_bytes, progress); };
+  } else {
+    way.read = [source, source_text = data.path, place = PlaceOf(data, *text), text = *text, &progress] {
+      WarnOfPart(text.path, text.options, source->info());
+      return Surveyed(source, place, FindIndex(source_text, source->info()), progress);
+    };
   }
-  Result<std::vector<std::string>> files = FilesOf(data);
-  if (!files.ok()) return files.status();
-  return WayToRead{*std::move(files), [text = *std::move(text), layers = data.layers] { return ReadWhole(text, layers); }};
+  return way;
 }
 
 // Of all that was read. A source may have more files than its volume, which come with it.
@@ -410,7 +393,7 @@ void CheckFiles(FoundData& found) {
   std::string_view refused;  // the name of which a time was refused; one error is enough
   for (const auto& [name, source] : found.datasets) {
     if (NameWithoutTime(name) == refused) continue;
-    const Status readable = source.load ? Status::Ok() : FilesOf(source).status();
+    const Status readable = source.load ? Status::Ok() : CheckHeaders(source);
     if (readable.ok()) continue;
     if (source.folder.empty()) {
       refused = NameWithoutTime(name);
@@ -426,9 +409,6 @@ void CheckFiles(FoundData& found) {
 Result<IndexFile> IndexFileOf(const std::string& source) {
   const Result<SourceText> parsed = ParseSourceText(source);
   if (!parsed.ok()) return parsed.status();
-  if (!IsReadInParts(parsed->path, parsed->options)) {
-    return Status::InvalidArgument(source + ": its format cannot be read in parts, so it has no index");
-  }
   return IndexFile::Of(parsed->path, parsed->options_text);
 }
 
@@ -447,6 +427,9 @@ Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_b
     const Result<FileStamp> before = StampFiles(way->files);
     if (!before.ok()) return before.status();
     AwaitRest(*before);
+    const SourceInfo& opened = way->source->info();
+    const Result<std::uint64_t> version = VersionOf(opened.files);
+    if (!opened.files.empty() && (!version.ok() || *version != opened.version)) continue;  // they have changed since it was opened
     Result<ReadableSource> read = way->read();
     Result<std::shared_ptr<const FileStamp>> stamp = std::shared_ptr<const FileStamp>();
     if (read.ok()) stamp = StampOf(*read, *before);

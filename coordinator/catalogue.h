@@ -23,10 +23,10 @@
 
 #include "common/base/status.h"
 #include "coordinator/data_source.h"
+#include "data/sources/volume_source.h"
 #include "data/survey/index_file.h"
 #include "data/survey/survey.h"
 #include "data/volume_io/read_progress.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 
@@ -78,7 +78,7 @@ struct OpenedSource {
 
 // A volume that was read as a whole.
 struct LoadedSource {
-  VolumeFileInfo file;  // of its paths; nothing if a function has loaded it
+  SourceInfo file;  // its finest level is the volume; nothing if a function has loaded it
   std::shared_ptr<const Volume> volume;
   Layers layers;
   std::shared_ptr<const FileStamp> stamp;          // of its files as they were read; null: they never change
@@ -95,7 +95,7 @@ using ReadableSource = std::variant<OpenedSource, LoadedSource>;
 // Unavailable: they change again.
 Result<ReadableSource> ReadSource(const DataSource& source, std::uint64_t most_bytes, const TellRead& tell = {});
 
-// Where the index of a source is kept. Errors: of ParseSourceText and IndexFile::Of; InvalidArgument: its format cannot be read in parts.
+// Where the index of a source that is read in parts is kept. Errors: of ParseSourceText and IndexFile::Of.
 Result<IndexFile> IndexFileOf(const std::string& source);
 
 }  // namespace slabstream

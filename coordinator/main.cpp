@@ -17,8 +17,8 @@
 #include "common/volume/memory_budget.h"
 #include "coordinator/catalogue.h"
 #include "coordinator/service.h"
-#include "data/open/any_volume.h"
 #include "data/open/cache_option.h"
+#include "data/open/open_source.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 

@@ -13,7 +13,7 @@
 #include "common/base/guarded.h"
 #include "common/base/log.h"
 #include "common/base/url.h"
-#include "data/open/same_source.h"
+#include "data/open/open_source.h"
 #include "data/stores/http_transfers.h"
 #include "data/stores/object_cache.h"
 #include "data/volume_io/read_options.h"

@@ -14,8 +14,7 @@
 #include "common/base/background_tasks.h"
 #include "common/base/guarded.h"
 #include "common/base/log.h"
-#include "data/open/any_volume.h"
-#include "data/open/same_source.h"
+#include "data/open/open_source.h"
 
 namespace slabstream {
 namespace {

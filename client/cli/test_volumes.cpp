@@ -5,7 +5,7 @@
 
 #include "client/cli/commands.h"
 #include "common/base/files.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {

@@ -11,8 +11,8 @@
 #include "client/request/shell_word.h"
 #include "common/base/version.h"
 #include "common/wire/request_json.h"
+#include "data/volume_io/formats.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/volume_reader.h"
 
 namespace slabstream {
 namespace {
@@ -132,7 +132,7 @@ void ReadLayerFiles(const JsonValue& value, LayerFiles& files) {
 
 // Names of catalogues have no slashes, and hardly ever the ending of a volume file.
 bool IsFile(const std::string& source) {
-  return source.find('/') != std::string::npos || LooksLikeVolume(source.substr(0, source.find('?')));
+  return source.find('/') != std::string::npos || LooksLikeVolumeFile(source.substr(0, source.find('?')));
 }
 
 bool IsPlain(std::string_view word) {

@@ -231,11 +231,7 @@ Status Container::AddLevel(Pyramid& pyramid, const Node& node, const Node& group
   if (!kinds.ok()) return kinds.status();
   const Result<AxisChoice> choice = ChooseAxes(NameOf(node.path), *kinds, size, options);
   if (!choice.ok()) return choice.status();
-  const auto time = std::ranges::find(*kinds, AxisKind::kTime);
-  pyramid.info.times = choice->times;
-  pyramid.info.time = time == kinds->end() ? 0 : int(choice->at[std::size_t(time - kinds->begin())]);
-  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
-  pyramid.info.channel = choice->channel;
+  choice->Describe(pyramid.info);
   pyramid.levels.push_back({.array = *array, .axes = choice->axes, .at = choice->at});
   return Status::Ok();
 }

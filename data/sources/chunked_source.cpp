@@ -429,7 +429,6 @@ Result<std::shared_ptr<VolumeSource>> MakeChunkedSource(const std::string& name,
   SourceInfo info = std::move(pyramid.info);
   if (info.file_type.empty()) info.file_type = ToString(type);
   info.exact = {type, pyramid.rescale};
-  if (MayBeRounded(type)) info.notes.push_back(RoundingText(type));
   info.levels.clear();
   std::vector<std::shared_ptr<Level>> levels;
   const auto findings = std::make_shared<Findings>();

@@ -47,4 +47,6 @@ class ReadContext {
   const std::shared_ptr<State> state_;
 };
 
+using SourceContext = std::shared_ptr<ReadContext>;
+
 }  // namespace slabstream

@@ -38,17 +38,4 @@ struct Survey {
 // `progress`, if any, counts what is read, on this thread. Errors of VolumeSource::Read.
 Result<Survey> SurveySource(VolumeSource& source, const SurveyBytes& most = {}, ReadProgress* progress = nullptr);
 
-// A whole level in memory.
-struct LevelInMemory {
-  std::shared_ptr<const Volume> volume;
-  std::shared_ptr<const ExactSamples> exact;
-};
-enum class ExactWanted {
-  kLabels,  // whole numbers, if float32 rounds one of them
-  kAll      // all whose type is one that float32 may round
-};
-// ResourceExhausted: it does not fit; errors of VolumeSource::Read.
-Result<LevelInMemory> ReadLevel(VolumeSource& source, int level, ReadProgress* progress = nullptr,
-                                ExactWanted wanted = ExactWanted::kLabels);
-
 }  // namespace slabstream

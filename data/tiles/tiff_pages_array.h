@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 #include "data/volume_io/tiff_file.h"
 
 namespace slabstream {

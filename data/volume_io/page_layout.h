@@ -33,7 +33,7 @@ struct PageLayout {
   std::optional<LengthUnit> unit = {};               // of the spacing
   ValueMapping rescale = {};                         // from samples to data values
   std::optional<ValueRange> window = {};             // data values that its author shows
-  std::vector<std::string> notes = {};               // as of VolumeFileInfo
+  std::vector<std::string> notes = {};               // as of SourceInfo
 
   // The number of a plane in `order`.
   std::int64_t NumberOf(std::int64_t slice, std::int64_t channel, std::int64_t time) const;

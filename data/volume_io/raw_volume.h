@@ -45,7 +45,7 @@ struct RawHeader {
   // Of an image: names of its channels, and which of them this is; empty: there is one channel.
   std::vector<std::string> channels = {};
   int channel = 0;
-  std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: VolumeFileInfo
+  std::vector<std::string> notes = {};  // a sentence each of what the reader chose where the file leaves it open: SourceInfo
 
   // Of all components.
   std::int64_t sample_bytes() const {
@@ -69,6 +69,7 @@ struct RawVolume {
   RawHeader header;
   AlignedVector<std::byte> bytes;     // this machine's byte order; none if only headers were read
   std::shared_ptr<const Mesh> cells;  // of an unstructured grid, in data space of the volume, which is not turned or straightened
+  bool size_unknown = false;          // headers alone do not tell it
   std::vector<std::filesystem::path> other_files;  // beside the path that is read, or the folder of many
 };
 

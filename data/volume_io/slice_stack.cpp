@@ -60,7 +60,7 @@ bool IsPicture(const std::string& path) {
 
 bool HasVolumeFiles(const std::string& folder) {
   std::vector<std::string_view> of_volumes;
-  for (const VolumeFormat& format : VolumeFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
+  for (const VolumeFormat& format : FileFormats()) of_volumes.insert(of_volumes.end(), format.endings.begin(), format.endings.end());
   return !SlicesIn(folder, of_volumes).empty();
 }
 

@@ -68,7 +68,7 @@ struct TextFormat {
   Result<TextPayload> (*read_payload)(const TextHeader& text);
 };
 
-// Skips lines of the header that begin with # and lines without the separator. Errors as in volume_reader.h.
+// Skips lines of the header that begin with # and lines without the separator. Errors as of VolumeFormat::locate.
 Result<LocatedSamples> LocateInTextVolume(const std::string& path, const TextFormat& format, const ReadOptions& options);
 
 std::string ToLower(std::string text);

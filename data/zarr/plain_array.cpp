@@ -167,9 +167,8 @@ Result<Pyramid> PyramidOfArray(const ArrayContext& context, const ZarrNode& node
   const Result<AxisChoice> choice = ChooseAxes(name, *kinds, sizes, options);
   if (!choice.ok()) return choice.status();
   Pyramid pyramid;
-  pyramid.info = {.format = fmt::format("Zarr {}", node.version), .times = choice->times, .time = choice->time};
-  if (choice->channels > 1) pyramid.info.channels.resize(std::size_t(choice->channels));
-  pyramid.info.channel = choice->channel;
+  pyramid.info.format = fmt::format("Zarr {}", node.version);
+  choice->Describe(pyramid.info);
   NoteAxes(*names, *kinds, pyramid.info);
   if (Status status = UnpackValues(node, *array, pyramid); !status.ok()) return status;
   pyramid.levels.push_back(LevelOf(*array, *choice));

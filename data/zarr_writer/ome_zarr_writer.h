@@ -26,12 +26,6 @@ struct OmeZarrProgress {
   int level = 0;                                // of the region that was finished last
 };
 
-// A source that is read once, slice by slice.
-struct SliceOrder {
-  Axis along = Axis::kZ;  // the slices lie one after the other along it
-  bool from_end = false;  // the last one comes first
-};
-
 struct OmeZarrOptions {
   OmeZarrVersion version = OmeZarrVersion::k05;
   std::int32_t chunk_side = 64;   // voxels, [8, 512]

@@ -6,7 +6,7 @@
 #include "common/base/files.h"
 #include "common/mesh/lattice.h"
 #include "data/volume_io/read_options.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 
 namespace slabstream {
 namespace {

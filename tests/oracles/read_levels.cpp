@@ -17,7 +17,6 @@
 
 #include "common/volume/box.h"
 #include "common/volume/volume.h"
-#include "data/open/any_volume.h"
 #include "data/open/open_source.h"
 
 namespace slabstream {

@@ -25,7 +25,7 @@
 #include "coordinator/folder_memory.h"
 #include "coordinator/peer_table.h"
 #include "coordinator/voxel_server.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/common/mesh/mesh_samples.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"

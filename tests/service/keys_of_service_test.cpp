@@ -13,7 +13,7 @@
 #include "common/service/service_file.h"
 #include "common/wire/any_message.h"
 #include "coordinator/service.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "tests/service/pictures.h"
 #include "tests/support/renderers.h"
 #include "tests/support/temporary_directory.h"

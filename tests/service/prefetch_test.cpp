@@ -8,9 +8,9 @@
 #include <thread>
 
 #include "client/embedded/embedded_service.h"
-#include "data/sources/memory_source.h"
 #include "data/stores/object_cache.h"
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/data/stores/scripted_server.h"
 #include "tests/service/pictures.h"
 #include "tests/support/temporary_directory.h"

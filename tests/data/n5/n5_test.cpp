@@ -255,7 +255,7 @@ TEST_F(N5Test, GroupsOfLevels) {
   ExpectRefused({.array = "../other"}, "");
   WriteDataset(root_ + "/more", {.size = {4, 4, 2}, .block = {4, 4, 4}}, random);
   ExpectRefused({}, "scan.n5: holds 2 volumes, of which ?array= takes one: more, raw");
-  ExpectRefused({.dataset = "/raw"}, "takes no option dataset");
+  ExpectRefused({.dataset = "/raw"}, "dataset is no option of N5");
 }
 
 // COSEM's lists are in the order of `axes`, whatever that is.

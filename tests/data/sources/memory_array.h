@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "data/sources/chunked_array.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
 
 namespace slabstream {
 

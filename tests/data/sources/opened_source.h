@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "common/base/check.h"
-#include "data/sources/source_format.h"
+#include "data/sources/read_context.h"
+#include "data/sources/volume_source.h"
 
 namespace slabstream {
 

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "data/open/open_source.h"
+#include "data/volume_io/formats.h"
 #include "tests/data/stores/zip_files.h"
 #include "tests/data/volume_io/volume_files.h"
 #include "tests/data/zarr/read_zarr.h"
@@ -133,7 +134,7 @@ TEST(ZarrSourceTest, ImagesShowTheTimeAndChannelThatAreAskedForInAnyOrderOfAxes)
   EXPECT_THAT(OpenText(folder / "czyx3.ome.zarr?channel=3").status().message(), HasSubstr("has 3 channels, so channel must be 0 to 2"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?channel=luminance").status().message(), HasSubstr("has 1 channel, so channel must be 0"));
   EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?spacing=1,1,1").status().message(), HasSubstr("states its spacing"));
-  EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("Zarr takes no option lattice"));
+  EXPECT_THAT(OpenText(folder / "zyx3.ome.zarr?lattice=64").status().message(), HasSubstr("lattice is no option of Zarr"));
 }
 
 TEST(ZarrSourceTest, LevelsLieWhereTheyWereMadeOf) {
@@ -428,16 +429,16 @@ TEST(ZarrSourceTest, KnowsItsFolders) {
   const TemporaryDirectory folder;
   std::filesystem::create_directories(folder / "plain/sub");
   WriteImage(folder / "plain/sub", "zyx", 3);
-  EXPECT_EQ(FindSourceFormat(folder / "plain"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "plain"), nullptr);
   // Some writers leave out .zgroup.
   WriteImage(folder / "bare", "zyx", 2);
   std::filesystem::remove(folder / "bare/.zgroup");
   EXPECT_EQ(ValuesOf(**OpenText(folder / "bare")), Volume(0, 0));
-  ASSERT_NE(FindSourceFormat(folder / "plain/sub"), nullptr);
-  EXPECT_EQ(FindSourceFormat(folder / "plain/sub")->name, "Zarr");
+  ASSERT_NE(FindFormat(folder / "plain/sub"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "plain/sub")->name, "Zarr");
   EXPECT_EQ(OpenText(folder / "none.zarr").status().code(), StatusCode::kNotFound);
   WriteZip(folder / "other.zip", {{"readme", "text"}});
-  EXPECT_EQ(FindSourceFormat(folder / "other.zip"), nullptr);
+  EXPECT_EQ(FindFormat(folder / "other.zip"), nullptr);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // What is written is compared with the definition of each level, read back by the reader of Zarr, which shares no code with the writer.
 #include "data/zarr_writer/ome_zarr_writer.h"
+#include "data/open/open_source.h"
 
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
@@ -14,8 +15,7 @@
 #include <span>
 #include <sstream>
 
-#include "data/sources/memory_source.h"
-#include "data/zarr/zarr.h"
+#include "tests/data/sources/memory_source.h"
 #include "tests/support/full_disk.h"
 #include "tests/support/random.h"
 #include "tests/support/temporary_directory.h"
@@ -137,7 +137,7 @@ Values Coarser(const Values& fine, const Index3& step, bool labels, bool whole) 
 }
 
 void ExpectLevels(const Case& made, const std::string& folder) {
-  const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}));
+  const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 2}));
   ASSERT_TRUE(read.ok()) << read.status().message();
   const VolumeDescription& description = made.volume->description;
   const std::vector<WrittenLevel> plan = PlanLevels(description.geometry, made.options.coarsest_side > 0 ? made.options.coarsest_side : 8);
@@ -205,7 +205,7 @@ TEST(OmeZarrWriterTest, KeepsTheWorldAndTheMapping) {
       made.options = {.version = version, .chunk_side = 8, .shard_side = 16};
       const std::string folder = directory / (std::string(ToString(version)) + (turned ? "turned" : "straight"));
       ASSERT_TRUE(WriteOmeZarr(*made.source(), folder, made.options).ok());
-      const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1}));
+      const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1}));
       ASSERT_TRUE(read.ok()) << read.status().message();
       const SourceInfo& info = (*read)->info();
       EXPECT_EQ(info.levels[0].description, description);
@@ -236,7 +236,7 @@ TEST(OmeZarrWriterTest, LabelsOf64BitsAreExactAtEveryLevel) {
     const std::string folder = directory / std::string(ToString(version));
     const Status status = WriteOmeZarr(*made.source(), folder, made.options);
     ASSERT_TRUE(status.ok()) << status.message();
-    const auto read = Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).value();
+    const auto read = OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).value();
     EXPECT_EQ(read->info().exact.type, SampleType::kUint64);
     EXPECT_TRUE(read->info().labels);
     const auto level = [&](int number) {
@@ -264,7 +264,7 @@ TEST(OmeZarrWriterTest, WrongAttributesAreNamed) {
     nlohmann::json wrong = right;
     wrong[nlohmann::json::json_pointer("/attributes/slabstream" + field)] = value;
     std::ofstream(file) << wrong;
-    return Zarr().open(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
+    return OpenSource(folder, {}, std::make_shared<ReadContext>(ReadContext::Limits{.decode_threads = 1})).status();
   };
   EXPECT_THAT(refusal("/orientation/world", "moon").message(),
               HasSubstr("slabstream.orientation.world is \"moon\", must be voxels, scene or patient"));

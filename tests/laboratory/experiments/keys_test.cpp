@@ -12,7 +12,7 @@
 
 #include "common/decomposition/decomposition.h"
 #include "common/planning/assignment.h"
-#include "data/volume_io/volume_reader.h"
+#include "data/volume_io/volume_writer.h"
 #include "laboratory/experiments/balanced_case.h"
 #include "laboratory/experiments/frame_keys.h"
 #include "laboratory/experiments/request_json.h"

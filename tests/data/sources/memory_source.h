@@ -1,4 +1,4 @@
-// A volume that is in memory already, as a source of one level: what a file that cannot be read in parts becomes.
+// A volume that is in memory already, as a source of one level.
 #pragma once
 
 #include <memory>

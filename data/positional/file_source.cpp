@@ -1,13 +1,17 @@
-#include "data/positional/positional_source.h"
+#include "data/positional/file_source.h"
 
+#include <algorithm>
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "common/base/check.h"
 #include "common/base/printable.h"
+#include "data/positional/decoded_source.h"
 #include "data/positional/located_volume.h"
+#include "data/positional/slice_stream.h"
 #include "data/positional/stored_samples.h"
 #include "data/stores/read_threads.h"
 
@@ -103,30 +107,45 @@ class PositionalSource : public VolumeSource {
   const SourceContext context_;
 };
 
-Result<std::shared_ptr<VolumeSource>> OpenFile(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<LocatedVolume> volume = LocateVolume(path, options, Packing::kNone);
-  if (!volume.ok()) return volume.status();
-  Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume->header, volume->payload, volume->component);
-  if (!samples.ok()) return samples.status();
-  return std::shared_ptr<VolumeSource>(
-      std::make_shared<PositionalSource>(std::move(volume->info), volume->turn, *std::move(samples), context));
-}
-
-bool Recognises(const std::string& path, const ReadOptions& options) { return HasLocatedSamples(path, options, Packing::kNone); }
-
-Result<std::shared_ptr<VolumeSource>> Open(const std::string& path, const ReadOptions& options, const SourceContext& context) {
-  Result<std::shared_ptr<VolumeSource>> source = OpenFile(path, options, context);
-  if (!source.ok()) return Printable(source.status());
-  return source;
+// Where the samples lie. None: it must be decoded as a whole.
+Result<std::optional<LocatedVolume>> Locate(const VolumeFormat& format, const std::string& path, const ReadOptions& options) {
+  if (format.locate == nullptr || options.channel == kLuminance) return std::optional<LocatedVolume>();
+  const Result<LocatedSamples> located = format.locate(path, options);
+  if (!located.ok() && format.read != nullptr) return std::optional<LocatedVolume>();
+  if (!located.ok()) return located.status();
+  const RawHeader& header = located->header;
+  if (Status status = CheckChannel(path, header, options); !status.ok()) return status;
+  const Result<WorldPlacement> placed = PlaceInWorld(header, path);
+  if (!placed.ok()) return placed.status();
+  if (placed->slant) return std::optional<LocatedVolume>();
+  Result<Payload> payload = PayloadOfVolume(path, *located);
+  if (!payload.ok()) return payload.status();
+  const std::vector<std::filesystem::path> beside = payload->FilesBeside(path);
+  const bool in_order = payload->compressed() || !payload->more.empty();
+  const Index3 block = {header.size.x, in_order ? header.size.y : 1, 1};  // a slice, or a row: its samples lie together
+  SourceInfo info = InfoOfFile(format, path, header, *placed, beside, block, options);
+  if (in_order) {
+    const auto along = std::size_t(std::ranges::find(placed->turn.from, 2) - placed->turn.from.begin());
+    info.slices = SliceOrder{kAxes[along], placed->turn.flipped[along]};
+  }
+  const int component = header.components > 1 ? options.channel.value_or(0) : 0;
+  return std::optional(LocatedVolume{header, *std::move(payload), placed->turn, component, std::move(info)});
 }
 
 }  // namespace
 
-SourceFormat UncompressedFile() {
-  return {.name = "uncompressed file",
-          .recognises = Recognises,
-          .options = {"time", "channel", "matrix", "spacing", "dims", "type", "endian", "offset"},
-          .open = Open};
+Result<std::shared_ptr<VolumeSource>> OpenFile(const VolumeFormat& format, const std::string& path, const ReadOptions& options,
+                                               const SourceContext& context) {
+  Result<std::optional<LocatedVolume>> found = Locate(format, path, options);
+  if (!found.ok()) return found.status();
+  if (!*found) return OpenDecoded(format, path, options);
+  LocatedVolume& volume = **found;
+  if (volume.info.slices)
+    return std::shared_ptr<VolumeSource>(std::make_shared<SliceStream>(path, std::move(volume), options.progress, context));
+  Result<std::shared_ptr<StoredSamples>> samples = StoredSamples::Open(volume.header, volume.payload, volume.component);
+  if (!samples.ok()) return samples.status();
+  return std::shared_ptr<VolumeSource>(
+      std::make_shared<PositionalSource>(std::move(volume.info), volume.turn, *std::move(samples), context));
 }
 
 }  // namespace slabstream
