@@ -86,7 +86,8 @@ struct LevelInMemory {
 };
 struct LevelWanted {
   bool all_exact = false;  // exact samples of each type that float32 may round; else of whole numbers of which it rounds one
-  bool narrow = false;     // what `info` says to be float32 becomes uint16 if that holds all samples after a shift
+  // What `info` says to be float32 becomes uint16 if that holds all samples after a shift. What is decoded as a whole always does.
+  bool narrow = false;
 };
 
 // Where the samples of a box go: x fastest.
