@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "common/base/status.h"
 

@@ -15,8 +15,7 @@
 #include <vector>
 
 #include "client/client.h"
-#include "client/image_io/annotations.h"
-#include "client/image_io/picture_key.h"
+#include "client/pictures/picture_writer.h"
 #include "common/base/status.h"
 
 namespace slabstream {

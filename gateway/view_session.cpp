@@ -5,7 +5,7 @@
 #include <chrono>
 #include <utility>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
 #include "common/base/version.h"
 #include "common/view/view_ahead.h"

@@ -9,7 +9,7 @@
 #include <variant>
 
 #include "client/client.h"
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/report/status_text.h"
 #include "client/request/key_of_picture.h"
 #include "client/request/picture_fields.h"

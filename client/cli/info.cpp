@@ -24,7 +24,7 @@
 #include "client/cli/picture_info.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/progress_display.h"
-#include "client/image_io/picture_header.h"
+#include "client/pictures/picture_header.h"
 #include "client/report/value_text.h"
 #include "client/request/json_value.h"
 #include "common/base/printable.h"

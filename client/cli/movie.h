@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "client/cli/picture_sink.h"
-#include "client/image_io/composed_picture.h"
 #include "client/movie/movie_encoder.h"
 #include "client/movie/movie_format.h"
+#include "client/pictures/picture_writer.h"
 #include "common/base/files.h"
 #include "common/base/status.h"
 

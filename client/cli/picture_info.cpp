@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "client/image_io/picture_header.h"
+#include "client/pictures/picture_header.h"
 #include "client/request/picture_record.h"
 
 namespace slabstream {

@@ -10,8 +10,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/input_volume.h"
-#include "client/image_io/image_writer.h"
-#include "client/image_io/ink.h"
+#include "client/pictures/picture_writer.h"
 #include "common/classification/color_maps.h"
 #include "common/image/local_image.h"
 #include "common/mesh/lattice.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "client/request/slice_request.h"
 #include "common/base/status.h"

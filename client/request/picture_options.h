@@ -6,7 +6,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/request_options.h"
 #include "client/request/slice_request.h"
 #include "common/base/status.h"

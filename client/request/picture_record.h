@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/image_io/image_writer.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/json_value.h"
 #include "client/request/request_options.h"
 #include "common/base/status.h"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "client/image_io/composed_picture.h"
+#include "client/pictures/picture_writer.h"
 #include "client/request/slice_planes.h"
 #include "client/request/value_window.h"
 #include "common/base/status.h"

@@ -1,5 +1,5 @@
 // What annotations of a picture say: the scale bar's length, the letters of a patient's sides, and where the world's axes point. Pure; who
-// draws them is another matter (client/image_io/annotations.h).
+// draws them is another matter (client/pictures/annotations.h).
 #pragma once
 
 #include <array>

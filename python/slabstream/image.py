@@ -132,7 +132,7 @@ def statistics_of(message: Any, latency_seconds: float) -> Statistics:
 
 def _codes(rgba: Floats, bits: int) -> numpy.typing.NDArray[Any]:
     """Straight alpha: round(max * clamp(straight value, 0, 1)), halves away from zero, without a transfer curve; as the command line's PNG.
-    The arithmetic is that of client/image_io: floats, until the rounding."""
+    The arithmetic is that of client/pictures: floats, until the rounding."""
     alpha, most = rgba[..., 3:], numpy.float32(2**bits - 1)
     straight = numpy.zeros_like(rgba)
     numpy.divide(rgba[..., :3], alpha, out=straight[..., :3], where=most * alpha >= numpy.float32(0.5))
