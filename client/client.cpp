@@ -1,7 +1,9 @@
 #include "client/client.h"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "client/client_impl.h"

@@ -95,14 +95,12 @@ Shape MovedRight(Shape shape, int x) {
   return shape;
 }
 
-Result<Ink> InkOf(const Rectangle& shape) { return RectangleInk(shape.begin, shape.end); }
-Result<Ink> InkOf(const Stroke& shape) { return StrokeInk(shape.begin, shape.end, shape.width); }
-Result<Ink> InkOf(const Polygon& shape) { return PolygonInk(shape.corners); }
-Result<Ink> InkOf(const ColorRows& shape) { return RectangleInk(shape.begin, shape.end); }
-Result<Ink> InkOf(const TextLine& shape) {
-  Result<Ink> ink = TextInk(shape.text, shape.size);
-  if (!ink.ok()) return ink;
-  return Shifted(*std::move(ink), int(std::lround(shape.begin.x)), int(std::lround(shape.begin.y)));
+Ink InkOf(const Rectangle& shape, Font&) { return RectangleInk(shape.begin, shape.end); }
+Ink InkOf(const Stroke& shape, Font&) { return StrokeInk(shape.begin, shape.end, shape.width); }
+Ink InkOf(const Polygon& shape, Font&) { return PolygonInk(shape.corners); }
+Ink InkOf(const ColorRows& shape, Font&) { return RectangleInk(shape.begin, shape.end); }
+Ink InkOf(const TextLine& shape, Font& font) {
+  return Shifted(font.Draw(shape.text, shape.size), int(std::lround(shape.begin.x)), int(std::lround(shape.begin.y)));
 }
 
 // Where the label of each axis stands, seen from where the arrows begin: before the tip. That of an axis along the line of sight stands
@@ -129,8 +127,8 @@ MarkColor ColorOf(const Rgb& color) { return {color.r, color.g, color.b}; }
 class Artist {
  public:
   // `left`: of this picture, in pixels of the whole.
-  Artist(ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale, const Palette& palette)
-      : size_(size), left_(left), geometry_(geometry), scale_(scale), palette_(palette) {}
+  Artist(Font& font, ImageSize size, int left, const PictureGeometry& geometry, const Scale& scale, const Palette& palette)
+      : font_(&font), size_(size), left_(left), geometry_(geometry), scale_(scale), palette_(palette) {}
 
   // What others have drawn at the top and on the right, in pixels from the edges.
   void KeepClear(double top, double right) {
@@ -140,27 +138,25 @@ class Artist {
   double top() const { return top_; }
   double right() const { return right_; }
 
-  Status DrawTitle(const std::string& title) {
+  void DrawTitle(const std::string& title) {
     top_ += kAscender * scale_.letters;
-    Status status = PutText(title, {0.5 * size_.width, top_});
+    PutText(title, {0.5 * size_.width, top_});
     top_ += (kDescender + 0.2) * scale_.letters;
-    return status;
   }
 
   // The letters of a patient's sides, at the middles of the picture's edges.
-  Status DrawSides() {
+  void DrawSides() {
     const double half = 0.5 * kCapital * scale_.letters, x = 0.5 * size_.width, y = 0.5 * size_.height + half;
     const std::pair<Vec3, InkPoint> sides[] = {{geometry_.up, {x, top_ + 2 * half}},
                                                {-geometry_.up, {x, double(size_.height - scale_.margin)}},
                                                {-geometry_.right, {0, y}},  // PutText keeps texts inside the picture
                                                {geometry_.right, {size_.width - right_, y}}};
     for (const auto& [direction, place] : sides) {
-      if (Status status = PutText(PatientSides(direction), place, palette_.letters, right_); !status.ok()) return status;
+      PutText(PatientSides(direction), place, palette_.letters, right_);
     }
-    return Status::Ok();
   }
 
-  Status DrawAxes() {
+  void DrawAxes() {
     const double arrow = 2.0 * scale_.letters, gap = 0.7 * scale_.letters, reach = arrow + gap + 0.5 * scale_.letters;
     const InkPoint origin = {scale_.margin + reach, size_.height - scale_.margin - reach};
     const std::array<ShownAxis, 3> axes = ShownAxes(geometry_);
@@ -170,35 +166,34 @@ class Artist {
       const InkPoint tip = {origin.x + arrow * axes[i].x, origin.y + arrow * axes[i].y};
       Put(Arrow(origin, tip, scale_), color);
       const InkPoint place = {origin.x + places[i].x, origin.y + places[i].y + 0.5 * kCapital * scale_.letters};
-      if (Status status = PutText(std::string(axes[i].label), place, color); !status.ok()) return status;
+      PutText(std::string(axes[i].label), place, color);
     }
-    return Status::Ok();
   }
 
-  Status DrawScaleBar() {
+  void DrawScaleBar() {
     const std::optional<ScaleBar> bar = ChooseScaleBar(geometry_, size_.width);
-    if (!bar) return Status::Ok();
+    if (!bar) return;
     const double end = size_.width - scale_.margin, begin = end - bar->pixels, thick = 2 * scale_.line, tick = 0.5 * scale_.letters;
     const double bottom = size_.height - scale_.margin, top = bottom - tick;
     Shapes shapes = {Rectangle{{begin, bottom - thick}, {end, bottom}}};
     for (const double x : {begin, end - thick}) shapes.emplace_back(Rectangle{{x, top}, {x + thick, bottom}});
     Put(std::move(shapes), palette_.letters);
-    return PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
+    PutText(bar->label, {0.5 * (begin + end), top - 0.3 * scale_.letters});
   }
 
   // Between the top and what may stand at the bottom: values upwards, with ticks to the left of the bar and the caption above it.
-  Status DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
+  void DrawColorBar(const PictureKey::Bar& bar, const std::string& caption) {
     const double width = std::round(0.8 * scale_.letters), right = size_.width - scale_.margin, left = right - width,
                  tick = 0.3 * scale_.letters;
     double top = top_ + 0.5 * scale_.letters;
     if (!caption.empty()) {
       top = top_ + kAscender * scale_.letters;
-      if (Status status = PutText(caption, {double(size_.width), top}); !status.ok()) return status;
+      PutText(caption, {double(size_.width), top});
       top += (kDescender + 0.5) * scale_.letters;
     }
     const double bottom = size_.height - scale_.margin - 2.5 * scale_.letters;
     const int rows = int(bottom - top);
-    if (rows < 1) return Status::Ok();
+    if (rows < 1) return;
     const TransferFunction colors{.colors = bar.colors, .opacities = {}};
     const double first = std::floor(top);
     ColorRows shown{{left, first}, {right, first + rows}, {}};
@@ -211,33 +206,31 @@ class Artist {
       const double y = first + rows * (bar.high - value) / (bar.high - bar.low);
       lines.emplace_back(Rectangle{{left - tick, y - 0.5 * scale_.line}, {left, y + 0.5 * scale_.line}});
       const std::string text = fmt::format("{:.6g}", value);
-      const Result<int> text_width = TextWidth(text, scale_.letters);
-      if (!text_width.ok()) return text_width.status();
-      widest = std::max(widest, *text_width);
-      const double x = left - 1.5 * tick - 0.5 * *text_width;
-      if (Status status = PutText(text, {x, y + 0.5 * kCapital * scale_.letters}); !status.ok()) return status;
+      const int text_width = font_->Width(text, scale_.letters);
+      widest = std::max(widest, text_width);
+      const double x = left - 1.5 * tick - 0.5 * text_width;
+      PutText(text, {x, y + 0.5 * kCapital * scale_.letters});
     }
     Put(std::move(lines), palette_.letters);
     PutPlain(std::move(shown), {});
     right_ = scale_.margin + width + 2 * tick + widest;
-    return Status::Ok();
   }
 
   // One line each, as many as there is room for.
-  Status DrawLegend(const std::vector<PictureKey::Entry>& entries) {
+  void DrawLegend(const std::vector<PictureKey::Entry>& entries) {
     const double line = 1.35 * scale_.letters, swatch = std::round(0.8 * scale_.letters), left = scale_.margin;
     const double room = size_.height - top_ - scale_.margin - 6.5 * scale_.letters;  // above the axes
     const std::size_t lines = std::max(std::size_t(std::max(room / line, 0.0)), std::size_t{1});
     const std::size_t shown = entries.size() <= lines ? entries.size() : lines - 1;
     double y = top_ + 0.2 * scale_.letters;
-    const auto put = [&](const std::string& text, double x) { return PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
+    const auto put = [&](const std::string& text, double x) { PutTextFrom(text, {x, y + 0.85 * scale_.letters}); };
     for (std::size_t i = 0; i < shown; ++i, y += line) {
       const InkPoint begin = {left, std::round(y + 0.1 * scale_.letters)}, end = {begin.x + swatch, begin.y + swatch};
       Put({Frame(begin, end)}, palette_.letters);
       PutPlain(Rectangle{begin, end}, ColorOf(entries[i].color));
-      if (Status status = put(entries[i].name, left + 1.4 * swatch); !status.ok()) return status;
+      put(entries[i].name, left + 1.4 * swatch);
     }
-    return shown < entries.size() ? put(fmt::format("and {} more", entries.size() - shown), left) : Status::Ok();
+    if (shown < entries.size()) put(fmt::format("and {} more", entries.size() - shown), left);
   }
 
   std::vector<Mark> TakeMarks() { return std::move(marks_); }
@@ -259,37 +252,32 @@ class Artist {
 
   // The text, with its baseline centred at `place`, but not beyond the picture's sides, and `right` pixels from the right one. One that is
   // too wide shrinks.
-  Status PutText(const std::string& text, InkPoint place, MarkColor color, double right = 0) {
-    Result<TextLine> line = Fitted(text);
-    if (!line.ok()) return line.status();
-    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - line->width, least);
-    line->begin = {double(std::clamp(int(std::lround(place.x - 0.5 * line->width)), least, most)), std::round(place.y)};
-    Put({*std::move(line)}, color);
-    return Status::Ok();
+  void PutText(const std::string& text, InkPoint place, MarkColor color, double right = 0) {
+    TextLine line = Fitted(text);
+    const int least = scale_.margin, most = std::max(size_.width - std::max(scale_.margin, int(right)) - line.width, least);
+    line.begin = {double(std::clamp(int(std::lround(place.x - 0.5 * line.width)), least, most)), std::round(place.y)};
+    Put({std::move(line)}, color);
   }
-  Status PutText(const std::string& text, InkPoint place) { return PutText(text, place, palette_.letters); }
+  void PutText(const std::string& text, InkPoint place) { PutText(text, place, palette_.letters); }
   // Its baseline begins at `place`.
-  Status PutTextFrom(const std::string& text, InkPoint place) {
-    Result<TextLine> line = Fitted(text);
-    if (!line.ok()) return line.status();
-    line->begin = {std::round(place.x), std::round(place.y)};
-    Put({*std::move(line)}, palette_.letters);
-    return Status::Ok();
+  void PutTextFrom(const std::string& text, InkPoint place) {
+    TextLine line = Fitted(text);
+    line.begin = {std::round(place.x), std::round(place.y)};
+    Put({std::move(line)}, palette_.letters);
   }
 
   // The text with its size and width.
-  Result<TextLine> Fitted(const std::string& text) const {
+  TextLine Fitted(const std::string& text) const {
     const int room = std::max(size_.width - 2 * scale_.margin, 1);
-    int letters = scale_.letters;
-    Result<int> width = TextWidth(text, letters);
-    while (width.ok() && *width > room && letters > 1) {
-      letters = std::clamp(int(std::int64_t{letters} * room / *width), 1, letters - 1);
-      width = TextWidth(text, letters);
+    int letters = scale_.letters, width = font_->Width(text, letters);
+    while (width > room && letters > 1) {
+      letters = std::clamp(int(std::int64_t{letters} * room / width), 1, letters - 1);
+      width = font_->Width(text, letters);
     }
-    if (!width.ok()) return width.status();
-    return TextLine{.text = text, .size = letters, .begin = {}, .width = *width};
+    return {.text = text, .size = letters, .begin = {}, .width = width};
   }
 
+  Font* font_;
   ImageSize size_;
   int left_;
   PictureGeometry geometry_;
@@ -325,29 +313,29 @@ Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, s
                                   const PictureKey& key) {
   CHECK(!panes.empty());
   const Annotations& annotations = format.annotations;
+  std::vector<Mark> marks;
+  if (!annotations.any()) return marks;
+  Result<Font> font = Font::Open();
+  if (!font.ok()) return font.status();
   const ImageSize pane = {size.width / int(panes.size()), size.height};
   const Scale scale(format, pane);
   const Palette palette = PaletteOn(format.background);
-  std::vector<Mark> marks;
   const auto keep = [&marks](std::vector<Mark> more) { std::ranges::move(more, std::back_inserter(marks)); };
 
-  Artist whole(size, 0, panes.front(), scale, palette);
-  Status status;
-  if (!annotations.title.empty()) status = whole.DrawTitle(annotations.title);
-  if (status.ok() && annotations.color_bar && key.bar) status = whole.DrawColorBar(*key.bar, *annotations.color_bar);
-  if (status.ok() && annotations.legend && !key.entries.empty()) status = whole.DrawLegend(key.entries);
-  if (!status.ok()) return status;
+  Artist whole(*font, size, 0, panes.front(), scale, palette);
+  if (!annotations.title.empty()) whole.DrawTitle(annotations.title);
+  if (annotations.color_bar && key.bar) whole.DrawColorBar(*key.bar, *annotations.color_bar);
+  if (annotations.legend && !key.entries.empty()) whole.DrawLegend(key.entries);
   keep(whole.TakeMarks());
 
   for (std::size_t i = 0; i < panes.size(); ++i) {
     const PictureGeometry& geometry = panes[i];
-    Artist artist(pane, int(i) * pane.width, geometry, scale, palette);
+    Artist artist(*font, pane, int(i) * pane.width, geometry, scale, palette);
     artist.KeepClear(whole.top(), i + 1 == panes.size() ? whole.right() : 0);
     const bool sides = annotations.orientation_marker && geometry.world == World::kPatient;
-    if (sides) status = artist.DrawSides();
-    if (status.ok() && annotations.orientation_marker && !(sides && annotations.sides_only)) status = artist.DrawAxes();
-    if (status.ok() && annotations.scale_bar) status = artist.DrawScaleBar();
-    if (!status.ok()) return status;
+    if (sides) artist.DrawSides();
+    if (annotations.orientation_marker && !(sides && annotations.sides_only)) artist.DrawAxes();
+    if (annotations.scale_bar) artist.DrawScaleBar();
     keep(artist.TakeMarks());
   }
   return marks;
@@ -355,13 +343,15 @@ Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, s
 
 Result<AnnotationLayers> AnnotationLayers::Draw(const std::vector<Mark>& marks) {
   AnnotationLayers drawn;
+  if (marks.empty()) return drawn;
+  Result<Font> font = Font::Open();
+  if (!font.ok()) return font.status();
   for (const Mark& mark : marks) {
     std::optional<Ink> ink;
     std::vector<MarkColor> colors = {mark.color};
     for (const Shape& shape : mark.shapes) {
-      Result<Ink> more = std::visit([](const auto& s) { return InkOf(s); }, shape);
-      if (!more.ok()) return more.status();
-      ink = ink ? Union(*ink, *more) : *std::move(more);
+      Ink more = std::visit([&font](const auto& s) { return InkOf(s, *font); }, shape);
+      ink = ink ? Union(*ink, more) : std::move(more);
       if (const auto* rows = std::get_if<ColorRows>(&shape)) colors = rows->colors;
     }
     if (!ink) continue;

@@ -36,7 +36,7 @@ Status CheckTitle(std::string_view name, std::string_view title);
 Status CheckCanDraw(const Annotations& annotations);
 
 // What is drawn onto a picture of this format, the last one on top. Title and caption have passed CheckTitle. `panes`: of the pictures side
-// by side, of equal widths, at least one. Errors as TextWidth.
+// by side, of equal widths, at least one. Errors as Font::Open.
 Result<std::vector<Mark>> MarksOf(const PictureFormat& format, ImageSize size, std::span<const PictureGeometry> panes,
                                   const PictureKey& key = {});
 
@@ -49,7 +49,7 @@ struct ColoredInk {
 // The annotations of one picture, drawn. Takes memory for the pixels that they touch.
 class AnnotationLayers {
  public:
-  // Errors as TextInk.
+  // Errors as Font::Open.
   static Result<AnnotationLayers> Draw(const std::vector<Mark>& marks);
 
   // Puts row y of the annotations over that of the picture: premultiplied RGBA.

@@ -10,8 +10,6 @@
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
-#include <memory>
-#include <string_view>
 
 #include "common/base/program_beside.h"
 #include "common/base/utf8.h"
@@ -52,52 +50,6 @@ Ink ShapeInk(const PixelBounds& bounds, Distance&& distance) {
 }
 
 constexpr FT_Int32 kDraw = FT_LOAD_RENDER | FT_LOAD_NO_BITMAP;  // 256 levels of gray, from outlines
-
-// The font of annotations, opened for one text: FreeType's objects belong to one thread. (OpenImageIO's render_text would do the same, but
-// version 2.4 reads of each character of UTF-8 only the last byte.)
-class Face {
- public:
-  static Result<Face> Open(int size) {
-    const Result<std::string> font = AnnotationFont();
-    if (!font.ok()) return font.status();
-    Face opened;
-    FT_Library library = nullptr;
-    FT_Face face = nullptr;
-    if (FT_Init_FreeType(&library) != 0) return Status::Internal("FreeType cannot be started");
-    opened.library_.reset(library);
-    const bool readable = FT_New_Face(library, font->c_str(), 0, &face) == 0;
-    opened.face_.reset(face);
-    if (!readable || FT_Set_Pixel_Sizes(face, 0, FT_UInt(size)) != 0) {
-      return Status::InvalidArgument(fmt::format("the font '{}' cannot be read", *font));
-    }
-    return opened;
-  }
-
-  // Calls visit(glyph, pen) for each character that the font can draw, with the place of its origin on the baseline. Returns the place
-  // after the last one.
-  template <class Visit>
-  int Lay(std::string_view text, FT_Int32 flags, Visit&& visit) {
-    constexpr int kShift = 6;  // positions are in 64ths of a pixel
-    FT_Pos pen = 0;
-    while (!text.empty()) {
-      const std::size_t bytes = std::max<std::size_t>(Utf8CharacterBytes(text), 1);
-      const char32_t character = Utf8Character(text.substr(0, bytes));
-      text.remove_prefix(bytes);
-      if (FT_Load_Char(face_.get(), character, flags) != 0) continue;
-      visit(*face_->glyph, int((pen + 32) >> kShift));
-      pen += face_->glyph->advance.x;
-    }
-    return int((pen + 32) >> kShift);
-  }
-
- private:
-  struct Done {
-    void operator()(FT_Library library) const { FT_Done_FreeType(library); }
-    void operator()(FT_Face face) const { FT_Done_Face(face); }
-  };
-  std::unique_ptr<FT_LibraryRec_, Done> library_;
-  std::unique_ptr<FT_FaceRec_, Done> face_;  // goes first
-};
 
 }  // namespace
 
@@ -199,23 +151,52 @@ Result<std::string> AnnotationFont() {
                                       kFontPackage, kFontVariable));
 }
 
-Result<int> TextWidth(const std::string& text, int size) {
-  Result<Face> face = Face::Open(size);
-  if (!face.ok()) return face.status();
-  return face->Lay(text, FT_LOAD_DEFAULT, [](const FT_GlyphSlotRec&, int) {});
+void Font::Done::operator()(FT_LibraryRec_* library) const { FT_Done_FreeType(library); }
+void Font::Done::operator()(FT_FaceRec_* face) const { FT_Done_Face(face); }
+
+Result<Font> Font::Open() {
+  const Result<std::string> file = AnnotationFont();
+  if (!file.ok()) return file.status();
+  Font font;
+  FT_Library library = nullptr;
+  FT_Face face = nullptr;
+  if (FT_Init_FreeType(&library) != 0) return Status::Internal("FreeType cannot be started");
+  font.library_.reset(library);
+  const bool readable = FT_New_Face(library, file->c_str(), 0, &face) == 0;
+  font.face_.reset(face);
+  if (!readable || !FT_IS_SCALABLE(face)) return Status::InvalidArgument(fmt::format("the font '{}' cannot be read", *file));
+  return font;
 }
 
-Result<Ink> TextInk(const std::string& text, int size) {
-  Result<Face> face = Face::Open(size);
-  if (!face.ok()) return face.status();
+template <class Visit>
+int Font::Lay(std::string_view text, int size, int flags, Visit&& visit) {
+  constexpr int kShift = 6;  // positions are in 64ths of a pixel
+  FT_Set_Pixel_Sizes(face_.get(), 0, FT_UInt(size));
+  FT_Pos pen = 0;
+  while (!text.empty()) {
+    const std::size_t bytes = std::max<std::size_t>(Utf8CharacterBytes(text), 1);
+    const char32_t character = Utf8Character(text.substr(0, bytes));
+    text.remove_prefix(bytes);
+    if (FT_Load_Char(face_.get(), character, flags) != 0) continue;
+    visit(*face_->glyph, int((pen + 32) >> kShift));
+    pen += face_->glyph->advance.x;
+  }
+  return int((pen + 32) >> kShift);
+}
+
+int Font::Width(std::string_view text, int size) {
+  return Lay(text, size, FT_LOAD_DEFAULT, [](const FT_GlyphSlotRec&, int) {});
+}
+
+Ink Font::Draw(std::string_view text, int size) {
   const auto bounds_of = [](const FT_GlyphSlotRec& glyph, int pen) {
     const int left = pen + glyph.bitmap_left, top = -glyph.bitmap_top;
     return PixelBounds{left, top, left + int(glyph.bitmap.width), top + int(glyph.bitmap.rows)};
   };
   Ink ink;
-  face->Lay(text, kDraw, [&](const FT_GlyphSlotRec& glyph, int pen) { ink.bounds = Union(ink.bounds, bounds_of(glyph, pen)); });
+  Lay(text, size, kDraw, [&](const FT_GlyphSlotRec& glyph, int pen) { ink.bounds = Union(ink.bounds, bounds_of(glyph, pen)); });
   ink = Blank(ink.bounds);
-  face->Lay(text, kDraw, [&](const FT_GlyphSlotRec& glyph, int pen) {
+  Lay(text, size, kDraw, [&](const FT_GlyphSlotRec& glyph, int pen) {
     if (glyph.bitmap.pixel_mode != FT_PIXEL_MODE_GRAY) return;
     const PixelBounds b = bounds_of(glyph, pen);
     for (int y = b.y_begin; y < b.y_end; ++y) {

@@ -3,13 +3,18 @@
 // Positions are those of marks (client/pictures/mark.h).
 #pragma once
 
+#include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/pictures/mark.h"
 #include "common/base/status.h"
 #include "common/image/pixel_bounds.h"
+
+struct FT_LibraryRec_;  // FreeType's
+struct FT_FaceRec_;
 
 namespace slabstream {
 
@@ -29,11 +34,30 @@ Ink Shifted(Ink ink, int x, int y);                         // by whole pixels
 // Debian has it. NotFound: there is no such file; the message says what to install.
 Result<std::string> AnnotationFont();
 
-// What the text measures in pixels, before it is drawn. Errors as TextInk.
-Result<int> TextWidth(const std::string& text, int size);
+// The font of annotations, opened. One thread. (OpenImageIO's render_text would do, but version 2.4 reads of each character of UTF-8 only
+// the last byte.)
+class Font {
+ public:
+  // NotFound: AnnotationFont. InvalidArgument: its file is none whose letters may have any size.
+  static Result<Font> Open();
 
-// One line of UTF-8 text whose letters are `size` pixels high, from ascender to descender; its baseline begins at (0, 0). Characters stand
-// side by side, each as the font has it; those that it lacks are boxes. InvalidArgument: the font's file is none.
-Result<Ink> TextInk(const std::string& text, int size);
+  // One line of UTF-8 text whose letters are `size` pixels high, from ascender to descender; its baseline begins at (0, 0). Characters
+  // stand side by side, each as the font has it; those that it lacks are boxes.
+  Ink Draw(std::string_view text, int size);
+  int Width(std::string_view text, int size);  // of the text, in pixels
+
+ private:
+  struct Done {
+    void operator()(FT_LibraryRec_* library) const;
+    void operator()(FT_FaceRec_* face) const;
+  };
+  // Calls visit(glyph, pen) for each character that the font can draw, with the place of its origin on the baseline. Returns the place
+  // after the last one.
+  template <class Visit>
+  int Lay(std::string_view text, int size, int flags, Visit&& visit);
+
+  std::unique_ptr<FT_LibraryRec_, Done> library_;
+  std::unique_ptr<FT_FaceRec_, Done> face_;  // goes first
+};
 
 }  // namespace slabstream

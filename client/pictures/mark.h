@@ -32,7 +32,7 @@ struct TextLine {
   std::string text;  // UTF-8
   int size = 11;     // pixels from ascender to descender
   InkPoint begin;    // of the baseline
-  int width = 0;     // pixels, as TextWidth measures it
+  int width = 0;     // pixels, as Font::Width measures it
 };
 // Colours from top to bottom, one for each row of pixels. Its sides lie between pixels.
 struct ColorRows {

@@ -304,19 +304,20 @@ TEST(AnnotationsTest, AnySizeCanBeAnnotated) {
 }
 
 TEST(AnnotationsTest, LettersBeyondAsciiAreThemselves) {
-  const Ink plain = *TextInk("a", 40), umlaut = *TextInk("\xC3\xA4", 40), none = *TextInk("\xF3\xB0\x80\x80", 40);
+  Font font = Font::Open().value();
+  const Ink plain = font.Draw("a", 40), umlaut = font.Draw("\xC3\xA4", 40), none = font.Draw("\xF3\xB0\x80\x80", 40);
   const PixelBounds& a = plain.bounds;
   EXPECT_EQ(umlaut.bounds.y_end, a.y_end);
   EXPECT_LT(umlaut.bounds.y_begin, a.y_begin - 5) << "the dots";
   ASSERT_EQ(umlaut.bounds.width(), a.width());
   EXPECT_TRUE(std::equal(plain.coverage.rbegin(), plain.coverage.rend(), umlaut.coverage.rbegin())) << "the rest is the letter";
   for (const char* text : {"\xCE\xB1", "\xE2\x86\x92", "\xD0\x96", "\xF0\x9D\x94\xB8"}) {  // alpha, an arrow, zhe, a double-struck A
-    const Ink ink = *TextInk(text, 40);
+    const Ink ink = font.Draw(text, 40);
     EXPECT_FALSE(ink.bounds.empty());
     EXPECT_NE(ink.coverage, none.coverage) << text << " is drawn as the box of characters that the font lacks";
   }
-  EXPECT_EQ(*TextWidth("ab", 40), *TextWidth("a", 40) + *TextWidth("b", 40));
-  EXPECT_TRUE(TextInk(" ", 40)->bounds.empty());
+  EXPECT_EQ(font.Width("ab", 40), font.Width("a", 40) + font.Width("b", 40));
+  EXPECT_TRUE(font.Draw(" ", 40).bounds.empty());
 }
 
 TEST(AnnotationsTest, TitlesAreOneLineOfUtf8) {
