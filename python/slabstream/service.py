@@ -8,11 +8,11 @@ import dataclasses
 import os
 from typing import Any, Callable, Iterator
 
-from . import schema
+from . import schema, values
 from .address import Address, find_service
 from .annotations import key_of
 from .connection import ANSWER_SECONDS, CONNECT_SECONDS, Connection
-from .drafts import Draft, camera_draft_of, draft_of, set_clip_box, slice_drafts_of
+from .drafts import Draft, camera_draft_of, draft_of, slice_drafts_of
 from .errors import InvalidArgument
 from .frame import Frame, Progress
 from .image import Image, side_by_side
@@ -33,7 +33,6 @@ from .probe import (
 from .status import Dataset, Status, dataset_of, status_of
 from .transfer import TransferFunction, mapped
 from .uploads import upload_of
-from .values import integer, number, point
 from .viewer import Viewer
 from .volumes import layers_of, on_grid, volume_of
 
@@ -92,9 +91,9 @@ class Service(contextlib.AbstractContextManager["Service"]):
         """Pictures of full turns about the volume's z axis, one by one, in order. `path` moves through cameras instead: a list of cameras, or
         the file of one (docs/movies.md). `in_flight` pictures are asked for before they are needed, so that the service never waits. Frames
         that are open when the iterator is closed are cancelled."""
-        frames = integer("frames", frames, 1, _MOST_FRAMES)
-        turns = integer("turns", turns, 0, _MOST_TURNS)
-        in_flight = integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
+        frames = values.integer("frames", frames, 1, _MOST_FRAMES)
+        turns = values.integer("turns", turns, 0, _MOST_TURNS)
+        in_flight = values.integer("in_flight", in_flight, 1, _MOST_IN_FLIGHT)
         draft = draft_of(dataset, options)
         if path is None:
             if draft.frame.view.HasField("eye") and turns > 0:
@@ -153,14 +152,13 @@ class Service(contextlib.AbstractContextManager["Service"]):
     def label_statistics(self, dataset: str, *, clip_box: Any = None, timeout: float = _QUESTION_SECONDS) -> list[LabelStatistics]:
         """Volume, mean, deviation and extremes of the voxels of each label of a dataset, by the label's value. Labels lie on the voxels of the
         dataset's volume. `clip_box`: only of voxels with their centres in this box, as the option of that name takes it."""
-        query = schema.StatisticsQuery(dataset=dataset, labels=True)
-        set_clip_box(query.box, "clip_box", ":,:,:" if clip_box is None else clip_box)
+        box = values.clip_box("clip_box", ":,:,:" if clip_box is None else clip_box)
+        query = schema.StatisticsQuery(dataset=dataset, labels=True, box=box)
         return label_statistics_of(self._connection.ask("statistics_query", query, timeout))
 
     def value(self, dataset: str, at: Any, *, timeout: float = _QUESTION_SECONDS) -> Sample | None:
         """The voxel that holds a point: x, y, z of the world, as in all options. None: the point lies outside the volume."""
-        x, y, z = point("at", at)
-        query = schema.SampleQuery(dataset=dataset, points=[schema.Vec3(x=x, y=y, z=z)])
+        query = schema.SampleQuery(dataset=dataset, points=[values.vec3(values.point("at", at))])
         return sample_of(self._connection.ask("sample_query", query, timeout).samples[0])
 
     @takes_options_of("render")
@@ -170,7 +168,7 @@ class Service(contextlib.AbstractContextManager["Service"]):
         draft = draft_of(dataset, options)
         self._settle([draft])
         frame = draft.frame
-        query = schema.PickQuery(frame=frame, x=number("x", x, 0, frame.size.width), y=number("y", y, 0, frame.size.height))
+        query = schema.PickQuery(frame=frame, x=values.number("x", x, 0, frame.size.width), y=values.number("y", y, 0, frame.size.height))
         reply = self._connection.ask("pick_query", query, timeout)
         return sample_of(reply.sample, reply.depth) if reply.HasField("sample") else None
 
