@@ -12,7 +12,6 @@ from .errors import InvalidArgument, NotFound
 
 USUAL_ENDPOINT = "tcp://127.0.0.1:7420"
 _SHAPES = "tcp://HOST:PORT or ipc:///PATH"
-_MOST_ENDPOINT_BYTES = 512
 _MOST_IPC_PATH_BYTES = 107
 _MOST_FILE_BYTES = 1 << 16
 _KEY_CHARACTERS = 40  # Z85
@@ -47,24 +46,15 @@ def check_endpoint(text: str, with_keys: bool) -> None:
     """InvalidArgument unless one can connect there. Without keys a service stays on its machine."""
 
     def refuse(why: str) -> InvalidArgument:
-        return InvalidArgument(f'endpoint "{text[:128]}": {why}')
+        return InvalidArgument(f"endpoint {json.dumps(text[:128])}: {why}")
 
-    if len(text.encode()) > _MOST_ENDPOINT_BYTES:
-        raise refuse(f"{len(text.encode())} bytes, at most {_MOST_ENDPOINT_BYTES}")
-    if not text.isprintable() or " " in text:
-        raise InvalidArgument(f"endpoint {text[:128]!r}: spaces and control characters are not allowed, expected {_SHAPES}")
-    if text.startswith("ipc://"):
-        path = text[6:]
-        if len(path) < 2 or path[0] != "/" or path[-1] == "/":
-            raise refuse("expected an absolute path of a socket file, ipc:///PATH")
-        if len(os.fsencode(path)) > _MOST_IPC_PATH_BYTES:
-            raise refuse(f"a path of {len(os.fsencode(path))} bytes, at most {_MOST_IPC_PATH_BYTES} fit a socket address")
+    if text.startswith("ipc:///"):
+        if len(os.fsencode(text[6:])) > _MOST_IPC_PATH_BYTES:
+            raise refuse(f"a path of {len(os.fsencode(text[6:]))} bytes, at most {_MOST_IPC_PATH_BYTES} fit a socket address")
         return
-    if not text.startswith("tcp://"):
+    host, _, port = text[6:].rpartition(":")
+    if not text.startswith("tcp://") or not host or " " in text:
         raise refuse(f"expected {_SHAPES}")
-    host, colon, port = text[6:].rpartition(":")
-    if not colon or not host:
-        raise refuse("no port, expected tcp://HOST:PORT")
     if not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
         raise refuse(f'port "{port}" is not a number of [1, 65535]')
     if not with_keys and not is_loopback(host):
