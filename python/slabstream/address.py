@@ -8,13 +8,13 @@ import os
 import pathlib
 from typing import Any
 
-from .errors import InvalidArgument, NotFound
+from .errors import InvalidArgument
+from .values import json_of
 
 USUAL_ENDPOINT = "tcp://127.0.0.1:7420"
 _SHAPES = "tcp://HOST:PORT or ipc:///PATH"
 _MOST_IPC_PATH_BYTES = 107
-_MOST_FILE_BYTES = 1 << 16
-_KEY_CHARACTERS = 40  # Z85
+_KEYS, _KEY_CHARACTERS = ("server_key", "public_key", "secret_key"), 40  # Z85
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,40 +67,22 @@ def check_endpoint(text: str, with_keys: bool) -> None:
 def read_service_file(path: str | os.PathLike[str]) -> Address:
     """The address in a file of role client or admin. Messages contain no secret."""
     file = pathlib.Path(path)
-    try:
-        mode = file.stat().st_mode
-    except OSError:
-        raise NotFound(f"'{file}' does not exist") from None
-    if mode & 0o077:
+    if file.exists() and file.stat().st_mode & 0o077:
         raise InvalidArgument(f"others can use '{file}', which holds a secret (chmod 600)")
-    try:
-        with file.open("rb") as stream:
-            fields: Any = json.loads(stream.read(_MOST_FILE_BYTES))
-    except OSError as error:
-        raise InvalidArgument(f"'{file}' cannot be read: {error.strerror}") from None
-    except ValueError:
-        fields = None
+    fields = json_of("service file", file)
     if not isinstance(fields, dict):
         raise InvalidArgument(f"'{file}' is no service file: it is not one JSON object")
-
-    def text(name: str) -> str:
+    for name in ("role", "endpoint", *_KEYS):
         value = fields.get(name)
         if not isinstance(value, str):
             raise InvalidArgument(f"service file '{file}': {name} is missing or no text")
-        return value
-
-    def key(name: str) -> str:
-        value = text(name)
-        if len(value) != _KEY_CHARACTERS or not value.isascii():
+        if name in _KEYS and (len(value) != _KEY_CHARACTERS or not value.isascii()):
             raise InvalidArgument(f"service file '{file}': {name} is no key")
-        return value
-
-    role = text("role")
-    if role == "worker":
+    if fields["role"] == "worker":
         raise InvalidArgument(f"service file '{file}' is of role worker, but client or admin is needed here")
-    if role not in ("client", "admin"):
+    if fields["role"] not in ("client", "admin"):
         raise InvalidArgument(f"service file '{file}': role is not client, worker or admin")
-    return Address(text("endpoint"), Keys(key("server_key"), key("public_key"), key("secret_key")), pathlib.Path(file).resolve())
+    return Address(fields["endpoint"], Keys(*(fields[name] for name in _KEYS)), file.resolve())
 
 
 def _state_folder() -> pathlib.Path:
