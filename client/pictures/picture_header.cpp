@@ -38,13 +38,8 @@ class HeaderBytes {
     return value;
   }
   std::uint32_t LittleEndian() {
-    std::uint32_t value = 0;
-    unsigned shift = 0;
-    for (const char c : Take(4)) {
-      value |= std::uint32_t{static_cast<unsigned char>(c)} << shift;
-      shift += 8;
-    }
-    return value;
+    const std::uint32_t value = BigEndian();
+    return value << 24U | (value << 8U & 0xFF0000U) | (value >> 8U & 0xFF00U) | value >> 24U;
   }
   // Up to a zero, which is taken too.
   std::string_view Text() {

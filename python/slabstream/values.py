@@ -1,6 +1,6 @@
-"""Values of options: what Python users write, or the command line's text, turned into numbers.
+"""Values of options: what Python users write, or the command line's text, turned into numbers and messages of the wire.
 
-Each function takes the option's name, for sentences, and a value; what is several numbers becomes a message of the wire. Sentences are those of the command line, without dashes:
+Each function takes the option's name, for what it says of mistakes, and a value. Sentences are those of the command line, without dashes:
 "zoom 0 is out of range [0.001, 10000]". Points and directions are x, y, z of the world.
 """
 from __future__ import annotations
