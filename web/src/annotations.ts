@@ -4,15 +4,10 @@ import { project } from "./camera";
 import { put, shown as text, svg } from "./dom";
 import { BOX_EDGES, cornersOfBox } from "./measure";
 import type { DrawnMeasure } from "./measuring";
-import type { Shown } from "./pane";
 import type { Geometry } from "./session";
+import { pageGeometry, type Shown } from "./shown";
 import { AXES, AXIS_NAMES, dot, sub, type Vec3 } from "./vec";
 import { unitName } from "./volume";
-
-// The geometry in pixels of the page.
-export function pageGeometry({ frame: { header }, cssWidth }: Shown): Geometry {
-  return { ...header.geometry, pixel_size: (header.geometry.pixel_size * header.size[0]) / cssWidth };
-}
 
 // Whether dark lines stand out better on it (WCAG 2.2, relative luminance).
 function isLight([r, g, b]: readonly [number, number, number, number]): boolean {

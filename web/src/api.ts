@@ -1,7 +1,8 @@
 // Requests to the gateway, relative to the page's address, so that it works below any path.
 import type { BoxStatistics, Profile } from "./measure";
-import type { Options } from "./options";
 import type { Vec3 } from "./vec";
+
+export type Options = Record<string, unknown>; // by the names of the command line
 
 export class ApiError extends Error {
   constructor(readonly status: number, message: string) { super(message); }

@@ -1,9 +1,8 @@
 // The clip box in the picture: its edges, and a handle on each face that moves it.
-import { pageGeometry } from "./annotations";
 import { project } from "./camera";
 import { put, svg } from "./dom";
 import { BOX_EDGES } from "./measure";
-import type { Shown } from "./pane";
+import { pageGeometry, type Shown } from "./shown";
 import type { Bounds, ClipBox } from "./state";
 import { AXES, type Axis, AXIS_NAMES, clamp, rounded, scale, add, type Vec3, withAxis } from "./vec";
 import type { Volume } from "./volume";

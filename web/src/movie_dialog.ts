@@ -1,11 +1,11 @@
 // The window for a movie of one turn, which the gateway makes while the page reads it.
-import { type Api, ApiError } from "./api";
+import { type Api, ApiError, type Options } from "./api";
 import { annotationFields } from "./annotation_fields";
 import { button, row, segmented } from "./controls";
 import { dialog } from "./dialogs";
 import { bytes, copyText, download, h } from "./dom";
 import { pathOf } from "./key_frames";
-import { type Options, renderOptions } from "./options";
+import { renderOptions } from "./options";
 import type { State } from "./state";
 
 const FRAMES = { usual: 120, most: 1000 } as const, FPS = { usual: 25, most: 120 } as const;

@@ -1,5 +1,5 @@
 // What the page shows: one plain object. All of it is in the link (link.ts), and pictures follow from it alone (options.ts).
-import { PATIENT_START } from "./camera";
+import { PATIENT_START, type Viewpoint } from "./camera";
 import type { Measure } from "./measure";
 import type { ColorMap } from "./transfer";
 import type { Vec3 } from "./vec";
@@ -10,20 +10,14 @@ export type Bounds = readonly [number | null, number | null]; // null: not clipp
 export type ClipBox = readonly [Bounds, Bounds, Bounds];
 export type ClipPlane = readonly [number, number, number, number]; // keeps n . p + d >= 0
 
-export interface KeyFrame { azimuth: number; elevation: number; roll: number; zoom: number; lookAt: Vec3 }
+export interface KeyFrame extends Viewpoint { lookAt: Vec3 }
 
 export const MOST_KEY_FRAMES = 100;
 
 export const ONE_COLOR = "one-color"; // instead of a preset: from clear to this colour
 
-export interface State {
+export interface State extends Viewpoint {
   dataset: string;
-  // The view
-  azimuth: number; // degrees
-  elevation: number;
-  roll: number;
-  zoom: number;
-  lookAt: Vec3 | null; // null: the middle of what shows (the service's `fit`)
   projection: "orthographic" | "perspective";
   // The look
   renderer: string;
