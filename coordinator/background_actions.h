@@ -38,7 +38,7 @@ using PlanFunction = std::function<Result<std::shared_ptr<const PlannedFrame>>(P
 
 inline constexpr std::size_t kLoadsAtOnce = 4;
 inline constexpr std::size_t kFarLoadsAtOnce = 16;  // so three servers that do not answer leave the others alone
-inline constexpr std::size_t kAnswersAtOnce = 8;    // likewise
+inline constexpr std::size_t kAnswersAtOnce = 8;    // so one server that does not answer leaves the others alone
 inline constexpr std::size_t kChecksAtOnce = 4;     // so one file system that does not answer leaves the others alone
 inline constexpr std::size_t kCountsAtOnce = 4;
 inline constexpr std::size_t kPlansAtOnce = 8;
@@ -79,7 +79,7 @@ class BackgroundActions {
     CoordinatorEvent event;
     DatasetId dataset = 0;
     VoxelServer::Samples samples = {};
-    std::shared_ptr<UploadBuffer> upload = nullptr;  // of an UploadBegun
+    std::shared_ptr<UploadBuffer> upload = nullptr;  // the event is UploadBegun: the buffer for its bytes
   };
   static Result<News> Load(const LoadDataset& action, const TellRead& tell);
   static Result<News> Open(const LoadDataset& action, OpenedSource opened, const TellRead& tell);
@@ -96,7 +96,8 @@ class BackgroundActions {
   const std::shared_ptr<Planner> planner_;
   const std::shared_ptr<Prefetcher> prefetcher_ = std::make_shared<Prefetcher>();
   VoxelServer& voxels_;
-  const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();  // of the search that is under way: one at a time
+  // what the search under way knows; one search at a time
+  const std::shared_ptr<FolderMemory> folders_ = std::make_shared<FolderMemory>();
   std::map<UploadId, std::shared_ptr<UploadBuffer>> uploads_;  // begun and neither finished nor dropped; null: memory is being taken
   std::map<PlanId, std::stop_source> plans_;                   // under way and not dropped
   std::map<PeerToken, std::stop_source> choosers_;             // clients whose policies may be chosen

@@ -72,17 +72,17 @@ struct OpenedSource {
   std::shared_ptr<VolumeSource> source;
   Survey survey;
   std::string text;                              // where workers find it
-  std::shared_ptr<const FileStamp> stamp;        // of its files as they were surveyed
+  std::shared_ptr<const FileStamp> stamp;        // the state of its files when they were surveyed
   std::shared_ptr<const BrickIndex> index = {};  // null: there is none, or none that can be used; a line of the log says why
 };
 
 // A volume that was read as a whole.
 struct LoadedSource {
-  VolumeFileInfo file;  // of its paths; nothing if a function has loaded it
+  VolumeFileInfo file;  // the header of its files; empty if a function has loaded it
   std::shared_ptr<const Volume> volume;
   Layers layers;
-  std::shared_ptr<const FileStamp> stamp;          // of its files as they were read; null: they never change
-  std::shared_ptr<const ExactSamples> exact = {};  // of whole numbers that are rounded in the volume; null: none is
+  std::shared_ptr<const FileStamp> stamp;          // the state of its files when they were read; null: they never change
+  std::shared_ptr<const ExactSamples> exact = {};  // the whole numbers that the volume rounds; null: it rounds none
 };
 
 using ReadableSource = std::variant<OpenedSource, LoadedSource>;

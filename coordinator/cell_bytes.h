@@ -14,7 +14,7 @@ namespace slabstream {
 
 class CellBytes {
  public:
-  // Of `box`, not empty, as EncodeMesh has them.
+  // The bytes of the cells in `box`, as EncodeMesh makes them. The box is not empty.
   Bytes Of(const std::shared_ptr<const MeshCutter>& cells, const Box& box);
 
  private:

@@ -20,7 +20,7 @@ namespace slabstream {
 // Bytes of payloads that were sent to a client and that it has not read: with so many or more it is behind.
 inline constexpr std::uint64_t kMaxUnreadBytes = std::uint64_t{128} << 20;
 inline constexpr std::uint64_t kLeastUnreadPart = std::uint64_t{4} << 20;  // more than a client reads before it says so
-inline constexpr std::size_t kMaxKeptAnswers = 64;                         // of one client
+inline constexpr std::size_t kMaxKeptAnswers = 64;                         // answers kept for one client
 // Bytes of the payloads of one client's kept answers. Few, since answers are hardly ever asked for again, and since a picture that is kept
 // holds a buffer that the next picture could use while it is still in a cache.
 inline constexpr std::size_t kMaxKeptAnswerBytes = std::size_t{8} << 20;

@@ -30,7 +30,7 @@ class CoordinatorMetrics {
   };
   Snapshot<Machines> now;
 
-  std::string Text(const std::function<void()>& wake);  // as in Snapshot
+  std::string Text(const std::function<void()>& wake);  // the metrics' text; `wake` is that of Snapshot
 
  private:
   const std::uint64_t memory_limit_;  // 0: none

@@ -32,13 +32,13 @@ struct SourceAtLevel {
   std::shared_ptr<const VolumeSummary> surveyed;  // Survey::summary
   std::optional<int> surveyed_level = {};         // the survey's level, if that is it and all of it was read
   StoredAt stored;                                // where workers find it
-  std::shared_ptr<const FileStamp> stamp;         // of its files
-  std::shared_ptr<const BrickIndex> index = {};   // of the source; null: there is none
+  std::shared_ptr<const FileStamp> stamp;         // the state of its files
+  std::shared_ptr<const BrickIndex> index = {};   // the source's brick index; null: there is none
 };
 
 using VolumeLoader = std::function<Result<std::shared_ptr<const Volume>>()>;
 struct LoadedData : LayeredVolume {
-  std::shared_ptr<const ExactSamples> exact = nullptr;  // of whole numbers that the volume rounds
+  std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that the volume rounds
 };
 using DataLoader = std::function<Result<LoadedData>(const TellRead&)>;
 
@@ -59,11 +59,12 @@ struct DataSource {
 
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
-  LayerFiles layers;   // of a named one
-  std::shared_ptr<const SourceAtLevel> at_level = {};  // of one that has several: this one, which is loaded as a dataset of its own
-  DataLoader load;                                     // set: `path` and `layers` are not used
-  std::shared_ptr<const ClientFile> sent;              // `path` is this file, which is deleted with the last source of it
-  std::uint64_t held_bytes = 0;                        // of memory that it takes itself, whether it is loaded or not: a client has sent it
+  LayerFiles layers;   // the files of the layers; only a named dataset has them
+  // set: this is one level of a source with several, and is loaded as a dataset of its own
+  std::shared_ptr<const SourceAtLevel> at_level = {};
+  DataLoader load;                         // set: `path` and `layers` are not used
+  std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it
+  std::uint64_t held_bytes = 0;            // memory that the source itself takes, loaded or not, since a client has sent it
 };
 
 // By name.
@@ -73,7 +74,7 @@ using Catalogue = std::map<std::string, DataSource>;
 struct FoundData {
   Catalogue datasets;
   std::vector<std::string> folders;     // that are to be watched
-  std::vector<Status> errors;           // of arguments and of named files
+  std::vector<Status> errors;           // why an argument or a named file is wrong
   std::vector<std::string> complaints;  // about files in folders, a line each: left out, or not to be read so far
 };
 

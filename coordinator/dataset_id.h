@@ -12,7 +12,8 @@ namespace slabstream {
 
 // Reads every voxel once. `exact`: its exact samples; null: those of the volume are. Not 0.
 DatasetId IdOf(const std::string& name, const Volume& volume, const Layers& layers = {}, const ExactSamples* exact = nullptr);
-// Of voxels that nobody has read: their files have another version if they are other voxels. `name`: of the dataset, or of one level of it.
+// The number of voxels that nobody has read: their files have another version if they are other voxels. `name` is that
+// of the dataset, or of one level of it.
 DatasetId IdOf(const std::string& name, const VolumeDescription& description, const StoredAt& stored);
 
 }  // namespace slabstream

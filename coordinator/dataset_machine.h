@@ -38,15 +38,15 @@
 
 namespace slabstream {
 
-using OrderId = std::uint64_t;     // of an order about datasets that waits; never given twice
-using QuestionId = std::uint64_t;  // likewise
-using UploadId = std::uint64_t;    // likewise, of a dataset that a client sends
+using OrderId = std::uint64_t;     // an order about datasets that waits; a number is never given twice
+using QuestionId = std::uint64_t;  // a question that waits; a number is never given twice
+using UploadId = std::uint64_t;    // a dataset that a client sends; a number is never given twice
 
 struct DatasetConfig {
   Catalogue datasets;
   std::set<std::string> folders;                      // that are watched, as WatchedFolder says them
   std::uint64_t memory_bytes = 0;                     // limit of the coordinator's memory; 0: none
-  std::size_t max_questions = 1024;                   // of all clients
+  std::size_t max_questions = 1024;                   // questions of all clients together
   Duration check_interval = std::chrono::seconds(5);  // between checks of the watched folders
   std::size_t max_datasets = kMaxListed;              // in the catalogue
   LogLevel log_level = LogLevel::kOff;                // Notes of lower levels are not made
@@ -71,15 +71,15 @@ struct DatasetLoaded {
   DatasetId dataset = 0;  // not 0
   std::shared_ptr<const VolumeSummary> summary;
   std::uint64_t bytes = 0;                           // memory of its voxels beside what the source holds
-  std::shared_ptr<const FileStamp> stamp = nullptr;  // of its files as they were read; null: they never change
+  std::shared_ptr<const FileStamp> stamp = nullptr;  // the state of its files when they were read; null: they never change
 };
-// Of a dataset with several levels: none was loaded yet.
+// The dataset has several levels. None of them was loaded yet.
 struct DatasetOpened {
   std::string name;
   LoadId load = 0;
   std::shared_ptr<const VolumeLevels> levels;  // never null
-  std::vector<DataSource> sources;             // of each level
-  std::shared_ptr<const FileStamp> stamp;      // as in DatasetLoaded
+  std::vector<DataSource> sources;             // the source of each level
+  std::shared_ptr<const FileStamp> stamp;      // as DatasetLoaded::stamp
 };
 struct DatasetReading {  // not the end yet
   std::string name;
@@ -132,7 +132,7 @@ struct LoadDataset {
   std::string name;
   LoadId load = 0;
   DataSource source;
-  std::uint64_t most_bytes = 0;  // of voxels that are held; more stay where they are, if the source can be read in parts
+  std::uint64_t most_bytes = 0;  // the most voxels that may be held; more stay where they are, if the source can be read in parts
 };
 // Its voxels are not needed any more.
 struct UnloadDataset {
@@ -162,7 +162,8 @@ struct AnswerQuestion {
   // 0: a SummaryQuery or ViewQuery about a dataset with several levels, which needs no voxels
   DatasetId dataset = 0;
   std::shared_ptr<const VolumeSummary> summary;
-  std::shared_ptr<const VolumeLevels> levels = nullptr;  // of a ViewQuery about such a dataset, whose summary is the overview's
+  // the levels, for a ViewQuery about such a dataset; its summary is the overview's
+  std::shared_ptr<const VolumeLevels> levels = nullptr;
 };
 // -> UploadBegun: room for the bytes of `order`.
 struct BeginUpload {

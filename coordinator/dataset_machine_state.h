@@ -24,7 +24,7 @@ namespace slabstream {
 
 inline std::string InQuotes(const std::string& name) { return '"' + name + '"'; }
 
-// Of an entry of the table, for messages: dataset "scan", or level 2 of dataset "scan".
+// An entry of the table, named for messages: dataset "scan", or level 2 of dataset "scan".
 inline std::string Named(const std::string& entry) {
   const std::string dataset = "dataset " + InQuotes(DatasetOfLevel(entry));
   return IsLevelName(entry) ? "level " + entry.substr(entry.find('\n') + 1) + " of " + dataset : dataset;
@@ -36,16 +36,17 @@ struct DatasetMachine::State {
   // A dataset that a request needs.
   struct Use {
     std::shared_ptr<const FrameRequest> request;
-    std::int64_t most_level_bytes = 0;  // as in SeekDataset
-    // Of the table: what it waits for. The dataset, or the levels of it that it draws, finest first, then that of its light volume.
+    std::int64_t most_level_bytes = 0;  // SeekDataset::most_level_bytes
+    // The entries of the table that it waits for: the dataset, or the levels of it that it draws, finest first, then
+    // that of its light volume.
     struct Entry {
       std::string name;
       CheckId check = 0;  // at its files, which must be over before a frame begins; 0: none
     };
     std::vector<Entry> entries;
     std::shared_ptr<const LevelMap> map = {};  // once it waits for levels
-    std::optional<ViewParameters> view = {};   // likewise (DatasetReady::view)
-    bool has_light = false;                    // likewise: the last one is that of its light volume
+    std::optional<ViewParameters> view = {};   // set once it waits for levels (DatasetReady::view)
+    bool has_light = false;                    // once it waits for levels: the last one is that of its light volume
     std::vector<DatasetId> kept = {};          // its frame has begun with these voxels; empty: it has not begun
 
     bool begun() const { return !kept.empty(); }
@@ -62,9 +63,9 @@ struct DatasetMachine::State {
   struct OpenQuestion {
     PeerToken client = 0;
     Question question;
-    std::string entry;   // as of a Use
-    CheckId check = 0;   // likewise
-    bool asked = false;  // of the executor
+    std::string entry;   // the entry of the table that it waits for
+    CheckId check = 0;   // the check of its files, which must be over first; 0: none
+    bool asked = false;  // whether the executor was asked
   };
   // A dataset on its way from a client.
   struct OpenUpload {
@@ -90,10 +91,10 @@ struct DatasetMachine::State {
   std::map<std::string, std::string> hidden;  // names that were removed though their files are still there, and the folder of each
   RefusedRequests refused;                    // questions and uploads, and what could not be decoded
 
-  Time now;  // of this Step
+  Time now;  // the time of this Step
   bool started = false, stopped = false;
-  std::vector<DatasetAction> actions;  // of this Step
-  DatasetNews news;                    // likewise
+  std::vector<DatasetAction> actions;  // the actions of this Step
+  DatasetNews news;                    // the news of this Step
 
   // ---- events
   void On(const ToDatasets& event) {
@@ -175,7 +176,7 @@ struct DatasetMachine::State {
 
   // ---- uploads
   Status AdmitUpload(const AddVolume& order);
-  std::uint64_t UploadBytes() const;  // of those under way, and of files that clients have sent
+  std::uint64_t UploadBytes() const;  // bytes of the uploads under way, and of the files that clients have sent
   void GrantCredit(OpenUpload& upload);
   using Upload = std::map<UploadId, OpenUpload>::iterator;
   Upload UploadOf(PeerToken client, std::optional<std::uint64_t> nonce = {});  // end: it has none, or another one

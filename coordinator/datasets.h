@@ -75,7 +75,7 @@ class DatasetTable {
   std::set<std::string> folders;         // that are watched
 
   // ---- voxels
-  LoadId BeginLoad(const std::string& name, Time now);  // of an unloaded or failed one
+  LoadId BeginLoad(const std::string& name, Time now);  // begins to load a dataset that is unloaded or failed
   void Use(const std::string& name);                    // a request asks for it
   // The end of a load. False: another one was begun since, or none; nothing changes.
   bool Loaded(const std::string& name, LoadId load, DatasetId id, std::shared_ptr<const VolumeSummary> summary, std::uint64_t bytes,
@@ -88,7 +88,7 @@ class DatasetTable {
   void Reset(const std::string& name, Time now);
   void Fail(const std::string& name, const Status& status, Time now);
 
-  std::uint64_t bytes() const;          // of all voxels, the retired ones too
+  std::uint64_t bytes() const;          // bytes of all voxels, the retired ones too
   bool Holds(DatasetId dataset) const;  // ready or retired
   std::size_t retired() const { return retired_.size(); }
   // Unloads the least recently used one of those that are not `in_use`, nor held by their source. nullopt: there is none.

@@ -47,7 +47,7 @@ class DeadlineForecast {
  private:
   struct Running {
     Frame frame;
-    Duration begun{};  // of Shared()
+    Duration begun{};  // Shared() when the frame began
   };
   struct Remaining {
     const Frame* frame = nullptr;

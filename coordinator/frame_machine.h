@@ -70,10 +70,11 @@ struct CoordinatorConfig {
   Duration return_wait = std::chrono::seconds(5);  // for the workers of an earlier coordinator, once one of them is there
   Duration stall_timeout = std::chrono::seconds(60);
   int max_stalls = 5;
-  std::size_t max_queued = 1024;                                   // frames of all clients
-  std::uint64_t share_pixels = kSharePixels;                       // of a picture that its client puts together (ClientTakes)
-  LogLevel log_level = LogLevel::kOff;                             // Notes of lower levels are not made
-  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;  // of this process; null: it asks no web server
+  std::size_t max_queued = 1024;              // frames of all clients
+  std::uint64_t share_pixels = kSharePixels;  // pixels of a share, in a picture that its client puts together (ClientTakes)
+  LogLevel log_level = LogLevel::kOff;        // Notes of lower levels are not made
+  // what this process reads from web servers; null: it reads from none
+  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;
 };
 
 // ---- events
@@ -86,7 +87,7 @@ struct FromClient {
   PeerToken from = 0;
   ClientToFrames message;
   std::string host = {};           // that it has connected from, as in an endpoint; empty: not known
-  std::uint64_t unsent_bytes = 0;  // of payloads for it that wait in this process
+  std::uint64_t unsent_bytes = 0;  // bytes of the payloads for this client that wait in this process
 };
 // The client has said something to the DatasetMachine, too.
 struct ClientHeard {
@@ -103,7 +104,7 @@ struct ClientGone {
 // The end of a count.
 struct OccupiedCounted {
   CountId count = 0;
-  Result<std::shared_ptr<const OccupancyGrid>> grid;  // of the dataset's size
+  Result<std::shared_ptr<const OccupancyGrid>> grid;  // the grid has the dataset's size
 };
 // The end of a PlanRequest.
 struct Planned {
@@ -174,7 +175,7 @@ class FrameMachine {
   Time NextWake() const;
   FrameSizes sizes() const;
   FrameCounts counts() const;
-  std::uint64_t frames_done() const;  // as in counts()
+  std::uint64_t frames_done() const;  // counts().frames_done
 
  private:
   struct State;

@@ -59,7 +59,7 @@ struct FrameMachine::State {
   UseId last_use = 0;
   const FrameLimits limits;
 
-  Time now;                     // of this Step
+  Time now;                     // the time of this Step
   Time wake = Time::max();      // promised at the end of the last Step
   std::optional<Time> started;  // the first Step
   Time next_ping;               // while there are workers
@@ -67,7 +67,7 @@ struct FrameMachine::State {
   std::uint64_t frames_done = 0, frames_failed = 0, frames_cancelled = 0, workers_lost = 0;
   RefusedRequests refused;
 
-  std::vector<FrameAction> actions;  // of this Step
+  std::vector<FrameAction> actions;  // the actions of this Step
 
   // ---- events
   void On(const FromWorker& event) {
@@ -108,7 +108,7 @@ struct FrameMachine::State {
   void OnClientMessage(PeerToken client, const CancelFrame& message);
   void OnPing(const FromClient& event, const ClientPing& message);
   void OnClientMessage(PeerToken client, const StatusQuery& message);
-  std::vector<WebTraffic> WebTrafficOfAll() const;  // of this process and its workers, by server
+  std::vector<WebTraffic> WebTrafficOfAll() const;  // what this process and its workers read, by server
   void OnClientMessage(PeerToken client, const ShutDown& message);
 
   // ---- requests

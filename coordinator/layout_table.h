@@ -32,16 +32,17 @@ class LayoutTable {
  public:
   static constexpr std::size_t kMaxKept = 16;   // layouts
   static constexpr std::size_t kMaxLearnt = 4;  // costs: two thirds of an OccupancyGrid each
-  static constexpr double kLeastWeight = 0.2;   // of a frame, however many came before it: older ones fade by a fifth a frame
+  // the least weight of a frame, however many came before it: older ones fade by a fifth a frame
+  static constexpr double kLeastWeight = 0.2;
 
   struct Request {
     const ResolvedPolicy* policy = nullptr;
-    const ClassifiedVolume* volume = nullptr;  // of the frame
+    const ClassifiedVolume* volume = nullptr;  // the frame's volume
     const VolumeSummary* summary = nullptr;
     std::shared_ptr<const OccupancyGrid> occupied;  // null: the policy does not need it, or begins without it
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
-    // As in ResolvedRequest.
+    // The levels that the frame draws (ResolvedRequest::map and coarser).
     std::shared_ptr<const LevelMap> map = {};
     std::span<const CoarserVolume> coarser = {};
     std::stop_token stop = {};  // told to stop, Find returns soon
@@ -68,7 +69,7 @@ class LayoutTable {
     std::uint32_t slots = 1;
     std::int64_t box_bytes_target = kBoxBytesTarget;
     bool by_bricks = false;  // the policy needs occupied voxels, but they were not counted yet
-    LevelMap map = {};       // of one level: the whole volume
+    LevelMap map = {};       // with one level: the whole volume
     friend bool operator==(const Key&, const Key&) = default;
   };
   // Combining moves no box, so policies that differ in that alone share a layout.
@@ -77,7 +78,7 @@ class LayoutTable {
     Key key;
     std::shared_ptr<const Layout> layout;
     bool by_cost = false;         // made when costs were known
-    int frames_seen = 0;          // of this layout
+    int frames_seen = 0;          // frames of this layout
     std::vector<double> seconds;  // by box, over these frames; newer ones count more; 0: not rendered yet
     double lost = 0;              // LostSeconds of these frames
     double lost_at_look = 0;      // `lost` when a change was weighed last
@@ -100,7 +101,7 @@ class LayoutTable {
 
   std::mutex mutex_;          // guards what follows
   std::list<Entry> entries_;  // most recently used first
-  std::list<Learnt> learnt_;  // likewise
+  std::list<Learnt> learnt_;  // most recently used first
 };
 
 }  // namespace slabstream

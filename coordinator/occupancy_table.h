@@ -27,7 +27,8 @@ class OccupancyTable {
 
   // The end of a count. If there is none with this id under way, nothing changes.
   void Counted(CountId count, std::shared_ptr<const OccupancyGrid> grid);
-  // Likewise; returns the volume whose count failed. It may be begun anew.
+  // The end of a count that failed. Returns its volume, whose count may be begun anew; none: there is no such count
+  // under way.
   std::optional<ClassifiedVolume> Failed(CountId count);
 
   void Forget(DatasetId dataset);  // all grids of it, and counts under way

@@ -40,7 +40,7 @@ struct OpenRequest {
   SubmitFrame submit;
   std::optional<PicturesAddress> pictures = {};  // where its client takes them
   Time arrived;
-  UseId use = 0;             // of its dataset
+  UseId use = 0;             // the use of its dataset
   std::string lowered = {};  // FrameStatistics::lowered
   bool coarse = false;       // it makes a preview of the client's request of this number (frame_machine_previews.cpp)
   FrameKind kind = 0;        // for the forecast; not of coarse ones
@@ -55,7 +55,7 @@ struct OpenRequest {
     bool seen = false;                                // DatasetReady::seen: its frame may begin
     std::shared_ptr<const VolumeLevels> levels;       // DatasetReady::levels and drawn
     std::vector<int> drawn = {0};
-    ViewParameters view = {};  // of the picture, complete, in terms of the finest level (ChooseView)
+    ViewParameters view = {};  // the picture's view, complete, in terms of the finest level (ChooseView)
     std::variant<std::monostate, PlanAsked, PlanMade> plan = {};
     const ClassifiedVolume& volume() const { return resolved->volume; }
     // The voxels that its frame is drawn from: the volume first.
@@ -110,7 +110,7 @@ class RequestQueue {
   std::size_t size() const;
   Duration UsedBy(PeerToken client) const { return turns_.TurnOf(client).used; }
   std::size_t clients() const;                  // that have requests in it
-  std::size_t CountOf(PeerToken client) const;  // of what the client has asked for
+  std::size_t CountOf(PeerToken client) const;  // requests of this client
   // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);
 

@@ -74,7 +74,7 @@ class LiveRoster {
   bool empty() const { return members_.empty(); }
   Time empty_since() const { return empty_since_; }            // from then on one may come; Time::min(): there never was a worker
   bool last_gave_notice() const { return last_gave_notice_; }  // the one since whose removal it is empty
-  SlotPlace PlaceOf(WorkerId worker) const;                    // of a member
+  SlotPlace PlaceOf(WorkerId worker) const;                    // a member's slot
 
   Roster slots() const;                               // 0 where a slot is vacant
   std::uint64_t version() const { return version_; }  // changes whenever slots() does

@@ -122,7 +122,7 @@ class RunningFrame {
   Status Expire(Time now);           // stalls, suspicions
   void Postpone(Duration duration);  // both end later, since the listener itself was asleep
 
-  Time NextWake() const;  // of Expire and AttemptDue; Time::max(): none
+  Time NextWake() const;  // when Expire or AttemptDue has something to do; Time::max(): never
 
   FrameProgress Progress() const;
   FrameStatistics Statistics(Time now) const;
@@ -171,7 +171,7 @@ class RunningFrame {
 
   std::vector<WorkerId> displays_;        // by attempt - 1
   std::uint32_t accumulating_since_ = 1;  // the attempt that the present display worker began with nothing
-  std::uint32_t first_group_ = 0;         // of this attempt
+  std::uint32_t first_group_ = 0;         // the first group of this attempt
   std::uint32_t next_group_ = 0;          // to be handed out
   std::uint32_t groups_done_ = 0;         // by the present display worker
   std::uint32_t furthest_done_ = 0;       // by any
@@ -193,7 +193,7 @@ class RunningFrame {
     std::optional<PictureShare> picture;
     Bytes payload;
   };
-  std::vector<Share> shares_;  // of this attempt
+  std::vector<Share> shares_;  // the shares of this attempt
 };
 
 }  // namespace slabstream

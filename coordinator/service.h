@@ -25,7 +25,7 @@ struct CoordinatorOptions {
   std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
   Catalogue catalogue;               // datasets
   std::set<std::string> folders;     // that are watched (FoundData)
-  Codec codec = Codec::kRaw;         // of voxels on their way to workers; zstd pays if the link is slower than packing
+  Codec codec = Codec::kRaw;         // how voxels travel to workers; zstd pays if the link is slower than packing
   CoordinatorConfig machine;         // filled in by Start: epoch, pid, voxels_endpoint
   ServiceSurroundings surroundings;  // except the link, filled in by Start
   PlanFunction make_plan = &Planner::Plan;

@@ -24,7 +24,8 @@ class ServiceKeys {
   // Once the planes are bound: writes the service files, with new keys where they are missing. Errors of KeyFolder::Publish.
   Status Publish(const std::string& client_endpoint, const std::string& worker_endpoint);
 
-  // Of the sender of a message that came over an encrypted connection, and was heard thereby; nullopt: its key is no longer admitted.
+  // The role of whoever sent a message over an encrypted connection, which also notes that it was heard; nullopt: its
+  // key is no longer admitted.
   std::optional<Role> RoleOf(const Incoming& incoming);
 
   struct Done {

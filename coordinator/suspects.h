@@ -27,7 +27,7 @@ class Suspects {
 
  private:
   static constexpr int kSuspect = 2, kGuilty = 3;
-  std::map<Part, int> deaths_;  // of workers that held it
+  std::map<Part, int> deaths_;  // deaths of workers that held the part
 };
 
 }  // namespace slabstream

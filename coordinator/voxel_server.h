@@ -43,16 +43,16 @@ class VoxelServer {
     std::shared_ptr<const Volume> volume = nullptr;
     std::shared_ptr<const BrickedVoxels> bricks = nullptr;
     std::shared_ptr<const BrickedVoxels> labels = nullptr, overlay = nullptr;
-    std::shared_ptr<const MeshCutter> cells = nullptr;    // of an unstructured grid
-    std::shared_ptr<const ExactSamples> exact = nullptr;  // of whole numbers that `volume` rounds
+    std::shared_ptr<const MeshCutter> cells = nullptr;    // the cells of an unstructured grid
+    std::shared_ptr<const ExactSamples> exact = nullptr;  // the whole numbers that `volume` rounds
     // Instead of all that: a level of a source, of which nothing is held.
     struct InParts {
       std::shared_ptr<VolumeSource> source = nullptr;
       int level = 0;
       const VolumeDescription& description() const { return source->info().levels[std::size_t(level)].description; }
     } in_parts = {};
-    std::shared_ptr<VolumeSource> read_from = nullptr;  // of `volume`, if chunks tell what was read of it
-    std::optional<VolumeDescription> description = {};  // of what is held; none: nobody can ask for its light volume
+    std::shared_ptr<VolumeSource> read_from = nullptr;  // where `volume` was read from, if chunks tell what was read of it
+    std::optional<VolumeDescription> description = {};  // describes what is held; none: nobody can ask for its light volume
 
     bool any() const { return volume != nullptr || bricks != nullptr || in_parts.source != nullptr; }
     // What follows needs any().
@@ -102,7 +102,7 @@ class VoxelServer {
   std::vector<std::string> TakeUnwanted();
   void Answer(const Incoming& incoming);
   Samples LightVolume(DatasetId light);  // neither: it is that of no dataset
-  // Of voxels that are read first: Reply follows when they are there.
+  // Reads the next voxels that must be read first; Reply follows when they are there.
   void ReadNext(DatasetId dataset);
   void Reply(const std::string& identity, const ChunkRequest& request, Result<std::pair<Chunk, Bytes>> answer);
   Bytes Cut(const Samples& samples, const Box& box, const ChunkPart& part);
@@ -120,7 +120,7 @@ class VoxelServer {
     Result<std::pair<Chunk, Bytes>> answer;
   };
   static constexpr std::size_t kReadAtOnce = 32;  // chunks of a dataset, which are in memory until they are sent
-  struct Reads {                                  // of a dataset
+  struct Reads {                                  // the reads of a dataset
     std::deque<Asked> waiting;                    // no two alike
     std::size_t begun = 0;                        // and not ended
   };

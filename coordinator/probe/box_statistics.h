@@ -18,7 +18,7 @@ namespace slabstream {
 struct BoxStatistics {
   std::uint64_t voxels = 0;      // finite ones whose centres lie in the box or on its sides
   std::uint64_t non_finite = 0;  // the others there
-  // Of the data values of `voxels`; 0 if there are none.
+  // The mean of the data values of `voxels`; 0 if there are none.
   double mean = 0;
   double deviation = 0;  // standard deviation: the root of the mean squared difference from the mean
   double least = 0, largest = 0;
@@ -39,7 +39,7 @@ struct WholeNumbers {
 };
 
 struct MeasuredVolume {
-  VoxelBricks voxels;  // of the whole volume
+  VoxelBricks voxels;  // all voxels of the volume
   const VolumeDescription& description;
   std::optional<WholeNumbers> exact = {};  // in place of `voxels`
 };

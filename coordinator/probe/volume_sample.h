@@ -10,7 +10,7 @@
 namespace slabstream {
 
 struct LabelAt {
-  std::uint32_t value = 0;  // as in the file; 0: none
+  std::uint32_t value = 0;  // the label's number in the file; 0: none
   std::string name = {};    // "": none is known
   friend bool operator==(const LabelAt&, const LabelAt&) = default;
 };
@@ -23,7 +23,7 @@ struct VolumeSample {
   std::optional<LabelAt> label = {};        // if the dataset has labels
   std::optional<double> overlay = {};       // data value of its overlay; none: there is none here
   std::optional<double> interpolated = {};  // data value at the point itself, trilinear (ProbeVolume::Interpolated); none: it is not finite
-  std::int64_t rest = 0;                    // of `value`, as of ExactValue
+  std::int64_t rest = 0;                    // what `value` leaves out, as in ExactValue
   friend bool operator==(const VolumeSample&, const VolumeSample&) = default;
 };
 
