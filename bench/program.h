@@ -51,7 +51,7 @@ struct Subject {
   std::shared_ptr<const VolumeSummary> summary;
   std::shared_ptr<const OccupancyGrid> occupied;
   FrameRequest request;
-  FrameSetup setup;  // of the request
+  FrameSetup setup;  // the request's setup
 };
 
 struct SubjectOptions {

@@ -60,7 +60,7 @@ struct DataSource {
   std::string path;    // a file, or a folder of slices; a named one may have options for reading it behind a question mark
   std::string folder;  // the watched folder that it was found in; empty: it was named
   LayerFiles layers;   // the files of the layers; only a named dataset has them
-  // set: this is one level of a source with several, and is loaded as a dataset of its own
+  // Set: this is one level of a source with several, and is loaded as a dataset of its own.
   std::shared_ptr<const SourceAtLevel> at_level = {};
   DataLoader load;                         // set: `path` and `layers` are not used
   std::shared_ptr<const ClientFile> sent;  // `path` is this file, which is deleted with the last source of it

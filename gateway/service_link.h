@@ -26,8 +26,8 @@ class ServiceLink {
   using Ticket = std::uint64_t;
   using AnswerHandler = std::function<void(Result<QuestionReply>)>;
   struct Rendered {
-    std::vector<Picture> pictures;  // of each frame
-    PictureKey key;                 // of the first frame, if it was asked for
+    std::vector<Picture> pictures;  // one for each frame
+    PictureKey key;                 // the key of the first frame, if it was asked for
   };
   struct Handlers {
     std::function<void(const FrameProgress&)> progress;  // may be empty
@@ -61,11 +61,11 @@ class ServiceLink {
   };
   struct OpenTask {
     Handlers handlers;
-    std::vector<RequestId> requests;  // of each frame, and of the question
+    std::vector<RequestId> requests;  // one for each frame, and that of the question
     FrameRequest first;               // frame
     Rendered rendered;
     std::size_t left = 0;    // requests that are not finished
-    AnswerHandler answered;  // of a question alone, instead of `handlers`
+    AnswerHandler answered;  // instead of `handlers`, if there is a question alone
   };
 
   Ticket Post(Task task);
@@ -79,7 +79,7 @@ class ServiceLink {
 
   Context& context_;
   const ServiceAddress address_;
-  // Of the link's thread.
+  // Used by the link's thread alone.
   std::map<Ticket, OpenTask> open_;
   std::map<RequestId, Ticket> requests_;
   Status reason_;  // why there is no client

@@ -1,4 +1,4 @@
-// ViewSession: one WebSocket with one view. It carries out what its ViewMachine decides. Of the io thread.
+// ViewSession: one WebSocket with one view. It carries out what its ViewMachine decides. Used by the io thread alone.
 #pragma once
 
 #include <atomic>
@@ -42,7 +42,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   void OnNews(std::shared_ptr<const ServiceNews> news);
   void SendStatus();
   void End();                        // the gateway stops
-  std::string_view dataset() const;  // of the latest view; empty: none has come
+  std::string_view dataset() const;  // the dataset of the latest view; empty: no view has come
 
  private:
   void Handle(ViewMessage view);
@@ -73,7 +73,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
     std::uint64_t order = 0;
     ServiceLink::Ticket ticket = 0;
     RenderedView view;      // what is known before the pictures are there
-    ImageSize size;         // of each frame
+    ImageSize size;         // the size of each frame
     bool shadowed = false;  // the view asks for shadows or ambient occlusion
   };
   std::optional<Rendering> rendering_;
@@ -85,7 +85,7 @@ class ViewSession final : public WebSocketSession, public std::enable_shared_fro
   int prefetching_ = 0;         // questions that are not answered
   std::string not_fetched_;     // a dataset of which the service fetches nothing ahead
   std::shared_ptr<const RenderedView> rendered_;
-  std::shared_ptr<std::atomic<bool>> given_up_;  // of what is being encoded
+  std::shared_ptr<std::atomic<bool>> given_up_;  // tells the encoding under way that nobody wants it any more
   std::uint64_t encoding_ = 0;                   // number of the encoding whose end is awaited
   std::optional<EncodedView> encoded_;
   Time sent_at_{};

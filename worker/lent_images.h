@@ -1,8 +1,8 @@
 // LentImages: images that other workers of this host read in this process' memory instead of receiving them.
 //
 //   1. Lend pins the memory and describes it in the message, which then carries no pixels.
-//   2. The receiver combines straight from there. If it cannot open the memory it answers ImageRefused: Find the image, and send it as
-//   runs.
+//   2. The receiver combines straight from there. If it cannot open the memory, it answers ImageRefused: then Find the
+//      image and send it as runs.
 //   3. Forget releases the images of groups that are over: they have been read, or are no longer needed.
 // No message says that an image was read. When a group is done, all images lent for it have been read, because an image is passed on only
 // after everything that went into it was read. A late reader notices (common/base/shared_arena.h). Any thread.

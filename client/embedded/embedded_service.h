@@ -16,7 +16,7 @@ namespace slabstream {
 struct EmbeddedOptions {
   int workers = 1;                 // [1, 256]
   CoordinatorOptions coordinator;  // endpoints and time-outs are filled in; the catalogue is used
-  WorkerConfig worker;             // of each; threads and budgets are used
+  WorkerConfig worker;             // what each worker gets; its threads and budgets are used
 };
 
 class EmbeddedService {

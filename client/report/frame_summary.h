@@ -8,7 +8,7 @@ namespace slabstream {
 
 struct FrameSummary {
   StageTimes stage_ns{};           // worker time, summed over ranks
-  std::int64_t render_ns = 0;      // of the worker with the longest render time
+  std::int64_t render_ns = 0;      // the longest render time of a worker
   std::int64_t combine_ns = 0;     // combining and encoding of partial images, summed over workers
   std::int64_t finish_ns = 0;      // making and encoding the picture, of all its shares
   std::uint64_t voxel_bytes = 0;   // that travelled to workers

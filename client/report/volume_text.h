@@ -33,7 +33,7 @@ nlohmann::ordered_json BoxStatisticsJson(const BoxStatistics& box);
 // What voxels of a dataset take of the world: millilitres, if the length of its unit is known in mm, cm or m; else its unit cubed.
 struct VoxelMeasure {
   std::string unit;   // "ml", "\u00b5m^3"
-  double volume = 1;  // of a voxel
+  double volume = 1;  // the volume of a voxel
 };
 VoxelMeasure MeasureOf(const VolumeGeometry& geometry);
 

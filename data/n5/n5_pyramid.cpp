@@ -1,6 +1,5 @@
-// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...), channels of these (c0,
-// c1,
-// ...), or datasets. Sources:
+// What a container holds: views as BigStitcher writes them (setupS/timepointT/sL), a group of levels (s0, s1, ...),
+// channels of these (c0, c1, ...), or datasets. Sources:
 // https://github.com/saalfeldlab/n5-viewer#metadata, https://github.com/bigdataviewer/bigdataviewer-core (N5ImageLoader)
 #include "data/n5/n5_pyramid.h"
 

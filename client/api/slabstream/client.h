@@ -90,7 +90,8 @@ class SLABSTREAM_API Image {
 
   // The bytes of a PNG file, over the background and under the annotations that options ask for: those of `slabstream render`.
   std::vector<std::byte> Png() const;
-  // Likewise of a JPEG file, over black as far as the picture is transparent. `quality` in [1, 100], else InvalidArgument.
+  // The bytes of a JPEG file, made like that PNG file; where the picture is transparent, it lies over black. `quality`
+  // in [1, 100], else InvalidArgument.
   std::vector<std::byte> Jpeg(int quality = 90) const;
   // Writes a .png, .jpg, .webp, .tif, .exr (with the floats and depths), .pdf or .svg file. It appears whole or not at all.
   // InvalidArgument: another ending. Unavailable: it cannot be written, or libslabstream-pictures.so is missing, which writes the last
