@@ -61,7 +61,7 @@ class BoxFetcher {
   Generation Acquire(const Use& use, DatasetId dataset, const Box& box, const SampleTypes& types, const std::optional<StoredAt>& stored,
                      const std::vector<FilledBox>& filled, WorkerActions& actions);
   void Release(Generation padded);  // once for each Acquire
-  // Of acquired padded boxes.
+  // What follows needs acquired padded boxes.
   bool complete(Generation padded) const { return boxes_.at(padded).is_complete(); }  // all that must be fetched is stored
   void Rendered(Generation padded);                                                   // the padded box now holds all its voxels itself
   BoxKey key(Generation padded) const { return boxes_.at(padded).key; }
@@ -117,7 +117,7 @@ class BoxFetcher {
     ClientId client = 0;              // that acquired it last
     std::vector<Generation> sources;  // pinned
     std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
-    std::uint64_t cell_bytes = 0;     // of the padded box's cells; 0: there are none, or no chunk of them has come yet
+    std::uint64_t cell_bytes = 0;     // bytes of the padded box's cells; 0: there are none, or no chunk of them has come yet
     std::size_t stored = 0, chunk_count = 0;
     std::map<ChunkPlace, int> failures;
     FetchReport report;
@@ -125,7 +125,7 @@ class BoxFetcher {
     bool begun = false;      // some of it was requested or copied: it takes memory
 
     bool is_complete() const { return stored == chunk_count; }
-    std::uint64_t RawBytes() const {  // of samples and cells
+    std::uint64_t RawBytes() const {  // bytes of samples and cells
       return std::uint64_t(key.box.voxel_count()) * key.types.bytes_per_voxel() + cell_bytes;
     }
     // Whether it can stand for a padded box in which no more than `filled` need not be read.
@@ -166,7 +166,7 @@ class BoxFetcher {
   std::map<ChunkName, InFlight> in_flight_;  // outlives its padded box: the credit is used until the chunk is stored or expires
   std::uint64_t in_flight_bytes_ = 0;
   std::uint64_t room_ = std::numeric_limits<std::uint64_t>::max();
-  std::uint64_t cached_bytes_ = 0;  // of boxes_
+  std::uint64_t cached_bytes_ = 0;  // bytes of boxes_
   Generation last_generation_ = 0;
   std::uint64_t use_counter_ = 0;
   std::map<std::pair<ClientId, DatasetId>, FrameUses> users_;

@@ -42,15 +42,15 @@ struct OutgoingPartial {
   Peer to;
   std::vector<std::byte> header;
   Bytes payload;
-  bool timed = false;             // as in the delivery
-  std::uint64_t acknowledge = 0;  // as in the message
-  GroupKey key;                   // likewise
+  bool timed = false;             // Delivery::timed
+  std::uint64_t acknowledge = 0;  // PartialImage::acknowledge
+  GroupKey key;                   // the message's group
 };
 struct OutgoingFrame {
   GroupKey key;  // the last group that it shows
   FrameImage message;
   Bytes payload;
-  std::optional<PicturesAddress> pictures;  // as in SendFrame
+  std::optional<PicturesAddress> pictures;  // SendFrame::pictures
 };
 using ExecutorOutput = std::variant<WorkerEvent, OutgoingPartial, OutgoingFrame>;
 

@@ -56,7 +56,7 @@ class FrameAccumulator {
   const std::shared_ptr<const FrameSetup> setup_;
   const std::optional<PicturesAddress> pictures_;
   const std::size_t share_, share_count_;
-  const PixelRange pixels_;  // of the share
+  const PixelRange pixels_;  // the share's pixels
   ImageNames& names_;
   const Duration preview_interval_;
 
@@ -69,7 +69,7 @@ class FrameAccumulator {
   bool group_started_ = false;
   OcclusionMask hidden_;                          // by the groups done
   std::map<std::uint32_t, GroupImage> waiting_;   // complete, but a group in front of them is missing
-  std::vector<std::vector<RankReport>> reports_;  // of the groups done, and of the one being combined
+  std::vector<std::vector<RankReport>> reports_;  // reports of the groups done, and of the one being combined
   Status failure_;
 };
 

@@ -44,7 +44,8 @@ class GroupRun {
   bool HasPeer(WorkerId worker) const { return FindPeer(worker) != nullptr; }
   const GroupKey& key() const { return assignment_.key; }
   ClientId client() const { return assignment_.client; }
-  const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }  // of this worker; none if the assignment is inconsistent
+  // This worker's ranks; none if the assignment is inconsistent.
+  const std::vector<Rank>& ranks() const { return runner_.order().ranks(); }
   const Placement& placement(Rank rank) const { return assignment_.group.placements[rank]; }
   const Status& failure() const { return failure_; }
 
@@ -92,7 +93,7 @@ class GroupRun {
   void TakeHome(Rank rank, ImagePiece&& piece, WorkerActions& actions);
   // Fills in key and frame.
   void Start(StartCombine&& combine, Rank rank, WorkerActions& actions);
-  // Of each share whose root is one of this worker's ranks, when that rank is done.
+  // Finishes each share whose root is one of this worker's ranks, when that rank is done.
   void FinishShares(WorkerActions& actions);
   void FinishShare(std::size_t share, WorkerActions& actions);
   Rank RootOf(std::size_t share) const { return assignment_.group.schedule.roots[share]; }
@@ -115,7 +116,7 @@ class GroupRun {
   const PixelRange frame_;
   Status failure_;
   Runner runner_;
-  std::map<Rank, RankState> ranks_;                      // of this worker
+  std::map<Rank, RankState> ranks_;                      // this worker's ranks
   std::multimap<std::uint32_t, Arrival> arrivals_;       // by the turn that waits for more of them; of a turn, at most one of any pixel
   std::vector<std::pair<ImageHandle, Rank>> combining_;  // StartCombine without CombineDone
   std::vector<std::size_t> unfinished_;                  // shares that end at this worker's ranks

@@ -18,7 +18,7 @@ namespace slabstream {
 std::optional<Compression> ParseCompression(std::string_view text);
 
 struct CodecSpeed {
-  double bytes_per_second = 0;  // of unpacked bytes, packed and unpacked one after the other
+  double bytes_per_second = 0;  // unpacked bytes a second, packed and unpacked one after the other
   double ratio = 1;             // packed bytes / unpacked bytes, [0, 1]
 };
 

@@ -29,7 +29,7 @@ struct LentImage {
 
 class LentImages {
  public:
-  static constexpr std::size_t kLeastBytes = std::size_t{32} << 10;  // of pixels: smaller images are sent as quickly
+  static constexpr std::size_t kLeastBytes = std::size_t{32} << 10;  // bytes of pixels: smaller images are sent as quickly
   static constexpr std::size_t kMostBytes = std::size_t{2} << 30;    // lent at a time
 
   // Fills message.shared for `view` of `image` and returns the payload. None: the memory is private, the image is small, or too much is
@@ -54,7 +54,7 @@ class LentImages {
  private:
   std::mutex mutex_;
   std::vector<std::shared_ptr<const LentImage>> lent_;  // guarded by mutex_
-  std::size_t bytes_ = 0;                               // of their pixels, guarded by mutex_
+  std::size_t bytes_ = 0;                               // bytes of their pixels, guarded by mutex_
 };
 
 }  // namespace slabstream

@@ -39,7 +39,7 @@ class LinkRates {
   void ForgetAll() { links_.clear(); }
 
  private:
-  static constexpr std::size_t kMessages = 64;  // of the past that an answer considers
+  static constexpr std::size_t kMessages = 64;  // the last messages that an answer considers
   struct Message {
     Time sent;
     std::uint64_t before;  // bytes sent earlier
@@ -52,7 +52,7 @@ class LinkRates {
     bool was_sent = false;          // whether the message with that number was sent
     std::uint64_t bytes_asked = 0;  // bytes sent in all, up to and including that message
     Time asked_sent;
-    std::deque<double> rates;  // of the last answers
+    std::deque<double> rates;  // the rates that the last answers gave
   };
   std::map<WorkerId, Link> links_;
   std::uint64_t last_number_ = 0;

@@ -66,7 +66,7 @@ class RenderQueue {
   };
   struct TurnNow {
     ClientId client = 0;
-    Time begin;    // of the turn
+    Time begin;    // when the turn began
     Time charged;  // the time before this has been charged
   };
   using Waiting = std::map<std::tuple<ClientId, GroupKey, Rank>, Job>;

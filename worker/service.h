@@ -22,8 +22,8 @@ struct WorkerOptions {
   std::string images_endpoint;       // bound; empty: any port on the way to the coordinator (tcp), a path of its own (ipc), a name (inproc)
   bool share_memory = true;          // lend images to workers of this host
   RendererFactory make_renderer = MakeRenderer;
-  TaskHook task_hook;                             // of the executor, and for "send"
-  std::optional<ClientKeys> keys = std::nullopt;  // of role worker; none: the service has no keys
+  TaskHook task_hook;                             // called for the executor's tasks, and for "send"
+  std::optional<ClientKeys> keys = std::nullopt;  // the worker's keys; none: the service has no keys
   // Start fills in incarnation, pid, host, images_endpoint, images_key, memory_scope, lends_memory. threads: [1, kMaxThreads].
   WorkerConfig machine;
 };

@@ -33,8 +33,8 @@ class StoredBox {
   // nor chunks bring.
   StoredBox(const BoxKey& key, std::vector<Copy> copies, bool stored, std::vector<FilledBox> filled = {});
 
-  // Of a box of stored voxels: where those of `box`, which lies in this one, are to be; nullopt: all are there. Whoever writes there keeps
-  // this object.
+  // For a box of stored voxels: where those of `box`, which lies in this one, must be written; nullopt: all are there.
+  // Whoever writes there keeps this object.
   std::optional<BoxRoom> RoomFor(const Box& box);
 
   // DataLoss: the chunk does not fit this padded box.
@@ -69,14 +69,14 @@ class StoredBox {
   struct Derived {
     explicit Derived(std::shared_ptr<BoxVoxels> voxels) : data(std::move(voxels)) {}
     BoxData data;
-    ClientId client = 0;  // of the last render
+    ClientId client = 0;  // the client of the last render
     bool lent = false;
     std::uint64_t last_use = 0;  // how many leases there had been when it was returned
     std::size_t bytes = 0;
   };
 
   BrickedVoxels& Arriving(Layer layer);  // the layer's voxels; the first call makes room for them
-  PaddedVoxels& ArrivingStored();        // likewise
+  PaddedVoxels& ArrivingStored();        // the stored voxels; the first call makes room for them
   // Part of the samples of `box` of the layer, as BrickedVoxels::Write.
   void Write(Layer layer, const Box& box, std::uint64_t begin, std::span<const std::byte> samples);
   void CopyFrom(const BoxVoxels& from, Layer layer, const Box& box);

@@ -77,9 +77,9 @@ struct WorkerConfig {
   std::uint32_t pid = 0;
   std::string host;
   std::string images_endpoint;
-  std::string images_key;          // as in Register
-  std::uint64_t memory_scope = 0;  // as in Register
-  bool lends_memory = false;       // as in Register
+  std::string images_key;          // Register::images_key
+  std::uint64_t memory_scope = 0;  // Register::memory_scope
+  bool lends_memory = false;       // Register::lends_memory
   Compression compression = Compression::kAuto;
   std::uint32_t threads = 1;                           // render threads, reported to the coordinator
   std::uint64_t memory_bytes = 0;                      // limit of the process (common/planning/worker_memory.h); 0: none. As in Register
@@ -93,7 +93,8 @@ struct WorkerConfig {
   Duration drain = std::chrono::seconds(30);                   // from LeaveRequested to the end; 0: at once
   std::uint64_t early_image_bytes = std::uint64_t{1} << 30;    // payloads of PartialImages kept before their assignment; then WorkerTrouble
   Duration early_image_patience = std::chrono::seconds(10);    // so long they are kept, at least
-  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;  // of this process, unless others tell of it; null: there is none
+  // What this process reads from web servers, unless others tell of it; null: nothing.
+  std::function<std::vector<WebTraffic>()> web_traffic = nullptr;
 };
 
 // The pixels of a PartialImage: runs, or another process' memory.
@@ -116,8 +117,8 @@ struct ImageUnreadable {
 };
 struct ChunkStored {
   BoxKey padded;
-  Box box;                  // as in the chunk
-  std::uint32_t chunk = 0;  // of that box
+  Box box;                  // the chunk's box
+  std::uint32_t chunk = 0;  // the chunk's number in that box
   Status status;
   std::uint64_t stored_bytes = 0;  // VolumeSource::TakeStoredBytes, of voxels that this worker has read itself
 };
@@ -148,8 +149,8 @@ struct SendFailed {
 // A SendPartial whose delivery is timed is about to be sent.
 struct PartialSent {
   WorkerId to = 0;
-  std::uint64_t acknowledge = 0;  // as in the message
-  std::size_t bytes = 0;          // of the payload
+  std::uint64_t acknowledge = 0;  // the number in the message
+  std::size_t bytes = 0;          // bytes of the payload
 };
 // Images cannot be sent to this worker, or the connection broke, so that those that were sent may be lost.
 struct PeerUnreachable {
@@ -189,7 +190,7 @@ struct OpenBox {
   BoxKey padded;
   std::vector<Copy> copies;
   bool stored = false;                 // the voxels are read in parts: nothing is known of them
-  std::vector<FilledBox> filled = {};  // of such a box: voxels that neither copies nor chunks bring
+  std::vector<FilledBox> filled = {};  // if it is read in parts: voxels that neither copies nor chunks bring
 };
 struct StoreChunk {
   BoxKey padded;
@@ -209,10 +210,10 @@ struct StartRender {
   std::shared_ptr<const FrameSetup> setup;
   std::shared_ptr<const OcclusionMask> hidden;  // tiles that need not be rendered; null: none is known
   ImageHandle image = 0;
-  std::optional<BoxKey> light = {};  // of the light volume (FrameSetup::light), whole
+  std::optional<BoxKey> light = {};  // the light volume (FrameSetup::light), whole
 };
-// Of a started render, by its image, for which RenderDone has not come. PauseRender: it stops soon, between two of its pieces, and keeps
-// what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.
+// These name a started render by its image. RenderDone has not come for it. PauseRender: it stops soon, between two of
+// its pieces, and keeps what it has. ResumeRender: it goes on. CancelRender: it ends soon; RenderDone still comes.
 struct PauseRender {
   ImageHandle image = 0;
 };
@@ -233,7 +234,7 @@ struct StartCombine {
   Rare<IncomingImage> incoming;
   Side side = Side::kBack;
   bool replace = false;  // instead: `pixels` of `image`, which have been passed on, are replaced by those of the other one
-  PixelRange pixels;     // of the frame; empty: all
+  PixelRange pixels;     // pixels of the frame; empty: all
   PixelBounds frame;
   RankInterval ranks;  // that `other` shows there; if `other` is 0: as the message says
 };
@@ -249,7 +250,7 @@ struct FindHidden {
 struct Delivery {
   bool lend = false;                              // the receiver can read this process' memory, so pixels may stay where they are
   bool timed = false;                             // -> PartialSent
-  double bytes_per_second = LinkRates::kUnknown;  // of the link; pixels that are not lent are packed if that pays
+  double bytes_per_second = LinkRates::kUnknown;  // the link's rate; pixels that are not lent are packed if that pays
 };
 // Sends message.pixels of `image`. Fills in how they travel, and adds bytes and times of messages to the reports of this worker's ranks. ->
 // SendFailed, or nothing.
@@ -281,7 +282,7 @@ struct AdmitKeys {
 struct ForgetGroups {
   FrameId finished_before = 0;
   std::vector<FrameId> cancelled;
-  GroupKey next;  // of its frame: earlier groups and older attempts
+  GroupKey next;  // over are its frame's earlier groups and older attempts
 
   bool Over(const GroupKey& key) const {
     return key.frame < finished_before || std::ranges::find(cancelled, key.frame) != cancelled.end() ||
@@ -295,7 +296,7 @@ struct SendFrame {
   FrameImage message;
   ImageHandle image = 0;
   PixelRange pixels;       // others of the image may hold anything
-  bool straight8 = false;  // as in FrameRequest
+  bool straight8 = false;  // FrameRequest::straight8
   std::shared_ptr<const FrameSetup> setup;
   std::optional<PicturesAddress> pictures = {};  // where its client takes it; none: through the coordinator
 };
@@ -324,7 +325,7 @@ struct WorkerSizes {
 // What is told of the worker from outside the service (metrics).
 struct WorkerCounts {
   WorkerSizes sizes;
-  std::uint64_t cached_bytes = 0, fetched_bytes = 0;  // as in Heartbeat
+  std::uint64_t cached_bytes = 0, fetched_bytes = 0;  // as a Heartbeat tells them
   bool registered = false, leaving = false;
 };
 

@@ -20,12 +20,12 @@ class WorkerMetrics {
  public:
   explicit WorkerMetrics(std::uint64_t memory_limit) : memory_limit_(memory_limit) {}
 
-  void Count(const WorkerEvent& event);                           // of those of the executor
+  void Count(const WorkerEvent& event);                           // counts what the executor has done
   void CountSent(Plane plane, std::size_t bytes, bool has_left);  // a payload: kImages, to a worker; kPictures, to a client
 
   Snapshot<WorkerCounts> now;
 
-  std::string Text(const std::function<void()>& wake);  // as in Snapshot
+  std::string Text(const std::function<void()>& wake);  // the metrics' text; `wake` is that of Snapshot
 
  private:
   const std::uint64_t memory_limit_;  // 0: none

@@ -24,7 +24,7 @@ class BrickRanges {
   explicit BrickRanges(const VoxelBricks& voxels);
 
   struct Range {
-    float min, max;  // of finite samples; min > max: there is none
+    float min, max;  // the range of finite samples; min > max: there is none
   };
   const Range& Of(const Index3& brick) const { return ranges_[grid_.Number(brick)]; }
   std::size_t bytes() const { return ranges_.capacity() * sizeof(Range); }

@@ -51,7 +51,7 @@ class RecentBoxes {
   static constexpr std::int64_t kMostTimes = 4;  // partitions that frames may use in turn
 
   std::list<Entry> entries_;
-  std::int64_t voxels_ = 0;  // of all boxes
+  std::int64_t voxels_ = 0;  // voxels of all boxes
 };
 
 }  // namespace slabstream

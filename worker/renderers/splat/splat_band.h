@@ -61,13 +61,13 @@ class SplatBand {
   LocalImage& image_;
   RankReport& report_;
   StageClock clock_;
-  const std::int32_t segments_, words_;  // of a row
-  const std::int32_t first_tile_row_;    // of the frame
+  const std::int32_t segments_, words_;  // segments and words of a row
+  const std::int32_t first_tile_row_;    // the first row of tiles, counted in the frame
   const bool clipped_;
   std::vector<float> opaque_alpha_;  // [row of tiles][segment]: alpha of the box at which nothing behind shows
   std::vector<SegmentWord> open_;    // [row][word]: not opaque yet
 
-  // Of the current slice.
+  // What follows belongs to the current slice.
   std::int32_t slice_ = 0;
   std::vector<std::array<ColumnInterval, 2>> left_;                // by row, of a clipped volume: columns of the slice
   std::vector<std::array<VoxelRecord, std::size_t{kOctet}>> cut_;  // records of octets near a cut
@@ -81,7 +81,7 @@ class SplatBand {
   std::vector<SegmentWord> filled_;               // [beam][word]: needed segments that the beam's voxels reach
   std::vector<std::uint8_t> any_filled_;          // [beam]: 1 if any segment is filled
   std::vector<OctetWork> octets_;                 // beam by beam
-  std::vector<VoxelPlace> octet_places_;          // of a clipped volume, or with a FrameLight: the first voxel of each octet
+  std::vector<VoxelPlace> octet_places_;          // the first voxel of each octet, if the volume is clipped or there is a FrameLight
   std::vector<OctetShares> shares_;               // with a FrameLight: of octets_
   std::vector<std::size_t> octets_before_;        // [beam], and one more: where the beam's octets begin
   std::int32_t margin_ = 0, shaded_voxels_ = 0;   // voxels beside the occupied ones; voxels in a row of shaded_

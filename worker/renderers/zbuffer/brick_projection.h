@@ -38,7 +38,7 @@ class BrickProjection {
   const Camera& camera_;
   const Index3 volume_size_;
   Vec3 ray_x_, ray_y_;                          // change of a ray per pixel: of its direction (perspective) or its origin
-  Vec3 direction_;                              // of the central ray
+  Vec3 direction_;                              // the central ray's direction
   std::array<FaceProjection, kSides> by_side_;  // the part that all bricks share
 };
 

@@ -46,7 +46,7 @@ struct KnownSurface {
 struct OpaqueVoxels {
   const ClassificationTable& table;
   const BinSelection& bins;                   // opaque ones
-  const BrickRanges& ranges;                  // of the voxels
+  const BrickRanges& ranges;                  // ranges of the voxels
   const ShownLabels* labels = nullptr;        // null: not shown
   const BrickRanges* label_ranges = nullptr;  // if they are
 };
