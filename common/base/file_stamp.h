@@ -13,12 +13,12 @@ namespace slabstream {
 
 struct FileStamp {
   std::vector<std::string> paths;
-  std::uint64_t digest = 0;                      // of device, number, size and times of each file
+  std::uint64_t digest = 0;                      // the digest of device, number, size and times of each file
   std::chrono::system_clock::time_point newest;  // when one of them was changed last, by the file system's clock
 };
 
-// Of these files, and of everything in those that are folders. Takes as long as the file system takes to answer. NotFound, Unavailable: a
-// path cannot be looked at; the message names it.
+// The state of these files, and of everything in those that are folders. Takes as long as the file system takes to
+// answer. NotFound, Unavailable: a path cannot be looked at; the message names it.
 Result<FileStamp> StampFiles(std::vector<std::string> paths);
 
 // Whether a file was written, replaced, added or removed since, or had its times changed. Changes within one tick of the file system's

@@ -27,15 +27,15 @@ struct ArenaName {
 
 // One use of one block.
 struct BlockName {
-  std::uint64_t offset = 0;  // of the first byte in the arena, a multiple of kBlockAlignment
+  std::uint64_t offset = 0;  // where its first byte lies in the arena, a multiple of kBlockAlignment
   std::uint64_t generation = 0;
-  std::uint32_t slot = 0;  // of the generation table, below kArenaSlots
+  std::uint32_t slot = 0;  // its place in the generation table, below kArenaSlots
   friend bool operator==(const BlockName&, const BlockName&) = default;
 };
 
 inline constexpr std::size_t kBlockAlignment = 4096;               // bytes: a page
 inline constexpr std::uint32_t kArenaSlots = 8190;                 // blocks at a time
-inline constexpr std::size_t kArenaBytes = std::size_t{64} << 30;  // of addresses; memory is taken when it is written
+inline constexpr std::size_t kArenaBytes = std::size_t{64} << 30;  // addresses of an arena; memory is taken when it is written
 
 // Key of the space in which process ids and their descriptors can be looked up: the running kernel and the process id namespace. Two
 // processes with different keys cannot open each other's arenas. 0: unknown, for instance without /proc.
@@ -44,7 +44,7 @@ std::uint64_t SharedMemoryScope();
 struct ArenaHeader {
   std::uint64_t magic;
   std::uint64_t id;
-  std::atomic<std::uint64_t> generations[kArenaSlots];  // of the blocks in use; 0: the slot is free
+  std::atomic<std::uint64_t> generations[kArenaSlots];  // the generations of the blocks in use; 0: the slot is free
 };
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free && sizeof(ArenaHeader) == 16 * kBlockAlignment);
 

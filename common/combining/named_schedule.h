@@ -18,7 +18,8 @@ inline constexpr std::size_t kMaxShares = 64;
 struct ScheduleName {
   std::string scheme;  // as --combine spells it, for example "radix-k:4x4"
   Rank ranks = 0;      // [0, kMaxRanks]; 0: a group without images, which needs no scheme
-  // As in a Schedule: 1 ... kMaxShares, each below `ranks`, 0 if there are none. Several shares: at most kMaxSteps ranks in all of them.
+  // Schedule's roots: 1 ... kMaxShares, each below `ranks`, 0 if there are none. If there are several shares, all of
+  // them together have at most kMaxSteps ranks.
   std::vector<Rank> roots = {0};
   friend bool operator==(const ScheduleName&, const ScheduleName&) = default;
 };

@@ -23,7 +23,7 @@ namespace slabstream {
 
 using Rank = std::uint32_t;
 inline constexpr Rank kMaxRanks = 65536;
-inline constexpr std::uint32_t kMaxSteps = std::uint32_t{1} << 20;  // of a schedule
+inline constexpr std::uint32_t kMaxSteps = std::uint32_t{1} << 20;  // steps of a schedule
 
 // Half-open interval of ranks whose images have been combined.
 struct RankInterval {

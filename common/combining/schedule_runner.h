@@ -43,7 +43,7 @@ class ScheduleRunner {
 
   struct Taken {
     StepOrder::Kind kind = StepOrder::Kind::kSend;
-    std::uint32_t index = 0, turn = 0;  // of the step
+    std::uint32_t index = 0, turn = 0;  // the step's numbers
     Rank rank = 0;                      // that takes it; kMove: one of the two
     bool last = true;                   // as StepOrder says
     const Step* step = nullptr;

@@ -41,9 +41,10 @@ struct LabelOpacity {
 
 struct LabelChoice {
   LabelMode mode = LabelMode::kTint;
-  double tint = kDefaultTint;           // [0, 1]: share of the label's colour; not of kSurface
-  std::vector<LabelOpacity> opacities;  // of labels that are not named: 1; no label twice; at most kMaxLabels
-  std::vector<LabelRange> shown;        // empty: all; at most kMaxLabelRanges
+  double tint = kDefaultTint;  // [0, 1]: share of the label's colour; not of kSurface
+  // Opacities of labels; a label that is not named has 1, none is named twice; at most kMaxLabels.
+  std::vector<LabelOpacity> opacities;
+  std::vector<LabelRange> shown;  // empty: all; at most kMaxLabelRanges
   friend bool operator==(const LabelChoice&, const LabelChoice&) = default;
 };
 
@@ -58,7 +59,7 @@ struct LabelLook {
   };
   LabelMode mode = LabelMode::kTint;  // or kSurface; kHighlight is kTint with labels that are not shown
   double tint = kDefaultTint;
-  std::vector<Entry> entries;  // of label number i: entries[i - 1]
+  std::vector<Entry> entries;  // entries[i - 1] is that of label number i
   friend bool operator==(const LabelLook&, const LabelLook&) = default;
 
   // The label is material under any transfer function.

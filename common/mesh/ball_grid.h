@@ -11,7 +11,7 @@
 namespace slabstream {
 
 struct GridRequest {
-  int size = 128;  // of the lattice, [8, 1024]
+  int size = 128;  // the lattice's side in voxels, [8, 1024]
   int cells = 32;  // hexahedra a side, [2, 256]
 };
 

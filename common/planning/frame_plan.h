@@ -30,7 +30,7 @@ struct Placement {
   Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
   std::uint8_t level = 0;              // that it is drawn from: LevelBox
-  std::vector<FilledBox> filled = {};  // of the padded box: parts that need not be read; only at level 0
+  std::vector<FilledBox> filled = {};  // parts of the padded box that need not be read; only at level 0
 
   LevelBox at() const { return {box, level}; }
   friend bool operator==(const Placement&, const Placement&) = default;
@@ -61,7 +61,7 @@ struct ClientTakes {
   // Not 0: it puts the picture together, so workers may finish shares of it, each of at least so many pixels of the frame. They do if there
   // is one group (SharesOf).
   std::uint64_t share_pixels = 0;
-  bool straight8 = false;  // as in FrameRequest
+  bool straight8 = false;  // FrameRequest::straight8
   friend bool operator==(const ClientTakes&, const ClientTakes&) = default;
 };
 
@@ -70,7 +70,7 @@ struct FramePlan {
   std::shared_ptr<const Layout> layout;  // never null; equal plans share it
   std::uint32_t slots = 1;               // p: owner slots the layout was made for
   Axis slab_axis = Axis::kZ;
-  double pixel_error = 0;         // as in the policy
+  double pixel_error = 0;         // the policy's pixel_error
   std::string combine;            // the combining scheme, as in the policy
   bool alternates = false;        // the policy's assignment does (AssignmentEntry)
   std::vector<GroupPlan> groups;  // nearest first; at least one

@@ -28,7 +28,7 @@ struct Layout {
   std::vector<std::uint8_t> levels = {};  // by box with a slot: that it is drawn from (LevelBox); empty: all from 0
   // By box: parts of it and of its halo that need not be read. Empty: nothing is known of any box, or there are several levels.
   std::vector<std::vector<FilledBox>> filled = {};
-  LeastExtinction extinction = {};  // of the volume; empty: not known
+  LeastExtinction extinction = {};  // the volume's least extinction; empty: not known
   friend bool operator==(const Layout&, const Layout&) = default;
 };
 
@@ -48,7 +48,7 @@ struct LayoutRequest {
   const ResolvedPolicy* policy = nullptr;
   std::uint32_t slots = 1;  // >= 1
   std::int64_t box_bytes_target = kBoxBytesTarget;
-  // As in ResolvedRequest; null: one level.
+  // ResolvedRequest::map and coarser; null: one level
   const LevelMap* map = nullptr;
   std::span<const CoarserVolume> coarser = {};
   WorkKnowledge known;

@@ -16,15 +16,15 @@
 namespace slabstream {
 
 struct ResolvedPolicy {
-  const DecompositionEntry* decomposition = nullptr;  // of Decompositions(), never null
+  const DecompositionEntry* decomposition = nullptr;  // one of Decompositions(), never null
   BalanceBy balance_by = BalanceBy::kVoxels;
   Axis axis = Axis::kZ;                         // the axis that is cut, or cut first
   int groups = 0;                               // [1, kMaxGroups]; 0: the fewest that memory allows (LayoutMaker::FewestGroups)
-  const AssignmentEntry* assignment = nullptr;  // of Assignments(), never null
-  const BalanceEntry* balance = nullptr;        // of Balances(), never null
+  const AssignmentEntry* assignment = nullptr;  // one of Assignments(), never null
+  const BalanceEntry* balance = nullptr;        // one of Balances(), never null
   std::string combine;                          // ParseCombining takes it
-  double pixel_error = 0;                       // as in Policy
-  int teams = 1;                                // as in Policy
+  double pixel_error = 0;                       // Policy::pixel_error
+  int teams = 1;                                // Policy::teams
   friend bool operator==(const ResolvedPolicy&, const ResolvedPolicy&) = default;
 };
 

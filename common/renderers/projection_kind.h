@@ -35,8 +35,8 @@ class ProjectionKind : public RendererKind {
   }
 };
 
-// Of a pixel of format kSum that holds a sum of values in [0, 1]: the sums over all samples of the bytes of min(floor(value * 2^24),
-// 2^24 - 1), highest first, and the number of samples. Exact up to 65793 samples of a ray.
+// The sum of values in [0, 1] that a pixel of format kSum holds. Its channels are sums over all samples: of the bytes
+// of min(floor(value * 2^24), 2^24 - 1), highest first, and the number of samples. Exact up to 65793 samples of a ray.
 inline double SumOfValues(const float* pixel) {
   return double(pixel[0]) * 0x1p-8 + double(pixel[1]) * 0x1p-16 + double(pixel[2]) * 0x1p-24;
 }

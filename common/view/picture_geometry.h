@@ -23,10 +23,10 @@ struct PictureGeometry {
   friend bool operator==(const PictureGeometry&, const PictureGeometry&) = default;
 };
 
-// Of lengths in the volume's world.
+// The unit of lengths in the volume's world.
 LengthUnit UnitOf(const VolumeGeometry& volume);
 
-// Of the finished picture, without supersampling. `camera` is of a view of `volume`.
+// The geometry of the finished picture, without supersampling. `camera` is of a view of `volume`.
 PictureGeometry GeometryOf(const Camera& camera, const VolumeGeometry& volume);
 
 }  // namespace slabstream

@@ -30,7 +30,7 @@ struct ShownAxis {
   Axis axis = Axis::kX;
   std::string_view label;  // "x"; of patients the side that it points to: "R", "A", "S"
   double x = 0, y = 0;     // pixels to the right and downwards of an arrow that is 1 pixel long in the world
-  double depth = 0;        // of its tip: away from the viewer, in [-1, 1]
+  double depth = 0;        // how far its tip lies away from the viewer, in [-1, 1]
 };
 
 // Farthest tip first, which is the order to draw them in.
