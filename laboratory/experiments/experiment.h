@@ -26,8 +26,8 @@ struct OwnOptions {
   std::vector<std::string> cases;  // volumes instead of the standard ones, as ParseBenchCase takes them
   std::vector<int> workers;        // numbers of workers
   std::vector<const RendererKind*> renderers;
-  std::vector<std::string> paths;         // of walks
-  std::vector<std::string> methods;       // of balance or of combining, by name
+  std::vector<std::string> paths;         // paths of walks, by name
+  std::vector<std::string> methods;       // methods of balance or of combining, by name
   std::vector<int> footprints;            // diameters of footprints, pixels
   std::vector<TransferChoice> transfers;  // two: the transfer function changes from one to the other in the middle of a path
   ServiceChoice service;                  // a running service whose frames are measured, instead of this machine
@@ -36,7 +36,7 @@ struct OwnOptions {
 
 struct ExperimentOptions {
   std::string name;
-  std::string sweep_file;  // of `sweep`; else empty
+  std::string sweep_file;  // the file of `sweep`; else empty
   std::string folder;
   bool quick = false;  // fewer and smaller sizes, fewer workers
   double scale = 1;    // [kMinScale, 1]: of the sides of spheres and pictures
@@ -72,7 +72,7 @@ class ExperimentContext {
   // Runs the trials that the log does not hold yet, each once (Distinct), and repeats them.
   void Run(std::vector<Trial> trials);
   const TrialLog& log() const { return log_; }
-  int repeats() const { return repeats_; }  // of the last Run
+  int repeats() const { return repeats_; }  // repeats of the last Run
   bool interrupted() const { return interrupted_ && interrupted_(); }
 
  private:

@@ -79,8 +79,8 @@ struct MeasuredFrame {
     double seconds = 0;
     std::array<double, kStageCount> stage_seconds{};
     double drawn_voxels = 0, covered_pixels = 0;
-    double voxel_bytes = 0;    // of the box and its halo
-    double fetched_bytes = 0;  // of these, those that its worker must fetch before it renders
+    double voxel_bytes = 0;    // voxels of the box and its halo
+    double fetched_bytes = 0;  // the part of these that its worker must fetch before it renders
     WorkUnits work{};
     CoverageMap coverage;
   };
@@ -90,8 +90,8 @@ struct MeasuredFrame {
   FrameInput Input() const;                   // for SimulateFrames, valid as long as this lives
   std::vector<double> WorkerSeconds() const;  // render time of each worker, including workers without a box
   double MostVoxelBytes() const;              // voxels, with halos, of the worker that holds most
-  double RenderSeconds() const;               // of all
-  double StageSeconds(Stage stage) const;     // of all
+  double RenderSeconds() const;               // the sum over all boxes
+  double StageSeconds(Stage stage) const;     // the sum over all boxes
 };
 // Both trials must have been run.
 MeasuredFrame Recall(ExperimentContext& context, const FrameCase& frame);

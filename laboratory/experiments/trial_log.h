@@ -49,7 +49,7 @@ class TrialLog {
   std::size_t size() const { return trials_.size(); }
 
   Status Append(const Json& key, int repeat, Json numbers, std::optional<double> other_load = std::nullopt);
-  // Of all trials that have one.
+  // The other loads of all trials that have one.
   const std::vector<double>& other_loads() const { return other_loads_; }
 
  private:

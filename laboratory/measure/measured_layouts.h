@@ -41,7 +41,7 @@ class MeasuredLayouts {
   LayoutTable::Request Wanted() const { return {&last_->policy.value(), &last_->volume, last_->summary.get(), occupied_, slots_}; }
 
   std::uint32_t slots_;
-  std::optional<ResolvedRequest> last_;  // of Next
+  std::optional<ResolvedRequest> last_;  // the request of the last Next
   std::shared_ptr<const OccupancyGrid> occupied_;
   LayoutTable table_;
 };

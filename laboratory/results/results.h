@@ -47,7 +47,7 @@ class Results {
 
  private:
   FoundBy by_;
-  std::vector<Json> rows_;  // as in results.jsonl
+  std::vector<Json> rows_;  // the rows of results.jsonl
   std::set<std::string> known_;
   std::vector<std::pair<std::string, std::vector<Json>>> attached_;
 };

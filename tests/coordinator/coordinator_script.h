@@ -198,10 +198,10 @@ class CoordinatorScript {
   Machines machine;
   Time now{seconds(1000)};
   std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
-  std::map<WorkerId, PeerToken> tokens;  // of all that have joined
+  std::map<WorkerId, PeerToken> tokens;  // the tokens of all workers that have joined
   std::vector<PeerToken> clients;        // those that send pings
   std::string host;                      // that clients connect from; empty: not known
-  std::string images_key;                // of workers that join
+  std::string images_key;                // the key of workers that join
   std::vector<LoadDataset> loads;        // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;

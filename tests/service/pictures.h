@@ -108,7 +108,7 @@ inline double ExpectedAlpha(const FrameRequest& request) {
   return format == PixelFormat::kRgba || HasDepth(format) ? 0.5 : 0.15;
 }
 
-// Of a picture that came as floats.
+// The highest alpha of a picture that came as floats.
 inline double HighestAlpha(const PictureImage& picture) {
   const LocalImage& image = *picture.floats();
   float highest = 0;

@@ -20,7 +20,7 @@ class HostileWords {
   explicit HostileWords(Random& random) : random_(random) {}
 
   struct Speaker {
-    Epoch epoch = 0;  // of the coordinator
+    Epoch epoch = 0;  // the coordinator's epoch
     WorkerId worker = 0;
     Incarnation incarnation = 0;  // 0: it is no worker
     std::uint32_t node = 0;

@@ -162,10 +162,10 @@ class Simulation : private Conditions {
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;
-  std::optional<Planner> planner_;          // of the coordinator
-  std::optional<DatasetMachine> datasets_;  // likewise
+  std::optional<Planner> planner_;          // the coordinator's planner
+  std::optional<DatasetMachine> datasets_;  // the coordinator's second machine
   Time datasets_wake_;                      // that was planned last
-  Epoch epoch_ = 0;                         // of the coordinator
+  Epoch epoch_ = 0;                         // the coordinator's epoch
   std::deque<ModelWorker> workers_;         // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
   std::set<Node> told_dead_;                      // workers whose death the sockets notice
@@ -187,7 +187,7 @@ class Simulation : private Conditions {
   };
   std::map<UploadId, Stored> stored_;
   std::set<DatasetId> published_;  // by the voxel server
-  // Of a volume that is read in parts: who sees which version of its file, and from when on it is open there.
+  // Where a volume that is read in parts is open: who sees which version of its file there, and since when.
   std::map<std::pair<Node, std::uint64_t>, std::optional<double>> places_;
 };
 

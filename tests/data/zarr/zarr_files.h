@@ -26,7 +26,7 @@ struct ZarrSpec {
   bool old_keys = false;                          // version 3: those of version 2
   std::vector<std::size_t> transpose = {};        // version 3, before shards are made
   std::vector<std::size_t> inner_transpose = {};  // version 3, of chunks in shards
-  std::string codec = {};                         // of PackBytes, but for crc32c
+  std::string codec = {};                         // a codec of PackBytes, except crc32c
   bool checked = false;                           // version 3: crc32c behind it
   bool shuffled = false;                          // version 2: the filter
   bool index_at_end = true, index_big_endian = false, index_checked = true;
