@@ -25,7 +25,7 @@ struct StoredStream {
   // so memory, which decides whether smaller ones are stored, never decides what there is to see. The store is in use as long as this is
   // there.
   std::shared_ptr<VolumeSource> source;
-  std::string path;  // of the OME-Zarr
+  std::string path;  // the path of the OME-Zarr
 };
 
 struct BrickStoreOptions {
@@ -36,10 +36,11 @@ struct BrickStoreOptions {
 // What the header says if `path` is a compressed stream. Null: it is not.
 Result<std::optional<SourceInfo>> DescribeStream(const std::string& path, const ReadOptions& options);
 
-// `source`: the text of a source (ParseSourceText) that is such a stream. `progress`, if any, counts what is read of the stream.
-// Unavailable: the store cannot be written, as where there is no room; in one line that names the place, the bytes that are needed and
-// those that are available; or the file changes meanwhile. ResourceExhausted: `memory` is too small. Cancelled. Errors of SliceStream.
-// Of a failure nothing stays; of what was stopped, all that was written.
+// `source`: the text of a source (ParseSourceText) that is such a stream. `progress`, if any, counts what is read of
+// the stream. Unavailable: the store cannot be written, as where there is no room; in one line that names the place,
+// the bytes that are needed and those that are available; or the file changes meanwhile. ResourceExhausted: `memory` is
+// too small. Cancelled. Errors of SliceStream. A failure leaves nothing on disk. What was stopped leaves all that was
+// written.
 Result<StoredStream> OpenStored(const std::string& source, const StoreFolder& stores, const SourceContext& context,
                                 const BrickStoreOptions& options, ReadProgress* progress = nullptr);
 

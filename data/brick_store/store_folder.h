@@ -29,7 +29,7 @@ class StoreFolder {
   const std::string& path() const { return path_; }
   std::string PathOf(const std::string& name) const { return path_ + "/" + name; }
 
-  // Of a store, until it is destroyed.
+  // A lock of a store, held until it is destroyed.
   using Lock = FileDescriptor;
   // Waits until nobody writes the store, and notes that it is used. Errors of MakeOwnFolder and LockFile.
   Result<Lock> LockShared(const std::string& name, const std::stop_token& stop = {}) const;

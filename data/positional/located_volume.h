@@ -14,7 +14,7 @@ enum class Packing { kNone, kCompressed };
 
 struct LocatedVolume {
   RawHeader header;
-  Payload payload;  // of this volume alone
+  Payload payload;  // the payload of this volume alone
   AxisTurn turn;
   int component = 0;  // which of the header's, in a voxel
   SourceInfo info;    // one level; samples as KeptTypeOf says

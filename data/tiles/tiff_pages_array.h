@@ -27,7 +27,7 @@ class TiffPool {
   explicit TiffPool(std::vector<std::string> files) : files_(std::move(files)) {}
 
   struct Entry {
-    std::size_t number = 0;  // of the file
+    std::size_t number = 0;  // the file's number
     std::uint64_t directory = 0;
     std::unique_ptr<TiffFile> file;
     bool is_new = true;  // nobody has used it

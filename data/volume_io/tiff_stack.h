@@ -22,7 +22,7 @@ struct TiffSlice {
 struct TiffStack {
   std::vector<std::string> files;  // paths of those that are used
   std::vector<TiffSlice> slices;
-  RawHeader header;                  // of the volume, as the first slice says
+  RawHeader header;                  // the volume's header, as the first slice says
   ReadOptions of_pages;              // what the options say of a page's components
   std::optional<ValueRange> window;  // as of SourceInfo
 
@@ -36,7 +36,7 @@ struct TiffStack {
 // DataLoss.
 Result<TiffStack> OpenTiffStack(const std::string& path, const ReadOptions& options);
 
-// Of the OME-TIFF that `path` is one file of; 1 if it stands alone or cannot be read.
+// How many files the OME-TIFF has that `path` belongs to; 1 if it stands alone or cannot be read.
 std::size_t FilesOf(const std::string& path);
 
 }  // namespace slabstream

@@ -43,8 +43,9 @@ struct VtkCompressor;
 
 class VtkXmlFile {
  public:
-  // Reads all but the arrays. `type`: of the dataset, "ImageData". Of a file of several times, options.time takes the arrays of one.
-  // NotFound: no such file. InvalidArgument: no XML, another type, no piece or more than kMostVtkPieces, or no such time.
+  // Reads all but the arrays. `type`: the dataset's, "ImageData". If a file has several times, options.time takes the
+  // arrays of one. NotFound: no such file. InvalidArgument: no XML, another type, no piece or more than kMostVtkPieces,
+  // or no such time.
   static Result<VtkXmlFile> Open(const std::string& path, std::string_view type, const ReadOptions& options);
 
   const XmlTag& dataset() const { return dataset_; }             // the element of the type's name

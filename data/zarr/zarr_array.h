@@ -18,7 +18,7 @@ namespace slabstream::zarr {
 struct ZarrArray {
   std::shared_ptr<ChunkedArray> array;
   std::vector<std::size_t> from;             // axis i of `array` is the axis from[i] of the metadata
-  std::vector<std::string> dimension_names;  // of the axes of `array`, "" where there is none; empty: there are none at all
+  std::vector<std::string> dimension_names;  // names of the axes of `array`, "" where there is none; empty: there are none at all
 };
 
 // What the arrays of a source share.
