@@ -15,7 +15,7 @@ namespace slabstream {
 
 struct SourceToConvert {
   std::shared_ptr<VolumeSource> source;
-  std::optional<SliceOrder> slices = {};  // of a compressed stream
+  std::optional<SliceOrder> slices = {};  // the order of slices in a compressed stream
   std::uint64_t memory = 0;               // bytes that it holds
 };
 

@@ -25,8 +25,8 @@ bool CanBeReadInParts(const std::string& source, std::uint64_t most_bytes);
 // A damaged file (DataLoss) becomes InvalidArgument: here the input is wrong, not a service.
 Status AsInput(const Status& status);
 
-// ReadVolume with such failures. Of several times or components the first one is read, unless the source says which, and a line is logged.
-// A parsed source must say which.
+// ReadVolume with such failures. If there are several times or components, the first one is read, unless the source
+// says which, and a line is logged. A parsed source must say which.
 Result<LoadedVolume> ReadInputVolume(const std::string& source, const TellRead& tell = {});
 Result<LoadedVolume> ReadInputVolume(const SourceText& source);
 
