@@ -45,7 +45,7 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxOpenRequests = 256;       // of one client
+inline constexpr std::size_t kMaxOpenRequests = 256;       // open requests of one client
 inline constexpr std::int64_t kMaxRequestBytes = 1 << 20;  // limit of the coordinator's client socket; any header that a client sends fits
 
 struct SubmitFrame {
@@ -73,7 +73,7 @@ struct FrameProgress {
 // A level that a picture was drawn from.
 struct LevelUse {
   std::uint32_t level = 0;   // [0, kMaxLevels); 0 is the finest
-  std::uint32_t boxes = 0;   // of the plan; those that turn out to be hidden or outside the picture are not read
+  std::uint32_t boxes = 0;   // boxes of the plan; those that turn out to be hidden or outside the picture are not read
   std::uint64_t voxels = 0;  // in these boxes
   friend bool operator==(const LevelUse&, const LevelUse&) = default;
 };
@@ -87,17 +87,17 @@ struct FrameStatistics {
   std::int64_t begin_ns = 0, end_ns = 0;                                      // plan to last byte at the coordinator, MonotonicNow() clock
   std::vector<RankReport> reports;                                            // at most kMaxReports
   std::uint32_t display = 0;                                                  // worker
-  PixelBounds grid;                                                           // of the frame that was rendered and combined (FrameBounds)
-  std::optional<FramePrediction> predicted;                                   // if the policy left a choice
-  std::vector<LevelUse> levels;                                               // finest first; at most kMaxLevels
-  std::string lowered;                 // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
-  std::optional<ViewParameters> view;  // that the picture was made by, complete (ChooseView); final pictures have it
+  PixelBounds grid;                          // pixels of the frame that was rendered and combined (FrameBounds)
+  std::optional<FramePrediction> predicted;  // if the policy left a choice
+  std::vector<LevelUse> levels;              // finest first; at most kMaxLevels
+  std::string lowered;                       // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
+  std::optional<ViewParameters> view;        // that the picture was made by, complete (ChooseView); final pictures have it
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
 struct FrameReply {  // payload: the runs of the shares that are not direct, one after the other
   RequestId request = 0;
-  ImageSize size;                                  // of the whole picture
+  ImageSize size;                                  // the size of the whole picture
   std::uint32_t groups_done = 0, group_count = 1;  // equal: final; 0 done: a preview from a coarser level
   std::vector<PictureShare> shares;                // from 1 to kMaxShares; those that are direct may have come before this
   FrameStatistics statistics;                      // final only
@@ -128,7 +128,7 @@ struct ClientPing {
 struct ClientPong {
   Epoch epoch = 0;
   std::uint64_t nonce = 0;                     // echoed
-  std::vector<RequestId> known;                // of those asked about: queued, running, or with a reply kept
+  std::vector<RequestId> known;                // requests among those asked about that are queued, running, or have a reply kept
   std::optional<PictureSenders> senders = {};  // if they are others than the ping says
   friend bool operator==(const ClientPong&, const ClientPong&) = default;
 };
@@ -201,7 +201,7 @@ struct StatusReply {
   std::uint64_t memory_bytes = 0;  // limit of the coordinator's memory; 0: none stated
   RefusedRequests refused;
   std::vector<RendererStatus> renderers = {};
-  std::vector<WebTraffic> web = {};  // of the coordinator and the present workers; at most kMaxWebServers
+  std::vector<WebTraffic> web = {};  // what the coordinator and the present workers read; at most kMaxWebServers
   friend bool operator==(const StatusReply&, const StatusReply&) = default;
 };
 
@@ -240,7 +240,7 @@ struct OrderRefused {
 
 enum class DataAction : std::uint8_t { kList = 1, kAdd = 2, kRemove = 3, kReload = 4 };
 
-inline constexpr std::size_t kMaxDataItems = 128;       // of one order
+inline constexpr std::size_t kMaxDataItems = 128;       // items of one order
 inline constexpr std::size_t kMaxDataItemBytes = 5120;  // a name, a path and what may stand between and behind them
 
 struct DataOrder {
@@ -260,7 +260,7 @@ struct DataReply {
 
 // ---- questions about what a dataset holds
 
-inline constexpr std::size_t kMaxOpenQuestions = 64;  // of one client
+inline constexpr std::size_t kMaxOpenQuestions = 64;  // open questions of one client
 inline constexpr std::size_t kMaxSamplePoints = 4096;
 inline constexpr std::size_t kMaxPercentiles = 64;
 
@@ -280,11 +280,11 @@ struct Percentile {
 struct SummaryReply {
   std::uint64_t nonce = 0;
   VolumeDescription description;
-  ValueRange range;                                                                   // as VolumeSummary
-  std::vector<std::uint64_t> histogram = std::vector<std::uint64_t>(kHistogramBins);  // likewise
+  ValueRange range;                                                                   // VolumeSummary::range
+  std::vector<std::uint64_t> histogram = std::vector<std::uint64_t>(kHistogramBins);  // VolumeSummary::histogram
   std::uint64_t non_finite = 0;                                                       // voxels
   std::vector<Percentile> percentiles;                                                // at most kMaxPercentiles
-  TransferFunction transfer;                                                          // of the query, for this dataset
+  TransferFunction transfer;                                                          // the query's function, for this dataset
   std::vector<Label> labels;                                                          // as LabelTable; at most kMaxLabels
   friend bool operator==(const SummaryReply&, const SummaryReply&) = default;
 };
@@ -292,13 +292,13 @@ struct SummaryReply {
 struct SampleQuery {
   std::uint64_t nonce = 0;
   std::string dataset;       // 1 ... kMaxNameBytes
-  std::vector<Vec3> points;  // of the world; 1 ... kMaxSamplePoints
+  std::vector<Vec3> points;  // points of the world; 1 ... kMaxSamplePoints
   friend bool operator==(const SampleQuery&, const SampleQuery&) = default;
 };
 
 struct SampleReply {
   std::uint64_t nonce = 0;
-  std::vector<VolumeSample> samples;  // of each point
+  std::vector<VolumeSample> samples;  // a sample for each point
   friend bool operator==(const SampleReply&, const SampleReply&) = default;
 };
 
@@ -314,8 +314,9 @@ struct StatisticsQuery {
 struct StatisticsReply {
   std::uint64_t nonce = 0;
   BoxStatistics statistics;
-  VolumeDescription description = {};        // of the voxels that were counted
-  std::vector<LabelStatistics> labels = {};  // of each label of the dataset, if the query says so; values rise; at most kMaxLabels
+  VolumeDescription description = {};  // describes the voxels that were counted
+  // One for each label of the dataset, if the query says so; values rise; at most kMaxLabels.
+  std::vector<LabelStatistics> labels = {};
   friend bool operator==(const StatisticsReply&, const StatisticsReply&) = default;
 };
 
@@ -344,7 +345,7 @@ struct PickQuery {
 struct PickReply {
   std::uint64_t nonce = 0;
   std::optional<VolumeSample> sample;  // none: the pixel shows no point
-  double depth = 0;                    // of it, as depths of the picture's pixels
+  double depth = 0;                    // its depth, counted as the depths of the picture's pixels
   friend bool operator==(const PickReply&, const PickReply&) = default;
 };
 

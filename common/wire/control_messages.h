@@ -34,7 +34,7 @@ namespace slabstream {
 
 inline constexpr std::size_t kMaxEndpointBytes = 512;
 inline constexpr std::size_t kMaxTextBytes = 4096;
-inline constexpr std::uint32_t kMaxThreads = 1024;  // of one worker
+inline constexpr std::uint32_t kMaxThreads = 1024;  // threads of one worker
 inline constexpr std::int32_t kMaxOcclusionTiles = OcclusionTiles(kMaxGridSide);
 
 // The slot that a worker owns, among how many.
@@ -76,7 +76,7 @@ struct Heartbeat {
   std::uint64_t fetched_bytes = 0;   // voxels received since the process began
   std::uint32_t rendered_ranks = 0;  // since the process began: progress, even while a long group runs
   bool leaving = false;              // it wants no new work, and Stop once nothing needs it any more; from then on in every heartbeat
-  std::vector<WebTraffic> web = {};  // of the process since it began; at most kMaxWebServers
+  std::vector<WebTraffic> web = {};  // what the process has read since it began; at most kMaxWebServers
   friend bool operator==(const Heartbeat&, const Heartbeat&) = default;
 };
 
@@ -84,7 +84,7 @@ struct Ping {
   Epoch epoch = 0;
   FrameId finished_before = 0;      // all frames with a smaller id are over: forget them
   std::vector<FrameId> cancelled;   // also over, though their id is not smaller; at most kMaxCancelled
-  SlotPlace place = {};             // of the receiver
+  SlotPlace place = {};             // the receiver's slot
   std::vector<WorkerId> gone = {};  // workers that left or were lost lately; at most kMaxPeers
   friend bool operator==(const Ping&, const Ping&) = default;
 };
@@ -103,15 +103,16 @@ struct GroupAssignment {
   GroupKey key;
   FrameId finished_before = 0;
   std::uint32_t group_count = 1;  // [1, kMaxGroups]
-  std::uint32_t first_group = 0;  // of this attempt: earlier groups are already accumulated by `display`
+  std::uint32_t first_group = 0;  // the first group of this attempt: earlier groups are already accumulated by `display`
   bool previews = false;
-  bool straight8 = false;  // as in FrameRequest
+  bool straight8 = false;  // FrameRequest::straight8
   WorkerId display = 0;
   FrameSetup setup;
-  GroupPlan group;                               // with several roots: the only one of its frame
-  std::vector<Peer> peers;                       // every worker of the group, and the display worker
-  OcclusionMask hidden;                          // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
-  std::uint32_t groups_done = 0;                 // of the frame, at most key.group: accumulated, so images lent for them have been read
+  GroupPlan group;          // with several roots: the only one of its frame
+  std::vector<Peer> peers;  // every worker of the group, and the display worker
+  OcclusionMask hidden;     // some of what earlier groups hide (common/planning/frame_occlusion.h); fits the setup
+  // Groups of the frame, at most key.group, that are accumulated, so images lent for them have been read.
+  std::uint32_t groups_done = 0;
   ClientId client = 0;                           // whom the frame is for: a worker shares its time among clients
   std::optional<PicturesAddress> pictures = {};  // where that client takes pictures; none: through the coordinator
   friend bool operator==(const GroupAssignment&, const GroupAssignment&) = default;
@@ -121,7 +122,7 @@ struct GroupDone {
   Epoch epoch = 0;
   WorkerId worker = 0;
   GroupKey key;
-  std::vector<RankReport> reports;  // of every rank of this group
+  std::vector<RankReport> reports;  // the reports of every rank of this group
   OcclusionMask hidden;             // some of what the groups 0 ... key.group hide; at most kMaxOcclusionTiles along an axis
   friend bool operator==(const GroupDone&, const GroupDone&) = default;
 };
