@@ -17,7 +17,7 @@ export interface Dataset {
 export interface Histogram { range: [number, number]; counts: number[]; percentiles: Record<string, number> }
 export interface JointHistogram { range: [number, number]; steepest: number; values: number; slopes: number; counts: number[] } // counts[value * slopes + slope], of square roots of slopes
 export interface LabelStatistics {
-  unit: string; // of volumes
+  unit: string; // that volumes are counted in
   labels: { value: number; name: string; volume: number; mean: number | null; deviation: number | null; least: number | null; largest: number | null }[];
 }
 export interface LabelName { value: number; name: string; color?: string }

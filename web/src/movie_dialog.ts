@@ -16,7 +16,7 @@ const even = (side: number): number => Math.max(16, Math.round(side / 2) * 2);
 // Counts the frames of an MP4 stream, in which each has a box "moof" of its own.
 class FrameCounter {
   frames = 0;
-  private head: number[] = []; // of the next box: 4 bytes of size, 4 of type
+  private head: number[] = []; // the next box's first bytes: 4 of size, 4 of type
   private skip = 0; // bytes of the box that are still to come
 
   add(part: Uint8Array): void {

@@ -21,7 +21,7 @@ export interface State extends Viewpoint {
   projection: "orthographic" | "perspective";
   // The look
   renderer: string;
-  parameters: Readonly<Record<string, string>>; // of renderers, by their names; those that are missing have their standard values
+  parameters: Readonly<Record<string, string>>; // parameters of renderers, by their names; those that are missing have their standard values
   shading: string;
   lights: readonly Vec3[]; // none: a light at the eye, or with shadows beside it
   shadows: number; // strengths
@@ -52,9 +52,9 @@ export interface State extends Viewpoint {
   window: number | null;
   level: number | null;
   measures: readonly Measure[];
-  path: readonly KeyFrame[]; // of a movie
+  path: readonly KeyFrame[]; // key frames of a movie
   // The page
-  legend: boolean; // of labels
+  legend: boolean; // the legend of labels
   marker: boolean;
   scaleBar: boolean;
   colorBar: boolean;
