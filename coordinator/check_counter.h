@@ -14,7 +14,7 @@ class CheckCounter {
   bool MustBegin() const { return begun_ == ended_ && wanted_ > begun_; }
   void Begin() { ++begun_; }
   void End() { ended_ = begun_; }           // the one under way, if any, or its answer is no longer wanted
-  CheckId Last() const { return wanted_; }  // that was asked for
+  CheckId Last() const { return wanted_; }  // the last check that was asked for
   bool UnderWay() const { return begun_ > ended_; }
   bool IsOver(CheckId check) const { return check <= ended_; }
   // There is nothing to check: what was asked for is answered.

@@ -73,7 +73,7 @@ using Catalogue = std::map<std::string, DataSource>;
 // What arguments of --data mean, or what lies in a folder.
 struct FoundData {
   Catalogue datasets;
-  std::vector<std::string> folders;     // that are to be watched
+  std::vector<std::string> folders;     // folders that are to be watched
   std::vector<Status> errors;           // why an argument or a named file is wrong
   std::vector<std::string> complaints;  // about files in folders, a line each: left out, or not to be read so far
 };

@@ -44,7 +44,7 @@ using UploadId = std::uint64_t;    // a dataset that a client sends; a number is
 
 struct DatasetConfig {
   Catalogue datasets;
-  std::set<std::string> folders;                      // that are watched, as WatchedFolder says them
+  std::set<std::string> folders;                      // folders that are watched, as WatchedFolder says them
   std::uint64_t memory_bytes = 0;                     // limit of the coordinator's memory; 0: none
   std::size_t max_questions = 1024;                   // questions of all clients together
   Duration check_interval = std::chrono::seconds(5);  // between checks of the watched folders
@@ -189,7 +189,7 @@ using DatasetAction = std::variant<DatasetNews, ToClient, LoadDataset, UnloadDat
 // Entries in the machine's tables. At rest, with nothing asked for and every client gone, they are 0.
 struct DatasetSizes {
   std::size_t uses = 0;
-  std::size_t orders = 0, awaited = 0;  // that wait for a file check; names that do
+  std::size_t orders = 0, awaited = 0;  // orders that wait for a file check; names that do
   std::size_t retired = 0;              // voxels that only frames under way use
   std::size_t questions = 0, uploads = 0;
 };

@@ -72,7 +72,7 @@ class DatasetTable {
   void Add(const std::string& name, DataSource source, Time now);  // no such name is in it; one that is awaited is there now
   void Await(const std::string& name, CheckId check);
   void Remove(const std::string& name);  // retires its voxels
-  std::set<std::string> folders;         // that are watched
+  std::set<std::string> folders;         // folders that are watched
 
   // ---- voxels
   LoadId BeginLoad(const std::string& name, Time now);  // begins to load a dataset that is unloaded or failed

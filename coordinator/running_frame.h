@@ -126,7 +126,7 @@ class RunningFrame {
 
   FrameProgress Progress() const;
   FrameStatistics Statistics(Time now) const;
-  Duration WorkerTime() const;  // that workers spent on it, as far as they have reported
+  Duration WorkerTime() const;  // time that workers spent on it, as far as they have reported
 
  private:
   struct Suspicion {

@@ -33,7 +33,7 @@ struct GatewayOptions {
   ListenAddress listen;
   std::optional<TlsFiles> tls;
   std::string proxy_origin;                // --behind-proxy, as ParseOrigin gives it; empty: there is no proxy
-  std::vector<std::string> frame_sources;  // whose pages may show the viewer in a frame, as ParseFrameSource gives them
+  std::vector<std::string> frame_sources;  // origins whose pages may show the viewer in a frame, as ParseFrameSource gives them
   std::string token;                       // CheckToken
   std::optional<HttpUrl> collector;        // OpenTelemetry's collector, which gets traces of requests; none: there are no traces
   HttpLimits limits;

@@ -88,7 +88,7 @@ class FrameSimulation : private Conditions {
 
   std::uint32_t submitted_ = 0, planned_ = 0, received_ = 0;  // frames
   std::map<FrameId, std::uint32_t> frame_of_;
-  std::map<std::uint32_t, Frame> frames_;  // that are under way
+  std::map<std::uint32_t, Frame> frames_;  // frames that are under way
   double render_seconds_ = 0;
   double coordinator_passed_ = 0, client_passed_ = 0;  // they are done with the pictures so far
   Timeline timeline_;

@@ -26,7 +26,7 @@ namespace slabstream {
 struct RenderCost {
   double seconds = 0;                     // time of one thread of a worker of speed 1
   const CoverageMap* coverage = nullptr;  // what its image covers, in the frame's grid; null: it shows nothing
-  double voxel_bytes = 0;                 // that its worker must fetch before it renders; 0: it holds them
+  double voxel_bytes = 0;                 // bytes that its worker must fetch before it renders; 0: it holds them
 };
 
 struct FrameInput {

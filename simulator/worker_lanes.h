@@ -21,7 +21,7 @@ using Node = std::uint32_t;  // a worker process of a simulation: 0, 1, ... in t
 
 struct WorkCost {
   double seconds = 0;        // time of one thread of a worker of speed 1
-  std::int32_t threads = 1;  // that share the work
+  std::int32_t threads = 1;  // threads that share the work
   bool direct = false;       // the thread that owns the sockets does it itself: nothing is handed over
 };
 
@@ -60,7 +60,7 @@ class WorkerLanes {
   };
   struct LaneState {
     bool taken = false;    // by a task that was handed over and has not ended
-    bool running = false;  // that task has begun
+    bool running = false;  // whether that task has begun
     LaneTask task;         // the one that has taken it
     std::deque<Waiting> waiting;
   };

@@ -114,7 +114,7 @@ class BoxFetcher {
     bool retired = false;  // not to be acquired again; dropped when unpinned
     std::uint64_t bytes = 0;
     std::uint64_t last_use = 0;
-    ClientId client = 0;              // that acquired it last
+    ClientId client = 0;              // the client that acquired it last
     std::vector<Generation> sources;  // pinned
     std::vector<ChunkPlace> missing;  // chunks neither stored nor in flight; the next one to ask for is last
     std::uint64_t cell_bytes = 0;     // bytes of the padded box's cells; 0: there are none, or no chunk of them has come yet
@@ -170,7 +170,7 @@ class BoxFetcher {
   Generation last_generation_ = 0;
   std::uint64_t use_counter_ = 0;
   std::map<std::pair<ClientId, DatasetId>, FrameUses> users_;
-  ClientId latest_client_ = 0;      // that acquired a padded box
+  ClientId latest_client_ = 0;      // the client that acquired a padded box last
   std::uint64_t needed_since_ = 0;  // in uses: its frames may need again what was used since then
   std::uint64_t fetched_bytes_ = 0;
   std::vector<Failure> failures_;

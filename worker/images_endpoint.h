@@ -26,7 +26,7 @@ class ImagesEndpoint {
 
  private:
   std::string text_;
-  std::string host_;  // that it follows; empty: none
+  std::string host_;  // the host that it follows; empty: none
 };
 
 }  // namespace slabstream

@@ -19,7 +19,7 @@ namespace slabstream {
 
 class PeerLinks {
  public:
-  static constexpr std::size_t kMostRefusals = 4096;  // that wait for their receivers to be named
+  static constexpr std::size_t kMostRefusals = 4096;  // refusals that wait for their receivers to be named
 
   explicit PeerLinks(const WorkerConfig& config) : config_(config) {}
 

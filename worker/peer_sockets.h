@@ -39,7 +39,7 @@ class PeerSockets {
   struct Connection {
     Socket socket;
     Time last_used;
-    WorkerId worker = 0;  // that was sent to last
+    WorkerId worker = 0;  // the worker that was sent to last
   };
   Context& context_;
   const std::optional<KeyPair> own_;

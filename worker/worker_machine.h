@@ -236,7 +236,7 @@ struct StartCombine {
   bool replace = false;  // instead: `pixels` of `image`, which have been passed on, are replaced by those of the other one
   PixelRange pixels;     // pixels of the frame; empty: all
   PixelBounds frame;
-  RankInterval ranks;  // that `other` shows there; if `other` is 0: as the message says
+  RankInterval ranks;  // ranks that `other` shows there; if `other` is 0: as the message says
 };
 // Finds the hidden tiles of `image`, a frame that has accumulated the groups up to `key`. `known`: the last hidden tiles. -> HiddenFound
 struct FindHidden {
@@ -261,13 +261,13 @@ struct SendPartial {
   ImageHandle image = 0;
   PixelBounds frame;
   ColorCoding color = ColorCoding::kFloat32;  // if they travel as runs
-  Rank rank = 0;                              // that sends
+  Rank rank = 0;                              // the rank that sends
   Delivery delivery;
 };
 // Sends an image that was lent for this message as runs, if it is still lent.
 struct ResendImage {
   ImageRefused refused;
-  bool first = false;  // that this worker refuses: for the log
+  bool first = false;  // the first refusal of this worker: for the log
 };
 // To another worker's images plane.
 struct AnswerPeer {

@@ -25,7 +25,7 @@ struct RequestOption {
   std::string value;     // what the help shows for it, such as "NUMBER"; empty: a flag
   std::string standard;  // text; empty: none
   std::string unit;
-  std::string ability;               // that the renderer needs (common/renderers/ability.h); empty: none
+  std::string ability;               // the ability that the renderer needs (common/renderers/ability.h); empty: none
   std::vector<std::string> choices;  // empty: it is no choice
   std::optional<NumberRange> range;
   bool repeatable = false;

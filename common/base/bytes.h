@@ -25,7 +25,8 @@ class Bytes {
 
   std::span<const std::byte> span() const { return data_; }
   std::size_t size() const { return data_.size(); }
-  Bytes Part(std::size_t begin, std::size_t bytes) const { return {owner_, data_.subspan(begin, bytes)}; }  // which lies inside
+  // The part must lie inside.
+  Bytes Part(std::size_t begin, std::size_t bytes) const { return {owner_, data_.subspan(begin, bytes)}; }
   bool empty() const { return data_.empty(); }
 
  private:

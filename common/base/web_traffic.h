@@ -7,7 +7,7 @@
 
 namespace slabstream {
 
-inline constexpr std::size_t kMaxWebServers = 64;  // that are told of; the first ones by name
+inline constexpr std::size_t kMaxWebServers = 64;  // servers that are told of; the first ones by name
 
 // What a process has asked one server for since it began.
 struct WebTraffic {

@@ -35,8 +35,8 @@ inline constexpr double kPixel = 1.5e-9;        // a pixel of the image
 //   balance_bench VOLUME --renderer raycast --decomposition kd-tree --balance-by occupied
 namespace raycast {
 inline constexpr double kBox = 30e-6;
-inline constexpr double kPixel = 60e-9;   // that the box covers
-inline constexpr double kSample = 11e-9;  // that is shaded
+inline constexpr double kPixel = 60e-9;   // a pixel that the box covers
+inline constexpr double kSample = 11e-9;  // a sample that is shaded
 }  // namespace raycast
 
 // Multi-pass shears (common/renderers/shear).
@@ -44,7 +44,7 @@ inline constexpr double kSample = 11e-9;  // that is shaded
 namespace shear {
 inline constexpr double kBox = 50e-6;
 inline constexpr double kResample = 4e-9;  // a voxel of a cell that is drawn, at a pixel a voxel
-inline constexpr double kSample = 6e-9;    // that is shaded
+inline constexpr double kSample = 6e-9;    // a sample that is shaded
 }  // namespace shear
 
 // Projections of values (common/renderers/projection_kind.h).

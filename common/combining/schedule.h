@@ -62,7 +62,7 @@ constexpr PixelRange Share(const PixelRange& pixels, std::uint64_t part, std::ui
 struct ScheduleRequest {
   Rank ranks = 1;
   Rank root = 0;                         // rank that holds the result
-  PixelRange pixels;                     // that end there
+  PixelRange pixels;                     // pixels that end there
   std::uint32_t most_steps = kMaxSteps;  // limits the number of strips
 };
 

@@ -45,7 +45,7 @@ struct FrameSetup {
   DatasetId dataset = 0;
   double unit = 1;  // in that of the volume's world; a power of two (common/frame/frame_unit.h)
   VolumeDescription description;
-  LayerTypes layers;                       // that the dataset has
+  LayerTypes layers;                       // layers that the dataset has
   ValueRange range;                        // data values that the classification table is made for
   std::optional<StoredAt> stored = {};     // none: the coordinator holds the voxels
   std::vector<CoarserLevel> coarser = {};  // finest first

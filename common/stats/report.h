@@ -46,7 +46,7 @@ struct RankReport {
   StageTimes stage_ns{};
   std::vector<Span> spans;            // at most kMaxSpans
   std::uint64_t occupied_voxels = 0;  // in the box, under this transfer function
-  std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
+  std::uint64_t drawn_voxels = 0;     // voxels that went through splat or Z-buffer
   std::uint64_t voxel_bytes = 0;      // received for this group since the last report (0: all was cached)
   std::uint64_t image_bytes = 0;      // payload sent to other workers
   PixelBounds image_bounds;           // pixels of the box's own image, in the frame

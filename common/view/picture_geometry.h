@@ -12,7 +12,7 @@
 namespace slabstream {
 
 struct PictureGeometry {
-  World world = World::kVoxels;  // whose axes these are
+  World world = World::kVoxels;  // the world whose axes these are
   LengthUnit unit = LengthUnit::kVoxel;
   Projection projection = Projection::kOrthographic;
   // Unit vectors at right angles, along the world's axes: to the right and upwards in the picture, and away from the viewer.

@@ -57,7 +57,7 @@ struct SampleTypes {
 // ---- labels
 
 inline constexpr std::uint32_t kMaxLabelValue = 1U << 24;  // the largest label of a file: float32 holds all integers up to here
-inline constexpr std::size_t kMaxLabels = 4096;            // that one label volume may hold, beside 0
+inline constexpr std::size_t kMaxLabels = 4096;            // labels that one label volume may hold, beside 0
 inline constexpr std::size_t kMaxLabelNameBytes = 128;
 
 struct Label {

@@ -24,8 +24,8 @@ constexpr std::string_view NameOf(World world) { return world == World::kVoxels 
 // The units of lengths in a world.
 enum class LengthUnit : std::uint8_t {
   kVoxel = 1,       // nothing is known: the distance of neighbouring voxels
-  kFile = 2,        // that of the file's spacing, for which the file states no name
-  kMillimetre = 3,  // that of patients, and of files that state it, like those below
+  kFile = 2,        // the unit of the file's spacing, for which the file states no name
+  kMillimetre = 3,  // the unit of patients, and of files that state it, like those below
   kMicrometre = 4,
   kNanometre = 5,
   kAngstrom = 6,

@@ -54,7 +54,7 @@ struct Register {
   std::uint64_t memory_scope = 0;  // workers of the same scope can read each other's memory (SharedMemoryScope); 0: it takes frames only
   bool lends_memory = false;       // it lends its own images to workers of its scope; else it sends them in frames
   std::string images_key = {};     // public key of its image plane; empty: that plane is not encrypted
-  SlotPlace place = {};            // that it had last: it holds the voxels of that slot's boxes
+  SlotPlace place = {};            // the slot that it had last: it holds the voxels of that slot's boxes
   friend bool operator==(const Register&, const Register&) = default;
 };
 
@@ -93,8 +93,8 @@ inline constexpr std::size_t kMaxCancelled = 1024;
 struct Peer {
   WorkerId worker = 0;
   std::string images_endpoint;
-  std::uint64_t memory_scope = 0;  // as it registered
-  std::string images_key = {};     // as it registered
+  std::uint64_t memory_scope = 0;  // Register::memory_scope
+  std::string images_key = {};     // Register::images_key
   friend bool operator==(const Peer&, const Peer&) = default;
 };
 

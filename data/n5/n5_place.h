@@ -27,7 +27,7 @@ struct Place {
   std::optional<Vec3> origin = {};  // the first voxel's centre, if the attributes state it
   std::optional<LengthUnit> unit = {};
   bool of_level = false;       // it is that of this level, not of the finest one
-  std::string attribute = {};  // that says so
+  std::string attribute = {};  // the attribute that says so
 };
 
 // None: they say nothing of it. InvalidArgument: a transform that is wrong, or whose axes have different units; names the field.

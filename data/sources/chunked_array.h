@@ -41,7 +41,7 @@ struct ArrayShape {
 // A chunk as it was read.
 struct StoredChunk {
   Bytes elements;                  // decoded, in this machine's byte order
-  std::uint64_t stored_bytes = 0;  // that the store gave for it
+  std::uint64_t stored_bytes = 0;  // bytes that the store gave for it
 };
 
 class ChunkedArray {

@@ -43,7 +43,7 @@ namespace slabstream {
 struct HttpAccess {
   std::string query;                 // added to each address, encoded; empty: none
   std::vector<std::string> headers;  // "NAME: VALUE"
-  std::optional<S3Access> s3;        // that signs them
+  std::optional<S3Access> s3;        // what signs them
 };
 
 struct HttpGet {

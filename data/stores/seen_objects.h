@@ -34,7 +34,7 @@ class SeenObjects {
   struct News {
     std::string version;       // empty: the server tells none
     std::uint64_t size = 0;    // size of the whole object; 0: the server tells none
-    std::optional<Part> part;  // that was read; none: only the size was asked for
+    std::optional<Part> part;  // the part that was read; none: only the size was asked for
   };
   enum class Verdict { kSame, kChanged, kMustBeCompared };
 

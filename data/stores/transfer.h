@@ -35,9 +35,9 @@ struct Transfer {
 
   HttpGet get;
   std::vector<Asker> askers;  // one, or several whose spans get.span covers
-  std::string url;            // that is asked now: of the request, or where a redirect led
+  std::string url;            // the address that is asked now: the request's, or where a redirect led
   std::string host;
-  std::string region;  // that its bucket is in, as far as the server has told; empty: it has told none
+  std::string region;  // the region of its bucket, as far as the server has told; empty: it has told none
   int tries = 0, redirects = 0;
   bool reads_start = false;         // to learn the object's size, if the server does not answer HEAD
   bool as_sent = false;             // a Content-Encoding says nothing true about the bytes

@@ -26,7 +26,7 @@ struct MeshFileInfo {
     const CellKind* kind = nullptr;
     std::int64_t count = 0;
   };
-  std::vector<CellCount> kinds;   // that occur, in the order of CellKinds()
+  std::vector<CellCount> kinds;   // the kinds that occur, in the order of CellKinds()
   std::vector<GridArray> arrays;  // in the file's order
   std::size_t array = 0;          // the one that is read, of `arrays`
   std::optional<int> channel{};   // the component that is read: that of MeshOptions

@@ -15,7 +15,7 @@ struct TiffSlice {
   std::size_t file = 0;                     // in TiffStack::files
   std::uint64_t directory = 0;              // its place there
   std::int64_t page = 0;                    // its number among all directories there
-  std::int64_t plane = 0;                   // as of TiffChunk
+  std::int64_t plane = 0;                   // TiffChunk::plane
   std::vector<std::uint64_t> smaller = {};  // places of its pictures at lower resolutions
 };
 
@@ -24,7 +24,7 @@ struct TiffStack {
   std::vector<TiffSlice> slices;
   RawHeader header;                  // the volume's header, as the first slice says
   ReadOptions of_pages;              // what the options say of a page's components
-  std::optional<ValueRange> window;  // as of SourceInfo
+  std::optional<ValueRange> window;  // SourceInfo::window
 
   // "a.tif: page 8", counted from 1, for messages.
   std::string NameOf(const TiffSlice& slice) const;

@@ -50,7 +50,7 @@ class VtkXmlFile {
 
   const XmlTag& dataset() const { return dataset_; }             // the element of the type's name
   const std::vector<XmlTag>& pieces() const { return pieces_; }  // at least one
-  std::int64_t times() const { return times_; }                  // that the file holds, at least one
+  std::int64_t times() const { return times_; }                  // times that the file holds, at least one
   std::int64_t time() const { return time_; }                    // the one whose arrays these are
   // The name of the active scalars of "PointData" or "CellData"; "": none.
   const std::string& ActiveScalars(std::string_view section) const { return section == "PointData" ? point_scalars_ : cell_scalars_; }

@@ -50,7 +50,7 @@ struct Sweep {
   std::vector<SweepPolicy> policies;
   std::vector<int> workers;
   std::vector<SweepLink> links;
-  HostModel host;  // that is simulated
+  HostModel host;  // the host that is simulated
   ImageSize size{512, 512};
 };
 

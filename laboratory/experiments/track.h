@@ -14,7 +14,7 @@ struct Track {
   // By frame; some frames, or all.
   std::vector<double> latency_seconds, period_seconds;
   double moving_seconds = 0;    // over the frames but the first, in which the worker that receives most receives voxels; 0: not known
-  double most_voxel_bytes = 0;  // that a worker holds at a time; 0: not known
+  double most_voxel_bytes = 0;  // the most that a worker holds at a time; 0: not known
 };
 
 // Adds the figures of the repeats: longest_render_time (mean, 95 % of frames, worst frame), imbalance, render_time, voxel_bytes,

@@ -23,7 +23,7 @@ struct BoxCost {
   double seconds = 0;                 // median of the later ones; the minimum is luck, since cores are at times quicker
   StageTimes stage_ns{};              // median of each, in elapsed time
   std::uint64_t occupied_voxels = 0;  // in the box, under the transfer function; splatting
-  std::uint64_t drawn_voxels = 0;     // that went through splat or Z-buffer
+  std::uint64_t drawn_voxels = 0;     // voxels that went through splat or Z-buffer
   PixelBounds bounds;                 // pixels of its local image
   std::uint64_t covered_pixels = 0;   // non-empty pixels in the bounds
   CoverageMap coverage;               // where these pixels lie in the frame

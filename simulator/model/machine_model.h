@@ -49,7 +49,7 @@ struct PictureWay {
 
 // Some workers render slower in some frames, for no reason that a plan could know. Which ones depends on the seed alone.
 struct Stragglers {
-  double probability = 0;  // that a worker is slow in a frame; [0, 1]
+  double probability = 0;  // how likely a worker is slow in a frame; [0, 1]
   double factor = 1;       // then its rendering takes this many times as long; >= 1
   std::uint64_t seed = 1;
   friend bool operator==(const Stragglers&, const Stragglers&) = default;

@@ -28,7 +28,7 @@ class UnionCoverage {
  private:
   struct TileRow {
     double filled = 0, runs = 0;           // numbers of each row of pixels
-    std::int32_t first_tile = 0, end = 0;  // that are not empty, and what lies between them
+    std::int32_t first_tile = 0, end = 0;  // tile columns that are not empty, and what lies between them
   };
   // share(x): of tile x of the row that is filled.
   template <class Share>

@@ -200,13 +200,13 @@ class CoordinatorScript {
   std::vector<FakeWorker> workers;       // those that send heartbeats while time passes
   std::map<WorkerId, PeerToken> tokens;  // the tokens of all workers that have joined
   std::vector<PeerToken> clients;        // those that send pings
-  std::string host;                      // that clients connect from; empty: not known
+  std::string host;                      // the host that clients connect from; empty: not known
   std::string images_key;                // the key of workers that join
   std::vector<LoadDataset> loads;        // all that were asked for
   std::vector<CountDataset> counts;
   Planner planner;
   bool plans_at_once = true;       // else plans wait in `plans` for Plan()
-  std::vector<PlanRequest> plans;  // that were not made yet
+  std::vector<PlanRequest> plans;  // plans that were not made yet
 
   // All that comes of the event, of the plans that are made at once, too.
   Actions Step(const auto& event) {

@@ -29,7 +29,7 @@ class Proxy {
   void SetDelay(Duration delay) { delay_ = delay; }         // delays everything that comes from now on, each way
   void SetStalled(bool stalled) { stalled_ = stalled; }     // nothing passes; connections stay
   void ResetAll() { ++resets_; }                            // the connections of now
-  std::size_t connections() const { return connections_; }  // that were ever made
+  std::size_t connections() const { return connections_; }  // connections that were ever made
 
  private:
   struct Chunk {

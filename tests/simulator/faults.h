@@ -40,8 +40,8 @@ struct Faults {
   double vanish = 0;    // share of clients
   // ---- stores, of volumes that are read in parts, until the world heals
   double slow_read = 0;   // share of reads that take seconds
-  double lost_read = 0;   // that never end
-  double fail_read = 0;   // that fail; another one may not
+  double lost_read = 0;   // share of reads that never end
+  double fail_read = 0;   // share of reads that fail; another one may not
   double bad_blocks = 0;  // share of blocks that are damaged, for whoever reads them
   // ---- files
   int file_changes = 0;  // changes of the volume's file

@@ -101,7 +101,7 @@ class ModelWorker {
   };
   std::map<ImageHandle, Rendering> rendering_;   // begun and not ended, paused or not
   std::map<ImageHandle, OcclusionMask> hidden_;  // found, and not yet told
-  std::map<BoxKey, ModelBox> boxes_;             // that are open
+  std::map<BoxKey, ModelBox> boxes_;             // boxes that are open
   std::map<ChunkName, Outstanding> requested_;   // and not yet stored, as the credit counts
 };
 

@@ -158,13 +158,13 @@ class Simulation : private Conditions {
   bool workerless_ = false;     // for a moment no worker was running
   const ModelCells cells_;
   const SimulatedWorld world_;
-  int most_teams_ = world_.policy.teams;  // that a client, which may be hostile, has asked for: each has a window of its own
+  int most_teams_ = world_.policy.teams;  // teams that a client, which may be hostile, has asked for: each has a window of its own
   FrameWitness witness_;
   const MachineModel machine_ = WithoutDelays();  // what takes how long is up to the world
   SimulatedService service_;
   std::optional<Planner> planner_;          // the coordinator's planner
   std::optional<DatasetMachine> datasets_;  // the coordinator's second machine
-  Time datasets_wake_;                      // that was planned last
+  Time datasets_wake_;                      // the wake-up that was planned last
   Epoch epoch_ = 0;                         // the coordinator's epoch
   std::deque<ModelWorker> workers_;         // by node
   std::vector<std::unique_ptr<ModelClient>> clients_;
@@ -177,7 +177,7 @@ class Simulation : private Conditions {
   std::size_t requests_planned_ = 0, requests_made_ = 0;
   const FrameEvent* cause_ = nullptr;  // what the coordinator deals with
   std::optional<StatusReply> status_;
-  DatasetId voxels_ = 1;  // that the volume's file holds now
+  DatasetId voxels_ = 1;  // the voxels that the volume's file holds now
   // The volume that the admin sends, and what the executor has stored of volumes.
   struct Sending {
     std::uint64_t nonce = 0, sent = 0, bytes = 0;

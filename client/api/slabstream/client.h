@@ -69,7 +69,7 @@ struct Progress {
   int queue_position = 0;                // kQueued: frames before this one
   int read_percent = 0;                  // kLoading: of the dataset, [0, 100]
   int groups_done = 0, group_count = 0;  // kRunning: parts of the picture; 0 of 0: not known yet
-  int workers = 0;                       // that share the frame
+  int workers = 0;                       // workers that share the frame
 };
 
 // A picture, immutable. Copies share the pixels. Any thread.

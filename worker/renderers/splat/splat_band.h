@@ -73,7 +73,7 @@ class SplatBand {
   std::vector<std::array<VoxelRecord, std::size_t{kOctet}>> cut_;  // records of octets near a cut
   std::vector<SegmentWord> open_whole_, open_part_, open_one_;     // [word]: scratch of CompositeClipped
   SheetOpacity::Slopes slopes_;
-  Rows rows_;                                     // that the slice can touch
+  Rows rows_;                                     // rows that the slice can touch
   std::int32_t first_beam_ = 0, beam_count_ = 0;  // beams whose footprints reach these rows
   std::vector<SegmentWord> owned_;                // [word]: segments with a column that the box owns
   const std::vector<SegmentWord> nothing_;        // [word]: 0

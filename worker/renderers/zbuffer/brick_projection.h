@@ -12,9 +12,9 @@ namespace slabstream {
 
 // A brick as a frame sees it.
 struct ProjectedBrick {
-  PixelBounds pixels;       // that its faces may touch, within the frame; may be empty
+  PixelBounds pixels;       // pixels that its faces may touch, within the frame; may be empty
   float nearest = 0;        // depth; no face is nearer
-  std::uint32_t sides = 0;  // that may face the eye: bit side
+  std::uint32_t sides = 0;  // sides that may face the eye: bit side
   bool clipped = false;     // not all of its faces are drawn
 };
 
