@@ -105,7 +105,7 @@ class ViewMachine {
   std::uint64_t frames_ = 0;
   Duration round_trip_{}, render_time_{};  // smoothed; 0: not measured yet
   bool small_ = false;                     // pictures while moving have half the size, for the connection's sake
-  double scale_ = 1;                       // the size of moving pictures, reduced for the service's sake
+  double scale_ = 1;                       // the scale of pictures while moving, below 1 for the service's sake
   Duration wider_time_{};                  // what the last picture of twice the scale took
   Time whole_until_{};                     // scale_ stays 1
   double coarseness_ = kFirstCoarseness;   // the coarseness of pictures while the view moves

@@ -282,7 +282,7 @@ struct AdmitKeys {
 struct ForgetGroups {
   FrameId finished_before = 0;
   std::vector<FrameId> cancelled;
-  GroupKey next;  // over are its frame's earlier groups and older attempts
+  GroupKey next;  // in its frame, earlier groups and older attempts are over
 
   bool Over(const GroupKey& key) const {
     return key.frame < finished_before || std::ranges::find(cancelled, key.frame) != cancelled.end() ||
