@@ -31,7 +31,7 @@
 namespace slabstream {
 
 inline constexpr std::size_t kMaxPathBytes = 4096;
-inline constexpr int kMaxTimes = 10'000;  // that one argument names
+inline constexpr int kMaxTimes = 10'000;  // times that one argument names
 
 // Help of --data.
 inline constexpr char kDataHelp[] =

@@ -86,7 +86,7 @@ struct FromWorker {
 struct FromClient {
   PeerToken from = 0;
   ClientToFrames message;
-  std::string host = {};           // that it has connected from, as in an endpoint; empty: not known
+  std::string host = {};           // the host that it has connected from, as endpoints spell it; empty: not known
   std::uint64_t unsent_bytes = 0;  // bytes of the payloads for this client that wait in this process
 };
 // The client has said something to the DatasetMachine, too.

@@ -31,7 +31,7 @@ struct PlanAsked {
   std::uint64_t version = 0;
 };
 struct PlanMade {
-  std::shared_ptr<const PlannedFrame> frame;  // which fits
+  std::shared_ptr<const PlannedFrame> frame;  // a plan that fits
   std::uint64_t version = 0;
 };
 
@@ -106,10 +106,10 @@ class RequestQueue {
   void VisitFirsts(const std::function<bool(OpenRequest&)>& visit);
   // Null: it is not there.
   const OpenRequest* Find(PeerToken client, RequestId request) const;
-  const OpenRequest* FindCoarse(PeerToken client, RequestId request) const;  // that makes a preview of it
+  const OpenRequest* FindCoarse(PeerToken client, RequestId request) const;  // the request that makes a preview of it
   std::size_t size() const;
   Duration UsedBy(PeerToken client) const { return turns_.TurnOf(client).used; }
-  std::size_t clients() const;                  // that have requests in it
+  std::size_t clients() const;                  // clients that have requests in it
   std::size_t CountOf(PeerToken client) const;  // requests of this client
   // Frames that VisitInTurn visits before this one. All of them, if it is not there.
   std::uint32_t PositionOf(PeerToken client, RequestId request);

@@ -22,9 +22,9 @@ struct CoordinatorOptions {
   std::string client_endpoint;       // bound; a wildcard port is read back
   std::string worker_endpoint;       // bound; empty: WorkerEndpointFor(client_endpoint)
   std::string voxels_endpoint;       // bound; empty: any port, ".voxels" beside an ipc path or inproc name
-  std::string keys_folder;           // whose keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
+  std::string keys_folder;           // its keys encrypt tcp connections (KeyFolder); empty: none, the service stays on this machine
   Catalogue catalogue;               // datasets
-  std::set<std::string> folders;     // that are watched (FoundData)
+  std::set<std::string> folders;     // folders that are watched (FoundData)
   Codec codec = Codec::kRaw;         // how voxels travel to workers; zstd pays if the link is slower than packing
   CoordinatorConfig machine;         // filled in by Start: epoch, pid, voxels_endpoint
   ServiceSurroundings surroundings;  // except the link, filled in by Start

@@ -16,7 +16,7 @@
 namespace slabstream {
 
 struct MovieOptions {
-  std::string path;  // of a movie, as MovieFormatOf has it
+  std::string path;  // the movie's path, as MovieFormatOf has it
   MovieShape shape;
   PictureFormat format;
   PictureKey key = {};  // black shows through a transparent background

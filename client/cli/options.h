@@ -194,7 +194,7 @@ struct SlurmOptions {
   TimeLimit time;                       // the time limit of the job
   int notice_seconds = 60;              // [1, kMaxNoticeSeconds]
   std::vector<std::string> data;        // NAME=PATH or DIR, as slabstream-coordinator takes them
-  std::string folder;                   // that all nodes share; empty: the one from which the job is submitted
+  std::string folder;                   // a folder that all nodes share; empty: the one from which the job is submitted
   std::vector<std::string> directives;  // as ParseDirective takes them
 };
 

@@ -30,13 +30,13 @@ struct RecordedRank {
   BoxId box = 0;
   WorkerId worker = 0;  // 0: no report for this rank
   double render_seconds = 0;
-  PixelBounds bounds;  // of its image, in the grid
+  PixelBounds bounds;  // pixels of its image, in the grid
   double pixels = 0;   // non-empty pixels in the bounds
 };
 
 struct RecordedFrame {
   const RendererKind* renderer = &DefaultRenderer();
-  PixelBounds grid;  // of the frame that was rendered and combined
+  PixelBounds grid;  // pixels of the frame that was rendered and combined
   std::uint32_t workers = 1;
   WorkerId display = 0;
   std::string combine;

@@ -25,7 +25,8 @@ namespace slabstream {
 // What a file holds beside the pixels.
 struct PictureNotes {
   PictureGeometry geometry;
-  std::vector<PictureGeometry> panes = {};  // of several pictures side by side, of equal widths; empty: it is one
+  // The geometries of several pictures side by side, of equal widths; empty: it is one picture.
+  std::vector<PictureGeometry> panes = {};
   PictureKey key = {};
   std::string record;  // ASCII text that says how the picture was made, under the name kRecordName; empty: none
 };

@@ -15,7 +15,7 @@ namespace slabstream {
 
 struct Ink {
   PixelBounds bounds;           // may reach beyond the picture; outside of it there is no ink
-  std::vector<float> coverage;  // of each pixel of the bounds, row by row, in [0, 1]
+  std::vector<float> coverage;  // one for each pixel of the bounds, row by row, in [0, 1]
 };
 
 Ink RectangleInk(InkPoint begin, InkPoint end);             // begin: upper left corner

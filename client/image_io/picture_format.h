@@ -14,7 +14,7 @@ struct StraightColor {
 struct Annotations {
   bool scale_bar = false;
   bool orientation_marker = false;  // the axes of the world; of patients also the letters of the sides
-  bool sides_only = false;          // of patients the letters without the axes, as is usual in slices
+  bool sides_only = false;          // a patient's sides as letters, without axes, as is usual in slices
   std::string title;                // empty: none
   // What the picture's key says (PictureKey); a key that has nothing of it leaves them out.
   std::optional<std::string> color_bar;  // its caption, such as a unit; "": none
@@ -31,8 +31,8 @@ inline constexpr int kMaxDotsPerInch = 10000;
 inline constexpr int kUsualDotsPerInch = 72;  // a point is a pixel
 
 struct PictureFormat {
-  int png_bits = 8;          // of PNG and TIFF, 8 or 16; EXR is always float, the others and frames of movies have 8
-  int quality = 90;          // of JPEG and WebP, [1, 100]
+  int png_bits = 8;          // bits of PNG and TIFF, 8 or 16; EXR is always float, the others and frames of movies have 8
+  int quality = 90;          // the quality of JPEG and WebP, [1, 100]
   StraightColor background;  // put behind the picture; the default leaves it as it is
   Annotations annotations;   // drawn onto it
   // Pixels an inch, [1, kMaxDotsPerInch], which the file states; none: it states the size of pixels in the world, if that is known.

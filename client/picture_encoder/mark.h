@@ -31,7 +31,7 @@ struct Polygon {
 struct TextLine {
   std::string text;  // UTF-8
   int size = 11;     // pixels from ascender to descender
-  InkPoint begin;    // of the baseline
+  InkPoint begin;    // where the baseline begins
   int width = 0;     // pixels, as TextWidth measures it
 };
 // Colours from top to bottom, one for each row of pixels. Its sides lie between pixels.

@@ -23,12 +23,12 @@ enum class PictureFileType { kPng, kJpeg, kWebp, kTiff, kExr, kPdf, kSvg };
 struct EncodedFormat {
   PictureFileType type = PictureFileType::kPng;
   int width = 0, height = 0;
-  int bits = 8;                               // of the samples of PNG and TIFF: 8 or 16. EXR has floats, the others have 8 bits
-  bool with_depth = false;                    // of an EXR: Z follows R, G, B and A
-  int quality = 90;                           // of JPEG and WebP, [1, 100]
+  int bits = 8;                               // bits of the samples of PNG and TIFF: 8 or 16. EXR has floats, the others have 8 bits
+  bool with_depth = false;                    // an EXR has depths: Z follows R, G, B and A
+  int quality = 90;                           // the quality of JPEG and WebP, [1, 100]
   std::optional<double> density;              // pixels a metre
   std::string software, record_name, record;  // texts for the file's header; an empty record: none of them
-  // Of PDF and SVG, over the pixels; in other formats the pixels hold them.
+  // What PDF and SVG show over the pixels; in other formats the pixels hold it.
   std::span<const Mark> marks = {};
   std::string font;  // the file of the letters; only with marks
 };
@@ -50,7 +50,7 @@ class PictureEncoder {
   ~PictureEncoder() = default;
 };
 
-// Of PNG, JPEG and WebP; of the other types null. Any thread.
+// The encoder of PNG, JPEG and WebP; null for the other types. Any thread.
 const PictureEncoder* OwnPictureEncoder(PictureFileType type);
 
 // What the module exports, as kPictureEncoderEntry, for the other types.

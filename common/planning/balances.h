@@ -23,9 +23,9 @@ struct BalanceRequest {
   const Layout* now = nullptr;          // the layout of the last frames
   std::span<const double> seconds;      // measured render time of each box of `now`, newer frames count more; 0: not rendered
   const LayoutRequest* make = nullptr;  // what `now` was made for, with known.cost
-  int frames_seen = 1;                  // of `now` since it was made, >= 1
-  std::optional<double> noise = {};     // of a box's time in a frame (FrameNoise); none: not known yet
-  MoveSeconds move = {};                // of the volume's earlier layouts
+  int frames_seen = 1;                  // frames of `now` since it was made, >= 1
+  std::optional<double> noise = {};     // how much a box's time in a frame scatters (FrameNoise); none: not known yet
+  MoveSeconds move = {};                // what moves took in the volume's earlier layouts
 };
 
 // A mean time of a box scatters no less than one over so many frames, since newer frames count more.

@@ -29,7 +29,7 @@ struct Placement {
   BoxId id = 0;
   Box box;  // in voxels of the setup's volume
   WorkerId worker = 0;
-  std::uint8_t level = 0;              // that it is drawn from: LevelBox
+  std::uint8_t level = 0;              // the level that it is drawn from: LevelBox
   std::vector<FilledBox> filled = {};  // parts of the padded box that need not be read; only at level 0
 
   LevelBox at() const { return {box, level}; }

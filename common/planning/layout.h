@@ -44,7 +44,7 @@ inline constexpr std::int64_t kBoxBytesTarget = std::int64_t{256} << 20;
 
 struct LayoutRequest {
   const VolumeSummary* summary = nullptr;
-  const ClassifiedVolume* volume = nullptr;  // which has this summary
+  const ClassifiedVolume* volume = nullptr;  // it has this summary
   const ResolvedPolicy* policy = nullptr;
   std::uint32_t slots = 1;  // >= 1
   std::int64_t box_bytes_target = kBoxBytesTarget;

@@ -91,7 +91,7 @@ struct FrameStatistics {
   std::optional<FramePrediction> predicted;  // if the policy left a choice
   std::vector<LevelUse> levels;              // finest first; at most kMaxLevels
   std::string lowered;                       // one line: a coarser level was drawn (FrameRequest::detail 0), which one and why; else empty
-  std::optional<ViewParameters> view;        // that the picture was made by, complete (ChooseView); final pictures have it
+  std::optional<ViewParameters> view;        // the view that the picture was made by, complete (ChooseView); final pictures have it
   friend bool operator==(const FrameStatistics&, const FrameStatistics&) = default;
 };
 
@@ -267,13 +267,13 @@ inline constexpr std::size_t kMaxPercentiles = 64;
 struct SummaryQuery {
   std::uint64_t nonce = 0;
   std::string dataset;      // 1 ... kMaxNameBytes
-  TransferChoice transfer;  // that is resolved for the dataset
+  TransferChoice transfer;  // the function that is resolved for the dataset
   friend bool operator==(const SummaryQuery&, const SummaryQuery&) = default;
 };
 
 struct Percentile {
   double percent = 0;  // [0, 100]
-  double value = 0;    // that so many of the finite voxels do not exceed
+  double value = 0;    // the value that so many of the finite voxels do not exceed
   friend bool operator==(const Percentile&, const Percentile&) = default;
 };
 
@@ -285,7 +285,7 @@ struct SummaryReply {
   std::uint64_t non_finite = 0;                                                       // voxels
   std::vector<Percentile> percentiles;                                                // at most kMaxPercentiles
   TransferFunction transfer;                                                          // the query's function, for this dataset
-  std::vector<Label> labels;                                                          // as LabelTable; at most kMaxLabels
+  std::vector<Label> labels;                                                          // LabelTable's labels; at most kMaxLabels
   friend bool operator==(const SummaryReply&, const SummaryReply&) = default;
 };
 
@@ -329,7 +329,7 @@ struct JointHistogramQuery {
 
 struct JointHistogramReply {
   std::uint64_t nonce = 0;
-  ValueRange range;  // as VolumeSummary
+  ValueRange range;  // VolumeSummary::range
   JointHistogram histogram;
   friend bool operator==(const JointHistogramReply&, const JointHistogramReply&) = default;
 };

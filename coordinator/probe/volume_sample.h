@@ -18,7 +18,7 @@ struct LabelAt {
 struct VolumeSample {
   Vec3 at;              // the point, of the world
   bool inside = false;  // the volume fills half a voxel beyond the centres of its outermost voxels; else nothing of what follows
-  Index3 voxel = {};    // that holds the point
+  Index3 voxel = {};    // the voxel that holds the point
   std::optional<double> value = {};         // data value of the voxel; none: it is not finite
   std::optional<LabelAt> label = {};        // if the dataset has labels
   std::optional<double> overlay = {};       // data value of its overlay; none: there is none here

@@ -1,4 +1,4 @@
-// --cache: what web servers send is kept on disk (data/stores/object_cache.h). Of all programs that read volumes.
+// --cache: what web servers send is kept on disk (data/stores/object_cache.h). All programs that read volumes have it.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -16,7 +16,7 @@ struct LocatedVolume {
   RawHeader header;
   Payload payload;  // the payload of this volume alone
   AxisTurn turn;
-  int component = 0;  // which of the header's, in a voxel
+  int component = 0;  // the component of a voxel that is read
   SourceInfo info;    // one level; samples as KeptTypeOf says
 };
 

@@ -26,7 +26,7 @@ class ChunkCache {
   std::optional<Bytes> Find(Owner owner, std::uint64_t chunk);
   void Keep(Owner owner, std::uint64_t chunk, const Bytes& elements);  // unless it is larger than the whole budget
 
-  std::uint64_t bytes() const;  // that it holds
+  std::uint64_t bytes() const;  // bytes that it holds
 
  private:
   using Key = std::pair<Owner, std::uint64_t>;

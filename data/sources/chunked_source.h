@@ -32,7 +32,7 @@ struct PyramidLevel {
 
 struct Pyramid {
   std::vector<PyramidLevel> levels;  // finest first
-  Orientation orientation = {};      // of all levels; its origin does not matter, since each level has its own
+  Orientation orientation = {};      // the orientation of all levels; its origin does not matter, since each level has its own
   ValueMapping rescale = {};         // from stored values to data values
   SourceInfo info = {};              // without its levels and exact; file_type: "" means that of the arrays
 };

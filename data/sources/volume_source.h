@@ -37,17 +37,17 @@ struct SourceLevel {
 struct SourceInfo {
   std::vector<SourceLevel> levels;         // at least one
   std::string format;                      // "OME-Zarr 0.5"
-  std::string file_type;                   // of samples as they are stored: "int16"
-  ExactType exact = {};                    // of reads of exact samples (BoxRoom::exact)
+  std::string file_type;                   // the type of samples as they are stored: "int16"
+  ExactType exact = {};                    // the type of exact samples (BoxRoom::exact)
   bool labels = false;                     // samples are numbers of structures, not measurements
-  std::vector<StatedLabel> looks = {};     // of labels, by ascending values, as far as the source says it
+  std::vector<StatedLabel> looks = {};     // looks of labels, by ascending values, as far as the source says it
   std::vector<std::string> channels = {};  // names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it shows
   int times = 1, time = 0;                 // how many the source holds, and which of them it shows
   std::optional<ValueRange> window = {};   // data values that its author shows
   std::vector<std::string> notes = {};     // as of VolumeFileInfo
   std::vector<std::string> files = {};     // whose time of change tells that it is another volume now (FileStamp)
-  std::uint64_t version = 0;               // of these files when it was opened (VersionOf); of an opened source
+  std::uint64_t version = 0;               // the version of these files when it was opened (VersionOf); only an opened source has one
   std::string folder = {};                 // whose other files hold the chunks, an object each; empty: `files` hold them
 };
 

@@ -25,13 +25,13 @@ inline constexpr std::int64_t kExactBytes = std::int64_t{1} << 30, kSurveyBytes 
 struct SurveyBytes {
   std::int64_t exact = kExactBytes, coarse = kSurveyBytes;
 };
-// Of a source behind an address: the first picture waits until they have come.
+// The survey of a source behind an address reads less: the first picture waits until the bytes have come.
 inline constexpr SurveyBytes kFarSurvey = {.exact = 8 << 20, .coarse = 8 << 20};
 
 struct Survey {
-  int level = 0;        // of `summary`
-  bool sample = false;  // of that level was read, not all of it
-  // Of that level. It has no bricks if only a sample was read.
+  int level = 0;        // the level that `summary` describes
+  bool sample = false;  // a sample of that level was read, not all of it
+  // The summary of that level. It has no bricks if only a sample was read.
   std::shared_ptr<const VolumeSummary> summary;
 };
 

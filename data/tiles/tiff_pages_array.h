@@ -17,7 +17,7 @@ namespace slabstream {
 struct TiffPlace {
   std::size_t file = 0;         // in the pool
   std::uint64_t directory = 0;  // its place there
-  std::int64_t plane = 0;       // as of TiffChunk
+  std::int64_t plane = 0;       // TiffChunk::plane
 };
 
 // Open files at directories, which are used by one thread at a time: those that were used last.

@@ -21,7 +21,7 @@ struct ExactType {
 
 struct ExactSamples {
   ExactType of;
-  AlignedVector<std::byte> bytes;  // of all voxels of the volume, x fastest
+  AlignedVector<std::byte> bytes;  // the samples of all voxels of the volume, x fastest
 };
 
 // Whether float32 rounds some of its values.
@@ -44,7 +44,7 @@ ExactValue ExactValueOf(const ExactType& of, const std::byte* sample);
 // What is said of a volume of this type, of which float32 rounds some values. `all`: its samples, if somebody has them.
 std::string RoundingText(SampleType type, const ExactSamples* all = nullptr);
 
-// Of the exact samples of a volume or, if there are none (null), of those of its block.
+// The type of the exact samples of a volume or, if there are none (null), of those of its block.
 ExactType BestType(const Volume& volume, const ExactSamples* exact);
 // Calls function(samples, mapping) with a pointer to these samples, in their C++ type, and the mapping from them to data values.
 template <class Function>

@@ -31,7 +31,7 @@ struct RawHeader {
   int components = 1;  // in [1, kMaxComponents]
   // In [1, kMaxVolumes], one after the other in the payload; of an image with channels: of each channel, one behind the other.
   std::int64_t volumes = 1;
-  std::int64_t number = 0;  // which of them: in [0, volumes)
+  std::int64_t number = 0;  // the volume's number in [0, volumes)
   World world = World::kVoxels;
   // From a voxel to the next one along its x, y and z, in that world. kVoxels: each along one axis, in some order. As in the file: may be
   // zero or NaN (kVoxels: only in that order).
@@ -111,7 +111,7 @@ T TakenComponent(const T* voxel, std::optional<int> channel) {
   return std::is_integral_v<T> ? T(std::nearbyint(value)) : T(value);
 }
 
-// Of several components, leaves the one that options.channel takes, or their luminance, in place.
+// Keeps one of several components in place: the one that options.channel takes, or their luminance.
 void TakeChannel(RawVolume& raw, const ReadOptions& options);
 
 }  // namespace slabstream

@@ -47,7 +47,7 @@ class ShardIndices {
   // So that it is read anew: it was wrong.
   void Forget(const std::string& shard);
 
-  std::uint64_t bytes() const;  // that are kept
+  std::uint64_t bytes() const;  // bytes that are kept
 
  private:
   struct Entry {
