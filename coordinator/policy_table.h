@@ -36,7 +36,7 @@ class PolicyTable {
   static constexpr std::size_t kMaxKept = 16;        // choices
   static constexpr std::size_t kMaxKinds = 16;       // kinds of views, for each choice
   static constexpr double kRevisitGain = 0.1;        // share of a frame's latency
-  static constexpr double kLeastWeight = 0.2;        // the least weight of a frame's render time, however many came before it
+  static constexpr double kLeastWeight = 0.2;        // of a frame's render time, however many came before it
   static constexpr int kMostFramesAPrediction = 64;  // predictions are made anew after 1, 2, 4 ... frames, later after every so many
 
   // The policy for the frame of `request`, whose own policy leaves a choice. `machine` models the workers. Measured costs come from

@@ -25,8 +25,8 @@ class BoxEstimator {
                std::int32_t pixel_side);
 
   struct Estimate {
-    double seconds = 0;    // time of one thread
-    CoverageMap coverage;  // what the box's image covers
+    double seconds = 0;    // of one thread
+    CoverageMap coverage;  // of the box's image
   };
   Estimate Of(const Box& box) const;  // inside the volume, not empty
 

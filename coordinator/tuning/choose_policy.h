@@ -26,7 +26,7 @@ namespace slabstream {
 struct PolicyQuestion {
   const Policy* open = nullptr;  // settled, with known names (SettledPolicy, CheckNames)
   const ResolvedRequest* resolved = nullptr;
-  const FrameSetup* setup = nullptr;  // the frame's setup (MakeFrameSetup)
+  const FrameSetup* setup = nullptr;  // of it (MakeFrameSetup)
   WorkKnowledge known;
   std::uint32_t slots = 1;                // workers, [1, kMaxRanks]
   const MachineModel* machine = nullptr;  // valid; see service_machine.h
@@ -39,10 +39,9 @@ struct PolicyQuestion {
 };
 
 struct PolicyChoice {
-  ResolvedPolicy policy;  // with a number of groups
-  // The frame's prediction; none: its schedule is too long to be tried (FramePredictor::kMostSteps).
-  std::optional<FramePrediction> prediction;
-  int predicted = 0;  // candidates
+  ResolvedPolicy policy;                      // with a number of groups
+  std::optional<FramePrediction> prediction;  // of it; none: its schedule is too long to be tried (FramePredictor::kMostSteps)
+  int predicted = 0;                          // candidates
 };
 
 inline constexpr double kLeastGain = 0.02;

@@ -16,9 +16,9 @@ namespace slabstream {
 
 class FramePredictor {
  public:
-  static constexpr std::int64_t kMostTiles = std::int64_t{1} << 17;  // tiles of all ranks of a group
+  static constexpr std::int64_t kMostTiles = std::int64_t{1} << 17;  // of all ranks of a group
   static constexpr std::int64_t kMostFrameTiles = 1024;
-  static constexpr std::uint64_t kMostSteps = 8192;  // steps of a frame: schedules of more are too long to be tried
+  static constexpr std::uint64_t kMostSteps = 8192;  // of a frame: schedules of more are too long to be tried
 
   // `render_scale`: measured / predicted time of boxes so far. All arguments must live as long as this.
   FramePredictor(const FrameSetup& setup, const VolumeSummary& summary, const OccupancyGrid& occupied, const WorkField* measured,
@@ -26,7 +26,7 @@ class FramePredictor {
 
   // A layout with estimated boxes, ready for any scheme.
   struct Prepared {
-    FramePlan plan;  // the plan of the coarse frame; without schedules
+    FramePlan plan;  // of the coarse frame; without schedules
     std::vector<BoxEstimator::Estimate> boxes;
   };
   Prepared Prepare(Layout layout) const;  // `layout` has as many slots as this

@@ -16,7 +16,7 @@ LinkModel DefaultLink();
 struct ServiceSurroundings {
   LinkModel link = DefaultLink();  // between workers of different hosts
   std::uint64_t memory_scope = 0;  // the coordinator's own host; 0: unknown
-  std::int32_t cores = 1;          // the cores of that host
+  std::int32_t cores = 1;          // of that host
   bool encrypted = false;          // images that travel, over tcp
   friend bool operator==(const ServiceSurroundings&, const ServiceSurroundings&) = default;
 };

@@ -19,8 +19,7 @@ namespace slabstream {
 const SourceContext& ProcessReadContext();
 void SetReadMemory(std::uint64_t process_bytes);
 
-// What a file would say of the finest level of a source. Steps are those of the voxels, since a source does not tell
-// how its files store them.
+// Of the finest level of a source. Its steps are those of the voxels, since a source does not tell how its files store them.
 VolumeFileInfo FileInfoOf(const SourceInfo& source);
 
 // Logs a line for each choice among times and channels that the options leave open (data/volume_io/file_parts.h).

@@ -12,9 +12,9 @@ namespace slabstream {
 
 struct FileParts {
   int times = 1, time = 0;            // how many, and the one that is read
-  std::vector<std::string> channels;  // names of an image's channels, some of which may be empty
+  std::vector<std::string> channels;  // of an image: their names, some of which may be empty
   int channel = 0;
-  int components = 1;  // components of a voxel
+  int components = 1;  // of a voxel
 };
 
 // By the headers. Errors of CheckVolumeHeaders (volume_reader.h).

@@ -41,8 +41,8 @@ struct VolumeFileInfo {
   std::array<Vec3, 3> steps;
   bool straightened = false;               // the stored axes are not at right angles
   bool labels = false;                     // samples are numbers of structures, not measurements
-  std::vector<StatedLabel> looks = {};     // looks of labels, by ascending values, as far as the file says it
-  std::vector<std::string> channels = {};  // names of an image's channels, "" where there is none; empty: there is one channel
+  std::vector<StatedLabel> looks = {};     // of labels, by ascending values, as far as the file says it
+  std::vector<std::string> channels = {};  // of an image: names, "" where there is none; empty: there is one channel
   int channel = 0;                         // which of them it is
   int times = 1, time = 0;                 // how many volumes the file holds, and which of them it is
   // A sentence each, for people, of what the reader chose or applied where the file leaves it open, such as which of two matrices.
@@ -72,9 +72,9 @@ Status CheckVolume(const std::string& path, const ReadOptions& options = {});
 bool LooksLikeVolume(const std::string& path);
 
 struct WriteOptions {
-  std::optional<SampleType> type;  // the type of the samples in the file; none: see FileSamples
+  std::optional<SampleType> type;  // of the samples in the file; none: see FileSamples
   WriteProgress progress;
-  const ExactSamples* exact = nullptr;  // the volume's exact samples, which are written; null: there are none
+  const ExactSamples* exact = nullptr;  // of the volume, which are written; null: there are none
 };
 
 // Writes the format that the ending names (formats.h; .mhd: with a .raw beside it). Files have no value mapping, but the data values
