@@ -31,10 +31,14 @@ pkg_check_modules(ZIP REQUIRED IMPORTED_TARGET libzip)
 pkg_check_modules(HDF5 REQUIRED IMPORTED_TARGET hdf5-serial)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 pkg_check_modules(WEBP REQUIRED IMPORTED_TARGET libwebp libwebpmux)
-pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET cairo-pdf cairo-svg cairo-ft)
-# OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.
-pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
-# So does that of GDCM, which has no pkg-config file.
+if(SLABSTREAM_PICTURES)
+  pkg_check_modules(CAIRO REQUIRED IMPORTED_TARGET cairo-pdf cairo-svg cairo-ft)
+endif()
+if(SLABSTREAM_PICTURES OR SLABSTREAM_TESTS)
+  # OpenImageIO's own CMake configuration wants its command-line tools and an OpenCV include directory; its pkg-config file does not.
+  pkg_check_modules(OIIO REQUIRED IMPORTED_TARGET OpenImageIO)
+endif()
+# The CMake configuration of GDCM wants programs, too, and it has no pkg-config file.
 find_path(GDCM_INCLUDE_DIR gdcmImageCodec.h PATH_SUFFIXES gdcm-3.0 REQUIRED)
 add_library(slabstream_gdcm INTERFACE)
 target_include_directories(slabstream_gdcm SYSTEM INTERFACE ${GDCM_INCLUDE_DIR})

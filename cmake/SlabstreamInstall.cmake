@@ -19,7 +19,9 @@ endforeach()
 # The client library in C++.
 install(TARGETS slabstream_api EXPORT SlabstreamTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT client-runtime NAMELINK_COMPONENT client-development)
-install(TARGETS slabstream_pictures LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/slabstream COMPONENT client-runtime)
+if(SLABSTREAM_PICTURES)
+  install(TARGETS slabstream_pictures LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/slabstream COMPONENT client-runtime)
+endif()
 install(FILES ${CMAKE_SOURCE_DIR}/client/api/slabstream/client.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/slabstream COMPONENT client-development)
 install(DIRECTORY ${CMAKE_SOURCE_DIR}/examples DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT client-development USE_SOURCE_PERMISSIONS)
 

@@ -12,6 +12,7 @@
 #include "common/base/version.h"
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
+#include "common/kernels/simd_target.h"
 #include "common/metrics/metrics_listener.h"
 #include "common/transport/socket.h"
 #include "common/volume/memory_budget.h"
@@ -26,6 +27,7 @@ namespace slabstream {
 namespace {
 
 Status Serve(CoordinatorOptions options, const MetricsOptions& metrics) {
+  if (Status simd = LimitSimdTargetByEnvironment(); !simd.ok()) return simd;
   BlockStopSignals();
   Context context;
   auto service = CoordinatorService::Start(context, std::move(options));

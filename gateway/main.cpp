@@ -11,6 +11,7 @@
 #include "common/cli/add_option.h"
 #include "common/cli/program.h"
 #include "common/http/address.h"
+#include "common/kernels/simd_target.h"
 #include "common/otlp/trace_sender.h"
 #include "common/transport/context.h"
 #include "common/volume/memory_budget.h"
@@ -31,6 +32,7 @@ Result<std::uint64_t> ParseUploadLimit(const std::string& option, const std::str
 }
 
 Status Serve(Options options) {
+  if (Status simd = LimitSimdTargetByEnvironment(); !simd.ok()) return simd;
   BlockStopSignals();
   const Result<ServiceAddress> service = ResolveService(options.service);
   if (!service.ok()) return service.status();

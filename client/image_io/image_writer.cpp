@@ -73,8 +73,8 @@ Result<void*> ModuleEntry() {
     void* const entry = module == nullptr ? nullptr : dlsym(module, kPictureEncoderEntry);
     if (entry == nullptr) {
       return Status::Unavailable(
-          fmt::format("only .png, .jpg and .webp can be written: {} (libslabstream-pictures.so belongs beside the "
-                      "program and needs libopenimageio2.4 and libcairo2)",
+          fmt::format("only .png, .jpg and .webp can be written: {} (libslabstream-pictures.so, which deploy/build makes, belongs "
+                      "beside the program and needs libopenimageio2.4 and libcairo2)",
                       dlerror()));
     }
     return entry;
