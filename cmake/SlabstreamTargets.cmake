@@ -81,7 +81,8 @@ function(slabstream_program name)
 endfunction()
 
 # slabstream_test(NAME SOURCES file... LINKS target... [TIMEOUT seconds] [LABELS label...] [COST seconds] [WAITS]): a GoogleTest program in
-# build/tests, one ctest. COST: long ones begin first. WAITS: it leaves the processors to others most of the time.
+# build/tests, one ctest. COST: long ones begin first. WAITS: it leaves the processors to others most of the time. A test without labels and
+# cost is quick: the target quick_tests builds all of these, and ctest -L quick runs them.
 function(slabstream_test name)
   cmake_parse_arguments(ARG "WAITS" "TIMEOUT;COST" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)
@@ -97,6 +98,10 @@ function(slabstream_test name)
   set(processors 2)
   if(ARG_WAITS)
     set(processors 1)
+  endif()
+  if(NOT ARG_COST AND NOT ARG_LABELS)
+    set(ARG_LABELS quick)
+    set_property(GLOBAL APPEND PROPERTY SLABSTREAM_QUICK_TESTS ${name})
   endif()
   if(NOT ARG_COST)
     set(ARG_COST 0)
